@@ -1,0 +1,282 @@
+//! Layer 3: what the host brings.
+//!
+//! [`Medium`] and [`Scene`] are open sets and therefore traits: few methods, plain data in and
+//! out, usable as `&dyn`. All but the indispensable have honest defaults.
+
+use glam::Vec3;
+pub use rand_core::Rng;
+
+use crate::math::Ray;
+use crate::phase::Phase;
+use crate::spectrum::{Gradient, Hessian, Spectrum};
+use crate::surface::Surface;
+
+/// Optical properties of a medium at a point.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Properties {
+    /// Absorption coefficient σₐ (m⁻¹).
+    pub absorption: Spectrum,
+    /// Scattering coefficient σₛ (m⁻¹).
+    pub scattering: Spectrum,
+    /// Emitted radiance per length (W·m⁻³·sr⁻¹); the same in all directions.
+    pub emission: Spectrum,
+    /// Angular law of scattering.
+    pub phase: Phase,
+}
+
+impl Properties {
+    /// Empty space.
+    pub const VACUUM: Self = Self {
+        absorption: Spectrum::ZERO,
+        scattering: Spectrum::ZERO,
+        emission: Spectrum::ZERO,
+        phase: Phase::ISOTROPIC,
+    };
+
+    /// Extinction coefficient σₜ = σₐ + σₛ (m⁻¹).
+    #[inline]
+    #[must_use]
+    pub fn extinction(&self) -> Spectrum {
+        self.absorption + self.scattering
+    }
+
+    /// Single-scattering albedo σₛ/σₜ; 0 in vacuum.
+    #[inline]
+    #[must_use]
+    pub fn albedo(&self) -> Spectrum {
+        self.scattering.ratio(self.extinction())
+    }
+}
+
+/// Bounds on extinction along a part of a ray.
+///
+/// Equal bounds mean that the medium is constant there (all of its properties, not only the sum),
+/// so closed forms apply; a majorant of 0 means vacuum without emission.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Stretch {
+    /// Distance along the ray (m) up to which the bounds hold; greater than where they were asked.
+    pub until: f32,
+    /// Lower bound of extinction (m⁻¹).
+    pub minorant: Spectrum,
+    /// Upper bound of extinction (m⁻¹).
+    pub majorant: Spectrum,
+}
+
+impl Stretch {
+    /// Vacuum up to `until`.
+    #[inline]
+    #[must_use]
+    pub fn vacuum(until: f32) -> Self {
+        Self { until, minorant: Spectrum::ZERO, majorant: Spectrum::ZERO }
+    }
+
+    /// Whether the medium is constant along the stretch.
+    #[inline]
+    #[must_use]
+    pub fn is_constant(&self) -> bool {
+        self.minorant == self.majorant
+    }
+}
+
+/// Gradients of a medium's coefficients inside it; jumps at its faces are [`Face`]s.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Gradients {
+    /// `∇σₜ` (m⁻²).
+    pub extinction: Gradient,
+    /// `∇σₛ` (m⁻²).
+    pub scattering: Gradient,
+}
+
+/// A crossing of a ray with a face where extinction jumps.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Face {
+    /// Distance along the ray (m).
+    pub distance: f32,
+    /// Unit normal of the face, out of the body.
+    pub normal: Vec3,
+    /// Jump of σₜ (m⁻¹) along the normal: outside minus inside.
+    pub jump: Spectrum,
+}
+
+/// A participating medium, as the host knows it.
+pub trait Medium {
+    /// Optical properties at `point`.
+    fn properties(&self, point: Vec3) -> Properties;
+
+    /// Bounds on extinction from distance `from` (m) along `ray` to a farther `until`.
+    ///
+    /// A pure question: no state between calls. `until` may lie beyond the ray's length; where
+    /// nothing follows it is infinite.
+    fn stretch(&self, ray: &Ray, from: f32) -> Stretch;
+
+    /// Extinction alone (m⁻¹), where a cheaper answer exists.
+    fn extinction(&self, point: Vec3) -> Spectrum {
+        self.properties(point).extinction()
+    }
+
+    /// Length (m) over which coefficients vary: the step of the default's differences and of ray
+    /// marching. A grid answers with its cell.
+    fn resolution(&self) -> f32 {
+        1e-2
+    }
+
+    /// `∇σₜ` and `∇σₛ` (m⁻²) inside the medium. The default takes central differences over a
+    /// hundredth of [`Medium::resolution`].
+    fn gradients(&self, point: Vec3) -> Gradients {
+        let step = 1e-2 * self.resolution();
+        let difference = |axis: Vec3| {
+            let (a, b) = (self.properties(point + axis * step), self.properties(point - axis * step));
+            let scale = 0.5 / step;
+            ((a.extinction() - b.extinction()) * scale, (a.scattering - b.scattering) * scale)
+        };
+        let [x, y, z] = [Vec3::X, Vec3::Y, Vec3::Z].map(difference);
+        Gradients { extinction: Gradient { x: x.0, y: y.0, z: z.0 }, scattering: Gradient { x: x.1, y: y.1, z: z.1 } }
+    }
+
+    /// Hessian of extinction (m⁻³) inside the medium. The default takes second differences over
+    /// [`Medium::resolution`].
+    fn extinction_hessian(&self, point: Vec3) -> Hessian {
+        let h = self.resolution();
+        let at = |offset: Vec3| self.extinction(point + offset * h);
+        let centre = at(Vec3::ZERO);
+        let second = |a: Vec3| (at(a) + at(-a) - centre * 2.0) / (h * h);
+        let mixed = |a: Vec3, b: Vec3| (at(a + b) + at(-a - b) - at(a - b) - at(b - a)) / (4.0 * h * h);
+        let (x, y, z) = (Vec3::X, Vec3::Y, Vec3::Z);
+        Hessian { xx: second(x), xy: mixed(x, y), xz: mixed(x, z), yy: second(y), yz: mixed(y, z), zz: second(z) }
+    }
+
+    /// Mean extinction (m⁻¹) within the ball around `centre` of `radius` (m). The default averages
+    /// the centre and two shells of six points: exact for quadratic fields, rough across faces.
+    fn mean_extinction(&self, centre: Vec3, radius: f32) -> Spectrum {
+        // Weights that integrate 1 and r² over the ball: shells at 0.5 R and 0.9 R.
+        const SHELLS: [(f32, f32); 2] = [(0.5, 0.3), (0.9, 0.648_148_15)];
+        let mut sum = self.extinction(centre) * (1.0 - SHELLS[0].1 - SHELLS[1].1);
+        for (at, weight) in SHELLS {
+            for axis in [Vec3::X, Vec3::Y, Vec3::Z] {
+                let offset = axis * (radius * at);
+                sum += (self.extinction(centre + offset) + self.extinction(centre - offset)) * (weight / 6.0);
+            }
+        }
+        sum.max(Spectrum::ZERO)
+    }
+
+    /// Reports every crossing of `ray` (within its length) with a face where extinction jumps, in
+    /// any order. The default has none.
+    fn faces(&self, ray: &Ray, visit: &mut dyn FnMut(Face)) {
+        let _ = (ray, visit);
+    }
+
+    /// Whether extinction is the same in every channel, everywhere: then tracking is simpler.
+    fn is_grey(&self) -> bool {
+        false
+    }
+
+    /// Whether the medium may emit light.
+    fn is_emissive(&self) -> bool {
+        false
+    }
+}
+
+impl<M: Medium + ?Sized> Medium for &M {
+    fn properties(&self, point: Vec3) -> Properties {
+        (**self).properties(point)
+    }
+    fn stretch(&self, ray: &Ray, from: f32) -> Stretch {
+        (**self).stretch(ray, from)
+    }
+    fn extinction(&self, point: Vec3) -> Spectrum {
+        (**self).extinction(point)
+    }
+    fn resolution(&self) -> f32 {
+        (**self).resolution()
+    }
+    fn gradients(&self, point: Vec3) -> Gradients {
+        (**self).gradients(point)
+    }
+    fn extinction_hessian(&self, point: Vec3) -> Hessian {
+        (**self).extinction_hessian(point)
+    }
+    fn mean_extinction(&self, centre: Vec3, radius: f32) -> Spectrum {
+        (**self).mean_extinction(centre, radius)
+    }
+    fn faces(&self, ray: &Ray, visit: &mut dyn FnMut(Face)) {
+        (**self).faces(ray, visit);
+    }
+    fn is_grey(&self) -> bool {
+        (**self).is_grey()
+    }
+    fn is_emissive(&self) -> bool {
+        (**self).is_emissive()
+    }
+}
+
+/// Where a ray meets a surface.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Hit {
+    /// Distance along the ray (m).
+    pub distance: f32,
+    /// Geometric normal (unit). One-sided surfaces reflect and emit on the side it points to; for
+    /// a two-sided one the host turns it against the ray.
+    pub normal: Vec3,
+    /// What the surface does to light, textures already looked up.
+    pub surface: Surface,
+    /// Index of the area light this surface belongs to, if any.
+    pub light: Option<u32>,
+}
+
+/// The surfaces of the world.
+pub trait Scene {
+    /// The nearest surface along `ray`, or `None` if nothing lies within its length.
+    fn closest_hit(&self, ray: &Ray) -> Option<Hit>;
+
+    /// Whether any surface other than a [`Surface::Null`] lies strictly between the ends of `ray`.
+    fn is_blocked(&self, ray: &Ray) -> bool {
+        let mut rest = *ray;
+        // Null interfaces let light through; a handful of nested ones is a lot.
+        for _ in 0..64 {
+            match self.closest_hit(&rest) {
+                None => return false,
+                Some(hit) if hit.surface != Surface::Null => return true,
+                Some(hit) => {
+                    let passed = hit.distance + 1e-4 * hit.distance.max(1e-3);
+                    rest = Ray { origin: rest.at(passed), direction: rest.direction, length: rest.length - passed };
+                }
+            }
+            if rest.length <= 0.0 {
+                return false;
+            }
+        }
+        true
+    }
+}
+
+impl<S: Scene + ?Sized> Scene for &S {
+    fn closest_hit(&self, ray: &Ray) -> Option<Hit> {
+        (**self).closest_hit(ray)
+    }
+    fn is_blocked(&self, ray: &Ray) -> bool {
+        (**self).is_blocked(ray)
+    }
+}
+
+/// A world without surfaces.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Empty;
+
+impl Scene for Empty {
+    fn closest_hit(&self, _: &Ray) -> Option<Hit> {
+        None
+    }
+}
+
+impl Medium for Empty {
+    fn properties(&self, _: Vec3) -> Properties {
+        Properties::VACUUM
+    }
+    fn stretch(&self, _: &Ray, _: f32) -> Stretch {
+        Stretch::vacuum(f32::INFINITY)
+    }
+    fn is_grey(&self) -> bool {
+        true
+    }
+}

@@ -1,0 +1,25 @@
+#![doc = include_str!("../ARCHITECTURE.md")]
+#![no_std]
+
+#[cfg(feature = "alloc")]
+extern crate alloc;
+
+pub use bytemuck;
+pub use glam;
+pub use rand_core;
+
+pub mod host;
+pub mod light;
+pub mod march;
+pub mod math;
+pub mod medium;
+pub mod multiple_scatter;
+pub mod path;
+pub mod phase;
+pub mod sampling;
+pub mod sh;
+pub mod single_scatter;
+pub mod spectrum;
+pub mod storage;
+pub mod surface;
+pub mod transmittance;

@@ -1,0 +1,177 @@
+//! Lights without extent. Radiant intensity is in W/sr.
+
+use glam::Vec3;
+
+use super::LightError;
+use super::geometry::{Falloff, Source, spot};
+use crate::math::float::{self, PI};
+use crate::math::quadrature;
+use crate::spectrum::Spectrum;
+
+fn check(position: Vec3, axis: Vec3, intensity: Spectrum) -> Result<Vec3, LightError> {
+    if !position.is_finite() {
+        return Err(LightError::Geometry);
+    }
+    if !intensity.is_valid() {
+        return Err(LightError::Emission);
+    }
+    axis.try_normalize().ok_or(LightError::Geometry)
+}
+
+fn inverse_square(position: Vec3, from: Vec3) -> f32 {
+    // The light itself must not become infinitely important.
+    1.0 / position.distance_squared(from).max(1e-12)
+}
+
+/// A light that shines the same in all directions.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PointLight {
+    /// Where (m).
+    pub position: Vec3,
+    /// Radiant intensity (W/sr).
+    pub intensity: Spectrum,
+}
+
+impl PointLight {
+    /// From radiant intensity (W/sr).
+    ///
+    /// # Errors
+    /// Values that are not finite, or a negative intensity.
+    pub fn new(position: Vec3, intensity: Spectrum) -> Result<Self, LightError> {
+        check(position, Vec3::Z, intensity)?;
+        Ok(Self { position, intensity })
+    }
+
+    /// From radiant flux (W): `I = Φ/(4π)`.
+    ///
+    /// # Errors
+    /// As [`PointLight::new`].
+    pub fn from_flux(position: Vec3, flux: Spectrum) -> Result<Self, LightError> {
+        Self::new(position, flux * float::INV_FOUR_PI)
+    }
+
+    /// The light as a [`Source`].
+    #[inline]
+    #[must_use]
+    pub fn source(&self) -> Source {
+        Source { position: self.position, normal: Vec3::Z, weight: self.intensity, falloff: Falloff::Uniform }
+    }
+
+    pub(super) fn importance(&self, from: Vec3) -> f32 {
+        self.intensity.mean() * inverse_square(self.position, from)
+    }
+}
+
+/// A light with a `cosˢ` lobe around its axis.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PhongLight {
+    /// Where (m).
+    pub position: Vec3,
+    /// Axis of the lobe (unit).
+    pub axis: Vec3,
+    /// Exponent `s`: 0 or at least 1.
+    pub exponent: f32,
+    /// Radiant intensity on the axis (W/sr).
+    pub intensity: Spectrum,
+}
+
+impl PhongLight {
+    /// From radiant intensity on the axis (W/sr).
+    ///
+    /// # Errors
+    /// Values that are not finite, an axis without length, an exponent between 0 and 1.
+    pub fn new(position: Vec3, axis: Vec3, exponent: f32, intensity: Spectrum) -> Result<Self, LightError> {
+        let axis = check(position, axis, intensity)?;
+        if !(exponent == 0.0 || (exponent >= 1.0 && exponent.is_finite())) {
+            return Err(LightError::Exponent);
+        }
+        Ok(Self { position, axis, exponent, intensity })
+    }
+
+    /// From radiant flux (W): `I₀ = Φ (s + 1)/(2π)`.
+    ///
+    /// # Errors
+    /// As [`PhongLight::new`].
+    pub fn from_flux(position: Vec3, axis: Vec3, exponent: f32, flux: Spectrum) -> Result<Self, LightError> {
+        Self::new(position, axis, exponent, flux * ((exponent + 1.0) / (2.0 * PI)))
+    }
+
+    /// Radiant power (W).
+    #[must_use]
+    pub fn power(&self) -> Spectrum {
+        self.intensity * (2.0 * PI / (self.exponent + 1.0))
+    }
+
+    /// The light as a [`Source`].
+    #[inline]
+    #[must_use]
+    pub fn source(&self) -> Source {
+        let falloff = Falloff::Phong { exponent: self.exponent };
+        Source { position: self.position, normal: self.axis, weight: self.intensity, falloff }
+    }
+
+    pub(super) fn importance(&self, from: Vec3) -> f32 {
+        if self.axis.dot(from - self.position) <= 0.0 {
+            return 0.0;
+        }
+        self.intensity.mean() * inverse_square(self.position, from)
+    }
+}
+
+/// A cone of light with a soft border.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SpotLight {
+    /// Where (m).
+    pub position: Vec3,
+    /// Axis of the cone (unit).
+    pub axis: Vec3,
+    /// Half angle within which intensity is full (rad).
+    pub beam: f32,
+    /// Half angle at which light ends (rad); between, intensity falls linearly in the angle.
+    pub cutoff: f32,
+    /// Radiant intensity on the axis (W/sr).
+    pub intensity: Spectrum,
+}
+
+impl SpotLight {
+    /// From radiant intensity on the axis (W/sr) and half angles (rad).
+    ///
+    /// # Errors
+    /// Values that are not finite, an axis without length, or angles out of order.
+    pub fn new(position: Vec3, axis: Vec3, beam: f32, cutoff: f32, intensity: Spectrum) -> Result<Self, LightError> {
+        let axis = check(position, axis, intensity)?;
+        // NaN fails every comparison.
+        if !(beam >= 0.0 && beam <= cutoff && cutoff > 0.0 && cutoff <= PI + 1e-6) {
+            return Err(LightError::Cone);
+        }
+        Ok(Self { position, axis, beam, cutoff: cutoff.min(PI), intensity })
+    }
+
+    /// Radiant power (W): `2π I ∫ f(γ) sin γ dγ`.
+    #[must_use]
+    pub fn power(&self) -> Spectrum {
+        let full = 1.0 - libm::cosf(self.beam);
+        let border = quadrature::integrate(self.beam, self.cutoff, |a| {
+            spot(libm::cosf(a), self.beam, self.cutoff) * libm::sinf(a)
+        });
+        self.intensity * (2.0 * PI * (full + border))
+    }
+
+    /// The light as a [`Source`].
+    #[inline]
+    #[must_use]
+    pub fn source(&self) -> Source {
+        let falloff = Falloff::Spot { beam: self.beam, cutoff: self.cutoff };
+        Source { position: self.position, normal: self.axis, weight: self.intensity, falloff }
+    }
+
+    pub(super) fn importance(&self, from: Vec3) -> f32 {
+        let to_point = from - self.position;
+        let cosine = self.axis.dot(to_point) / to_point.length().max(1e-30);
+        // A little beyond the border, so that rounding cannot hide a point that is still lit.
+        if cosine < libm::cosf((self.cutoff + 1e-3).min(PI)) - 1e-6 {
+            return 0.0;
+        }
+        self.intensity.mean() * inverse_square(self.position, from)
+    }
+}

@@ -1,0 +1,20 @@
+//! Layer 0: numbers, directions, rays, boxes and quadrature.
+//!
+//! | file | holds |
+//! |---|---|
+//! | [`float`] | elementary functions, the same bits on every target |
+//! | [`frame`] | orthonormal frames around a direction |
+//! | [`ray`] | [`Ray`] |
+//! | [`bounds`] | [`Bounds`]: axis-aligned boxes |
+//! | [`quadrature`] | Gauss–Legendre nodes |
+
+pub mod bounds;
+pub mod float;
+pub mod frame;
+pub mod quadrature;
+pub mod ray;
+
+pub use bounds::Bounds;
+pub use frame::Frame;
+pub use glam::{Affine3, Mat3, Vec2, Vec3};
+pub use ray::Ray;

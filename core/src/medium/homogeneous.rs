@@ -1,0 +1,118 @@
+//! A medium that is the same everywhere.
+
+use glam::Vec3;
+
+use crate::host::{Gradients, Medium, Properties, Stretch};
+use crate::math::Ray;
+use crate::phase::{LobeError, Phase};
+use crate::spectrum::{Hessian, Spectrum};
+
+/// A value of a medium outside its range.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum MediumError {
+    /// Coefficients must be finite and not negative.
+    Coefficients,
+    /// Emission must be finite and not negative.
+    Emission,
+    /// A phase function's parameter.
+    Phase(LobeError),
+    /// A placement must be finite and invertible.
+    Placement,
+    /// A size of zero, or values that do not fill it.
+    Size,
+    /// Densities must be finite and not negative.
+    Density,
+    /// Overlapping media with too many different lobes.
+    TooManyLobes,
+}
+
+impl core::fmt::Display for MediumError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.write_str(match self {
+            Self::Coefficients => "absorption and scattering must be finite and not negative",
+            Self::Emission => "emission must be finite and not negative",
+            Self::Phase(error) => return error.fmt(f),
+            Self::Placement => "the placement must be finite and invertible",
+            Self::Size => "the grid's size is zero or its values do not fill it",
+            Self::Density => "densities must be finite and not negative",
+            Self::TooManyLobes => "overlapping media have too many different phase functions",
+        })
+    }
+}
+
+impl core::error::Error for MediumError {}
+
+impl From<LobeError> for MediumError {
+    fn from(error: LobeError) -> Self {
+        Self::Phase(error)
+    }
+}
+
+/// A medium that is the same everywhere.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Homogeneous {
+    properties: Properties,
+}
+
+impl Homogeneous {
+    /// From absorption and scattering coefficients (m⁻¹) and a phase function.
+    ///
+    /// # Errors
+    /// Coefficients that are negative or not finite; phase parameters out of range.
+    ///
+    /// ```
+    /// # use fogbow::{medium::Homogeneous, phase::Lobe, spectrum::Spectrum};
+    /// let fog = Homogeneous::new(Spectrum::splat(0.1), Spectrum::splat(0.9), Lobe::HenyeyGreenstein { g: 0.7 });
+    /// assert!(fog.is_ok());
+    /// ```
+    pub fn new(absorption: Spectrum, scattering: Spectrum, phase: impl Into<Phase>) -> Result<Self, MediumError> {
+        if !(absorption.is_valid() && scattering.is_valid() && (absorption + scattering).is_finite()) {
+            return Err(MediumError::Coefficients);
+        }
+        let phase = phase.into().check()?;
+        Ok(Self { properties: Properties { absorption, scattering, emission: Spectrum::ZERO, phase } })
+    }
+
+    /// The same medium, emitting `emission` (W·m⁻³·sr⁻¹) in all directions.
+    ///
+    /// # Errors
+    /// Emission that is negative or not finite.
+    pub fn with_emission(mut self, emission: Spectrum) -> Result<Self, MediumError> {
+        if !emission.is_valid() {
+            return Err(MediumError::Emission);
+        }
+        self.properties.emission = emission;
+        Ok(self)
+    }
+}
+
+impl Medium for Homogeneous {
+    #[inline]
+    fn properties(&self, _: Vec3) -> Properties {
+        self.properties
+    }
+    #[inline]
+    fn stretch(&self, _: &Ray, _: f32) -> Stretch {
+        let extinction = self.properties.extinction();
+        Stretch { until: f32::INFINITY, minorant: extinction, majorant: extinction }
+    }
+    #[inline]
+    fn extinction(&self, _: Vec3) -> Spectrum {
+        self.properties.extinction()
+    }
+    fn gradients(&self, _: Vec3) -> Gradients {
+        Gradients::default()
+    }
+    fn extinction_hessian(&self, _: Vec3) -> Hessian {
+        Hessian::ZERO
+    }
+    fn mean_extinction(&self, _: Vec3, _: f32) -> Spectrum {
+        self.properties.extinction()
+    }
+    fn is_grey(&self) -> bool {
+        self.properties.extinction().is_grey()
+    }
+    fn is_emissive(&self) -> bool {
+        !self.properties.emission.is_black()
+    }
+}

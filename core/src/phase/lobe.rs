@@ -1,0 +1,131 @@
+//! The closed set of simple phase functions.
+
+use super::{CosineSample, Deflection, draine, henyey_greenstein, rayleigh, schlick};
+use crate::math::float::INV_FOUR_PI;
+
+/// Largest |g| or |k| accepted: above, the peak `(1+g)/(4π(1−g)²)` leaves what `f32` can do.
+pub const MAX_ANISOTROPY: f32 = 1.0 - 1.0 / 65_536.0;
+
+/// A simple phase function.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Lobe {
+    /// The same in all directions: `1/(4π)`.
+    Isotropic,
+    /// Henyey–Greenstein; `g` in (−1, 1), forward for `g > 0`.
+    HenyeyGreenstein {
+        /// Mean cosine of the deflection.
+        g: f32,
+    },
+    /// Schlick; `k` in (−1, 1), forward for `k > 0`.
+    Schlick {
+        /// Elongation; `1.55 g − 0.55 g³` comes near Henyey–Greenstein.
+        k: f32,
+    },
+    /// Rayleigh.
+    Rayleigh,
+    /// Draine; `g` in (−1, 1), `alpha` ≥ 0.
+    Draine {
+        /// As in Henyey–Greenstein.
+        g: f32,
+        /// Strength of the `cos² θ` factor.
+        alpha: f32,
+    },
+}
+
+/// A parameter outside its range.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum LobeError {
+    /// `g` or `k` must lie in (−1, 1), with 2⁻¹⁶ to spare.
+    Anisotropy(f32),
+    /// `alpha` must be finite and not negative.
+    Alpha(f32),
+    /// A droplet's diameter (µm) must lie in [5, 50].
+    Diameter(f32),
+}
+
+impl core::fmt::Display for LobeError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Self::Anisotropy(g) => write!(f, "anisotropy {g} is outside (-1, 1)"),
+            Self::Alpha(a) => write!(f, "alpha {a} is negative or not finite"),
+            Self::Diameter(d) => write!(f, "droplet diameter {d} µm is outside [5, 50]"),
+        }
+    }
+}
+
+impl core::error::Error for LobeError {}
+
+impl Lobe {
+    /// Whether the parameters lie in their ranges.
+    ///
+    /// # Errors
+    /// The parameter that does not.
+    pub fn check(self) -> Result<Self, LobeError> {
+        match self {
+            Self::HenyeyGreenstein { g: a } | Self::Schlick { k: a } | Self::Draine { g: a, .. }
+                if !(a.abs() <= MAX_ANISOTROPY) =>
+            {
+                Err(LobeError::Anisotropy(a))
+            }
+            Self::Draine { alpha, .. } if !(alpha >= 0.0 && alpha.is_finite()) => Err(LobeError::Alpha(alpha)),
+            _ => Ok(self),
+        }
+    }
+
+    /// Value (sr⁻¹); also the density of [`Lobe::sample`].
+    ///
+    /// ```
+    /// # use fogbow::phase::{Deflection, Lobe};
+    /// let fog = Lobe::HenyeyGreenstein { g: 0.5 };
+    /// assert!(fog.value(Deflection::from_cos(1.0)) > fog.value(Deflection::from_cos(0.0)));
+    /// ```
+    #[inline]
+    #[must_use]
+    pub fn value(&self, deflection: Deflection) -> f32 {
+        match *self {
+            Self::Isotropic => INV_FOUR_PI,
+            Self::HenyeyGreenstein { g } => henyey_greenstein::value(deflection, g),
+            Self::Schlick { k } => schlick::value(deflection, k),
+            Self::Rayleigh => rayleigh::value(deflection),
+            Self::Draine { g, alpha } => draine::value(deflection, g, alpha),
+        }
+    }
+
+    /// Derivative of the value with respect to `cos θ` (sr⁻¹).
+    #[inline]
+    #[must_use]
+    pub fn derivative(&self, deflection: Deflection) -> f32 {
+        match *self {
+            Self::Isotropic => 0.0,
+            Self::HenyeyGreenstein { g } => henyey_greenstein::derivative(deflection, g),
+            Self::Schlick { k } => schlick::derivative(deflection, k),
+            Self::Rayleigh => rayleigh::derivative(deflection),
+            Self::Draine { g, alpha } => draine::derivative(deflection, g, alpha),
+        }
+    }
+
+    /// Draws a cosine with density [`Lobe::value`].
+    #[inline]
+    #[must_use]
+    pub fn sample(&self, u: f32) -> CosineSample {
+        match *self {
+            Self::Isotropic => CosineSample::from_poles(2.0 * (1.0 - u), 2.0 * u, INV_FOUR_PI),
+            Self::HenyeyGreenstein { g } => henyey_greenstein::sample(u, g),
+            Self::Schlick { k } => schlick::sample(u, k),
+            Self::Rayleigh => rayleigh::sample(u),
+            Self::Draine { g, alpha } => draine::sample(u, g, alpha),
+        }
+    }
+
+    /// Legendre moment `f_l = 2π ∫ p(c) P_l(c) dc`: `f_0 = 1`, `f_1` the mean cosine.
+    #[must_use]
+    pub fn moment(&self, degree: usize) -> f32 {
+        match *self {
+            Self::Isotropic => f32::from(u8::from(degree == 0)),
+            Self::HenyeyGreenstein { g } => henyey_greenstein::moment(g, degree),
+            Self::Schlick { k } => schlick::moment(k, degree),
+            Self::Rayleigh => rayleigh::moment(degree),
+            Self::Draine { g, alpha } => draine::moment(g, alpha, degree),
+        }
+    }
+}

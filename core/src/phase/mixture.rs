@@ -1,0 +1,221 @@
+//! The phase function a medium carries: one lobe, or a coloured mixture of several.
+
+use glam::{Vec2, Vec3};
+
+use super::{Deflection, Lobe, LobeError, deflection_gradient, draine};
+use crate::math::{Frame, float::PI};
+use crate::sampling::discrete;
+use crate::spectrum::{Gradient, Spectrum};
+
+/// Most lobes a mixture holds: two overlapping fogs of two lobes each.
+pub const MAX_LOBES: usize = 4;
+
+/// A phase function: a mixture of up to [`MAX_LOBES`] lobes with coloured weights that sum to 1 in
+/// every channel.
+///
+/// Coloured, because where media overlap each scatters its own colours: `Σ σₛᵢ pᵢ / Σ σₛᵢ`.
+///
+/// ```
+/// # use fogbow::phase::{Deflection, Lobe, Phase};
+/// let haze = Phase::from(Lobe::HenyeyGreenstein { g: 0.7 });
+/// assert_eq!(haze.mean_cosine()[0], 0.7);
+/// let cloud = Phase::droplets(20.0).unwrap();
+/// assert!(cloud.value(Deflection::from_cos(1.0))[0] > 100.0);
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Phase {
+    lobes: [Lobe; MAX_LOBES],
+    weights: [Spectrum; MAX_LOBES],
+    count: usize,
+}
+
+/// A mixture would need more than [`MAX_LOBES`] different lobes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct TooManyLobes;
+
+impl core::fmt::Display for TooManyLobes {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        write!(f, "a mixture holds at most {MAX_LOBES} different lobes")
+    }
+}
+
+impl core::error::Error for TooManyLobes {}
+
+/// A direction drawn from a phase function.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PhaseSample {
+    /// Where the traced path goes on (unit); it receives light from there.
+    pub to_light: Vec3,
+    /// Value over density: 1 for a mixture without colours.
+    pub weight: Spectrum,
+    /// Density (sr⁻¹).
+    pub pdf: f32,
+}
+
+impl From<Lobe> for Phase {
+    #[inline]
+    fn from(lobe: Lobe) -> Self {
+        let mut weights = [Spectrum::ZERO; MAX_LOBES];
+        weights[0] = Spectrum::ONE;
+        Self { lobes: [lobe; MAX_LOBES], weights, count: 1 }
+    }
+}
+
+impl Phase {
+    /// Isotropic scattering.
+    pub const ISOTROPIC: Self = Self {
+        lobes: [Lobe::Isotropic; MAX_LOBES],
+        weights: [Spectrum::ONE, Spectrum::ZERO, Spectrum::ZERO, Spectrum::ZERO],
+        count: 1,
+    };
+
+    /// Fog or cloud of water droplets of `diameter` (µm, in [5, 50]): the blend of
+    /// Henyey–Greenstein and Draine fitted by Jendersie and d'Eon 2023.
+    ///
+    /// # Errors
+    /// [`LobeError::Diameter`] outside the range of the fit.
+    pub fn droplets(diameter: f32) -> Result<Self, LobeError> {
+        if !(5.0..=50.0).contains(&diameter) {
+            return Err(LobeError::Diameter(diameter));
+        }
+        let fit = draine::droplets(diameter);
+        let mut phase = Self::from(Lobe::HenyeyGreenstein { g: fit.g_hg });
+        phase.lobes[1] = Lobe::Draine { g: fit.g_draine, alpha: fit.alpha };
+        phase.weights[0] = Spectrum::splat(1.0 - fit.weight_draine);
+        phase.weights[1] = Spectrum::splat(fit.weight_draine);
+        phase.count = 2;
+        Ok(phase)
+    }
+
+    /// The mixture of phase functions, each with the scattering coefficient (m⁻¹) it acts with.
+    /// Equal lobes are merged; nothing that scatters gives [`Phase::ISOTROPIC`].
+    ///
+    /// # Errors
+    /// [`TooManyLobes`] if more than [`MAX_LOBES`] different lobes scatter.
+    pub fn mix(parts: impl IntoIterator<Item = (Spectrum, Self)>) -> Result<Self, TooManyLobes> {
+        let mut mixed = Self { count: 0, ..Self::ISOTROPIC };
+        let mut total = Spectrum::ZERO;
+        for (scattering, phase) in parts {
+            total += scattering;
+            for (lobe, weight) in phase.lobes() {
+                let share = scattering * weight;
+                if share.is_black() {
+                    continue;
+                }
+                if let Some(i) = mixed.lobes[..mixed.count].iter().position(|l| *l == lobe) {
+                    mixed.weights[i] += share;
+                } else {
+                    let slot = mixed.count;
+                    *mixed.lobes.get_mut(slot).ok_or(TooManyLobes)? = lobe;
+                    mixed.weights[slot] = share;
+                    mixed.count += 1;
+                }
+            }
+        }
+        if mixed.count <= 1 {
+            return Ok(if mixed.count == 1 { Self::from(mixed.lobes[0]) } else { Self::ISOTROPIC });
+        }
+        for weight in &mut mixed.weights[..mixed.count] {
+            *weight = weight.ratio(total);
+        }
+        Ok(mixed)
+    }
+
+    /// Whether every lobe's parameters lie in their ranges.
+    ///
+    /// # Errors
+    /// The parameter that does not.
+    pub fn check(self) -> Result<Self, LobeError> {
+        self.lobes().try_for_each(|(lobe, _)| lobe.check().map(drop))?;
+        Ok(self)
+    }
+
+    /// The lobes and their weights.
+    pub fn lobes(&self) -> impl Iterator<Item = (Lobe, Spectrum)> + '_ {
+        (0..self.count).map(|i| (self.lobes[i], self.weights[i]))
+    }
+
+    #[inline]
+    fn sum(&self, f: impl Fn(Lobe) -> f32) -> Spectrum {
+        if self.count == 1 {
+            return Spectrum::splat(f(self.lobes[0]));
+        }
+        self.lobes().map(|(lobe, weight)| weight * f(lobe)).sum()
+    }
+
+    /// Value (sr⁻¹) per channel.
+    #[inline]
+    #[must_use]
+    pub fn value(&self, deflection: Deflection) -> Spectrum {
+        self.sum(|lobe| lobe.value(deflection))
+    }
+
+    /// Derivative of the value with respect to `cos θ` (sr⁻¹).
+    #[inline]
+    #[must_use]
+    pub fn derivative(&self, deflection: Deflection) -> Spectrum {
+        self.sum(|lobe| lobe.derivative(deflection))
+    }
+
+    /// Gradient (sr⁻¹ m⁻¹) of the value when the point moves and a light `distance` (m) away stays.
+    ///
+    /// ```text
+    /// ∇p = (dp/dc) (ω − c u) / r
+    /// ```
+    ///
+    /// Source: sheet § 1.3 (Jarosz et al. 2008, Eq. 43–45 with the sign corrected).
+    #[inline]
+    #[must_use]
+    pub fn gradient(&self, to_light: Vec3, to_eye: Vec3, distance: f32) -> Gradient {
+        let derivative = self.derivative(super::deflection(to_light, to_eye));
+        Gradient::outer(derivative, deflection_gradient(to_light, to_eye, distance))
+    }
+
+    /// Density (sr⁻¹) with which [`Phase::sample`] draws directions: the mixture with grey weights.
+    #[inline]
+    #[must_use]
+    pub fn pdf(&self, deflection: Deflection) -> f32 {
+        if self.count == 1 {
+            return self.lobes[0].value(deflection);
+        }
+        self.lobes().map(|(lobe, weight)| weight.mean() * lobe.value(deflection)).sum()
+    }
+
+    /// Draws the direction from which light is received, for light that leaves towards `to_eye`.
+    #[inline]
+    #[must_use]
+    pub fn sample(&self, to_eye: Vec3, u: Vec2) -> PhaseSample {
+        let (lobe, u_cos) = if self.count == 1 {
+            (self.lobes[0], u.x)
+        } else {
+            match discrete::choose(self.count, |i| self.weights[i].mean(), u.x) {
+                Some(choice) => (self.lobes[choice.index], choice.remainder),
+                None => (self.lobes[0], u.x),
+            }
+        };
+        let cosine = lobe.sample(u_cos);
+        let (sin_azimuth, cos_azimuth) = crate::math::float::sin_cos(2.0 * PI * u.y);
+        let sin = cosine.sin();
+        // Light that goes straight on towards the eye comes from −to_eye.
+        let frame = Frame::around(-to_eye);
+        let to_light =
+            frame.to_world(Vec3::new(sin * cos_azimuth, sin * sin_azimuth, cosine.deflection.cos)).normalize();
+        if self.count == 1 {
+            return PhaseSample { to_light, weight: Spectrum::ONE, pdf: cosine.pdf };
+        }
+        let pdf = self.pdf(cosine.deflection);
+        PhaseSample { to_light, weight: self.value(cosine.deflection) / pdf, pdf }
+    }
+
+    /// Legendre moment `f_l` per channel.
+    #[must_use]
+    pub fn moment(&self, degree: usize) -> Spectrum {
+        self.sum(|lobe| lobe.moment(degree))
+    }
+
+    /// Mean cosine of the deflection, `f_1`.
+    #[must_use]
+    pub fn mean_cosine(&self) -> Spectrum {
+        self.moment(1)
+    }
+}

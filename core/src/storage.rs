@@ -1,0 +1,98 @@
+//! Layer 0: storage whose size nobody knows beforehand.
+//!
+//! Who knows the bound owns the memory. Where nobody does (cache records, virtual lights, beams),
+//! a [`List`] takes either a slice lent by the host or, with feature `alloc`, a growing `Vec`.
+
+/// A sequence in lent memory, or in a growing `Vec` with feature `alloc`.
+///
+/// ```
+/// # use fogbow::storage::{Full, List};
+/// let mut slots = [0u32; 2];
+/// let mut list = List::from(&mut slots[..]);
+/// assert_eq!((list.push(7), list.push(8), list.push(9)), (Ok(()), Ok(()), Err(Full)));
+/// assert_eq!(list.as_slice(), [7, 8]);
+/// ```
+#[derive(Debug)]
+pub struct List<'s, T>(Storage<'s, T>);
+
+#[derive(Debug)]
+enum Storage<'s, T> {
+    Lent {
+        slots: &'s mut [T],
+        used: usize,
+    },
+    #[cfg(feature = "alloc")]
+    Grown(alloc::vec::Vec<T>),
+}
+
+/// A lent slice has no room left.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Full;
+
+impl core::fmt::Display for Full {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.write_str("the lent storage is full")
+    }
+}
+
+impl core::error::Error for Full {}
+
+impl<T: Copy> List<'_, T> {
+    /// Appends one element.
+    ///
+    /// # Errors
+    /// [`Full`] when a lent slice has no room left; a `Vec` grows.
+    pub fn push(&mut self, value: T) -> Result<(), Full> {
+        match &mut self.0 {
+            Storage::Lent { slots, used } => {
+                *slots.get_mut(*used).ok_or(Full)? = value;
+                *used += 1;
+            }
+            #[cfg(feature = "alloc")]
+            Storage::Grown(vec) => vec.push(value),
+        }
+        Ok(())
+    }
+
+    /// The elements so far.
+    #[must_use]
+    pub fn as_slice(&self) -> &[T] {
+        match &self.0 {
+            Storage::Lent { slots, used } => &slots[..*used],
+            #[cfg(feature = "alloc")]
+            Storage::Grown(vec) => vec,
+        }
+    }
+
+    /// The elements so far, to change in place.
+    #[must_use]
+    pub fn as_mut_slice(&mut self) -> &mut [T] {
+        match &mut self.0 {
+            Storage::Lent { slots, used } => &mut slots[..*used],
+            #[cfg(feature = "alloc")]
+            Storage::Grown(vec) => vec,
+        }
+    }
+
+    /// Forgets all elements and keeps the memory.
+    pub fn clear(&mut self) {
+        match &mut self.0 {
+            Storage::Lent { used, .. } => *used = 0,
+            #[cfg(feature = "alloc")]
+            Storage::Grown(vec) => vec.clear(),
+        }
+    }
+}
+
+impl<'s, T> From<&'s mut [T]> for List<'s, T> {
+    fn from(slots: &'s mut [T]) -> Self {
+        Self(Storage::Lent { slots, used: 0 })
+    }
+}
+
+#[cfg(feature = "alloc")]
+impl<T> From<alloc::vec::Vec<T>> for List<'_, T> {
+    fn from(vec: alloc::vec::Vec<T>) -> Self {
+        Self(Storage::Grown(vec))
+    }
+}

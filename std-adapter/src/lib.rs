@@ -1,0 +1,1 @@
+//! Threads, film and files.
