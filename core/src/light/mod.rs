@@ -22,7 +22,7 @@ pub use distant::{EnvironmentMap, Sun};
 pub use geometry::{Falloff, Incident, Source};
 pub use point::{PhongLight, PointLight, SpotLight};
 
-use crate::math::Bounds;
+use crate::math::{Bounds, Ray};
 use crate::spectrum::Spectrum;
 
 /// A light.
@@ -168,6 +168,29 @@ impl Light<'_> {
             Self::Phong(light) => Some(light.position),
             Self::Spot(light) => Some(light.position),
             _ => None,
+        }
+    }
+
+    /// Radiant intensity (W/sr) on the axis of a light without extent; 0 for others.
+    #[inline]
+    #[must_use]
+    pub fn intensity(&self) -> Spectrum {
+        match self {
+            Self::Point(light) => light.intensity,
+            Self::Phong(light) => light.intensity,
+            Self::Spot(light) => light.intensity,
+            _ => Spectrum::ZERO,
+        }
+    }
+
+    /// The part of `ray` between `near` and `far` (m) that a light without extent can reach; `None`
+    /// if it reaches nothing. Never too small: a spot's cone is a little widened.
+    #[inline]
+    #[must_use]
+    pub fn lit_interval(&self, ray: &Ray, near: f32, far: f32) -> Option<(f32, f32)> {
+        match self {
+            Self::Spot(light) => light.lit_interval(ray, near, far),
+            _ => Some((near, far)),
         }
     }
 
