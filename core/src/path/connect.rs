@@ -15,22 +15,43 @@ use crate::transmittance::{Flight, transmittance};
 /// A shadow ray ends this share of its length before the light's own surface.
 const SHADOW_MARGIN: f32 = 1e-4;
 
-/// How important a light is for next-event estimation at `point`. In the medium, lights without
-/// extent are reached by equiangular connections instead.
+/// How important a light is for next-event estimation at `point`. In the medium, a light's near
+/// field is left to [`along`].
 #[inline]
 fn importance(light: &Light<'_>, point: Vec3, in_medium: bool) -> f32 {
-    if in_medium && light.position().is_some() { 0.0 } else { light.importance(point) }
+    if in_medium && is_near(light, point) { 0.0 } else { light.importance(point) }
 }
 
-/// Probability with which [`choose`] picks light `index`.
 #[inline]
-pub(super) fn probability(lights: &[Light<'_>], index: usize, point: Vec3, in_medium: bool) -> f32 {
-    let own = importance(&lights[index], point, in_medium);
-    if lights.len() == 1 {
-        return f32::from(u8::from(own > 0.0));
+fn is_near(light: &Light<'_>, point: Vec3) -> bool {
+    light.near_field().is_some_and(|field| field.contains(point))
+}
+
+/// Density (sr⁻¹) with which connections from a vertex choose and sample the light `index`, where
+/// a ray from there meets it: what the weight of that hit is measured against.
+///
+/// For points in the near field the distance's density is left out on both sides: weights may be
+/// any partition of 1.
+#[inline]
+pub(super) fn pdf(
+    lights: &[Light<'_>],
+    index: usize,
+    vertex: (Vec3, bool),
+    to_light: Vec3,
+    distance: f32,
+    normal: Vec3,
+) -> f32 {
+    let (light, (point, in_medium)) = (&lights[index], vertex);
+    if in_medium && is_near(light, point) {
+        return light.anchor_pdf(point, to_light, distance, normal);
     }
+    let pdf = light.pdf(point, to_light, distance, normal);
+    if lights.len() == 1 || pdf <= 0.0 {
+        return pdf;
+    }
+    let own = importance(light, point, in_medium);
     let total: f32 = lights.iter().map(|light| importance(light, point, in_medium)).sum();
-    if total > 0.0 { own / total } else { 0.0 }
+    if total > 0.0 { pdf * own / total } else { 0.0 }
 }
 
 /// A light chosen and sampled for next-event estimation; `pdf` includes the choice.
@@ -85,8 +106,8 @@ pub(super) fn next_event<M: Medium + ?Sized, S: Scene + ?Sized>(
     scattered * arriving * incident.irradiance * (weight / probability)
 }
 
-/// Light without extent scattered towards the eye somewhere along a flight, over the throughput at
-/// the flight's start.
+/// Light from the near field of a light, scattered towards the eye somewhere along a flight, over
+/// the throughput at the flight's start: an equiangular connection (Kulla and Fajardo 2012).
 ///
 /// Grey media: the point lies on the part that was flown, whose survival already holds the
 /// transmittance. Coloured ones: on the whole segment, with an estimate of the transmittance.
@@ -95,35 +116,54 @@ pub(super) fn along<M: Medium + ?Sized, S: Scene + ?Sized>(
     world: &World<'_, M, S>,
     segment: &Ray,
     flight: &Flight,
-    random: (f32, f32),
+    random: (f32, f32, Vec2),
     rng: &mut Generator,
 ) -> Spectrum {
     let flown = world.medium.is_grey();
     let (near, far) = (flight.span.0, if flown { flight.span.1 } else { segment.length });
-    let interval = |light: &Light<'_>| {
-        let position = light.position()?;
-        let (near, far) = light.lit_interval(segment, near, far)?;
-        Equiangular::new(segment.origin, segment.direction, position, near, far)
+    let lights = world.lights;
+    let around =
+        |pivot: Vec3, (near, far): (f32, f32)| Equiangular::new(segment.origin, segment.direction, pivot, near, far);
+    let strength = |i: usize| {
+        let light = &lights[i];
+        let Some(interval) = light.near_interval(segment, near, far) else { return 0.0 };
+        if lights.len() == 1 {
+            return 1.0;
+        }
+        let centre = light.near_field().map(|field| field.centre());
+        centre.and_then(|centre| around(centre, interval)).map_or(0.0, |e| e.weight() * light.intensity())
     };
-    let strength =
-        |i: usize| interval(&world.lights[i]).map_or(0.0, |e| e.weight() * world.lights[i].intensity().mean());
-    let Some(chosen) = discrete::choose(world.lights.len(), strength, random.0) else {
+    let Some(chosen) = discrete::choose(lights.len(), strength, random.0) else {
         return Spectrum::ZERO;
     };
-    let light = &world.lights[chosen.index];
-    let Some(equiangular) = interval(light) else {
+    let light = &lights[chosen.index];
+    let Some(interval) = light.near_interval(segment, near, far) else {
         return Spectrum::ZERO;
     };
-    let distance = equiangular.sample(random.1).clamp(near, far);
+    let Some((pivot, source)) = light.anchor(random.2) else {
+        return Spectrum::ZERO;
+    };
+    let Some(equiangular) = around(pivot, interval) else {
+        return Spectrum::ZERO;
+    };
+    let distance = equiangular.sample(random.1).clamp(interval.0, interval.1);
     let point = segment.at(distance);
-    let Some(LightSample { incident, .. }) = light.sample(point, Vec2::ZERO) else {
+    let sampled = match source {
+        Some(source) => source
+            .incident(point)
+            .map(|incident| (incident, light.anchor_pdf(point, incident.to_light, incident.distance, source.normal))),
+        None => light.sample(point, random.2).map(|sample| (sample.incident, sample.pdf)),
+    };
+    let Some((incident, pdf)) = sampled else {
         return Spectrum::ZERO;
     };
     let properties = world.medium.properties(point);
-    let scattered = properties.scattering * properties.phase.value(deflection(incident.to_light, -segment.direction));
+    let deflection = deflection(incident.to_light, -segment.direction);
+    let scattered = properties.scattering * properties.phase.value(deflection);
     if scattered.is_black() {
         return Spectrum::ZERO;
     }
+    let weight = if pdf > 0.0 { mis::power(pdf, properties.phase.pdf(deflection)) } else { 1.0 };
     let mut arriving = reach(world, point, &incident, rng);
     if arriving.is_black() {
         return Spectrum::ZERO;
@@ -131,5 +171,5 @@ pub(super) fn along<M: Medium + ?Sized, S: Scene + ?Sized>(
     if !flown {
         arriving *= transmittance(world.medium, &segment.with_length(distance), rng);
     }
-    scattered * arriving * incident.irradiance / (equiangular.pdf(distance) * chosen.probability)
+    scattered * arriving * incident.irradiance * (weight / (equiangular.pdf(distance) * chosen.probability))
 }

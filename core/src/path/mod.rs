@@ -10,14 +10,14 @@
 //! L(x,ω) = ∫ T(x,x_t) σₛ(x_t) ∫ p L dω′ dt + ∫ T ε dt + T(x,x_s) L(x_s,ω)
 //! ```
 //!
-//! Light reaches a path in three ways, none counted twice:
+//! Light reaches a path in two ways, weighted so that none is counted twice:
 //!
-//! * lights with extent and the environment: next-event estimation at every vertex, and hits of
-//!   the path itself, weighted by the power heuristic (Veach 1997);
-//! * suns: next-event estimation at every vertex;
-//! * lights without extent: next-event estimation at surfaces; in the medium an equiangular
-//!   connection on every path segment (Kulla and Fajardo 2012), because `1/r²` from collision
-//!   vertices has infinite variance.
+//! * connections: at every surface, and at every collision outside a light's near field,
+//!   next-event estimation; inside a near field (everywhere, for lights without extent) an
+//!   equiangular connection on every path segment (Kulla and Fajardo 2012), because there `1/r²`
+//!   from collision vertices has a large or infinite variance;
+//! * hits of lights with extent and of the environment by the path itself; the power heuristic
+//!   (Veach 1997) weighs them against connections.
 
 mod connect;
 pub mod trace;

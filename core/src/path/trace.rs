@@ -105,7 +105,7 @@ pub fn radiance<M: Medium + ?Sized, S: Scene + ?Sized>(
         scatterings: 0,
         last: None,
     };
-    let has_point_lights = world.lights.iter().any(|light| light.position().is_some());
+    let has_near_fields = world.lights.iter().any(|light| light.near_field().is_some());
     let mut ray = *ray;
     for segment_index in 0..MAX_SEGMENTS {
         let hit = world.scene.closest_hit(&ray);
@@ -114,8 +114,8 @@ pub fn radiance<M: Medium + ?Sized, S: Scene + ?Sized>(
         let mut child = Generator::new(u64::from(rng.next_u32()) | u64::from(segment_index) << 32);
         let flown = flight(world.medium, &segment, path.throughput, u_distance, &mut child);
         path.add(path.throughput * flown.emission, path.first, path.scatterings);
-        if has_point_lights {
-            let random = (uniform(rng), uniform(rng));
+        if has_near_fields {
+            let random = (uniform(rng), uniform(rng), uniform2(rng));
             if path.scatterings < settings.max_scatterings && flown.span.1 > flown.span.0 {
                 let light = connect::along(world, &segment, &flown, random, &mut child);
                 let first = if path.first == First::Nothing { First::Medium } else { path.first };
@@ -202,7 +202,7 @@ pub fn radiance<M: Medium + ?Sized, S: Scene + ?Sized>(
 
         let strength = path.throughput.max_element();
         if path.scatterings >= settings.roulette_after {
-            let survives = strength.min(0.95);
+            let survives = (2.0 * strength).min(0.95);
             if survival >= survives {
                 break;
             }
@@ -228,8 +228,8 @@ fn emitted<M: ?Sized, S: ?Sized>(path: &mut Path, world: &World<'_, M, S>, ray: 
     let weight = match path.last {
         Some(vertex) if vertex.pdf > 0.0 => {
             let distance = vertex.point.distance(point);
-            let pdf = light.pdf(vertex.point, ray.direction, distance, hit.normal)
-                * connect::probability(world.lights, index, vertex.point, vertex.in_medium);
+            let from = (vertex.point, vertex.in_medium);
+            let pdf = connect::pdf(world.lights, index, from, ray.direction, distance, hit.normal);
             mis::power(vertex.pdf, pdf)
         }
         _ => 1.0,
@@ -250,8 +250,8 @@ fn background<M: ?Sized, S: ?Sized>(path: &mut Path, world: &World<'_, M, S>, ra
         }
         let weight = match path.last {
             Some(vertex) if vertex.pdf > 0.0 => {
-                let pdf = light.pdf(vertex.point, ray.direction, f32::INFINITY, Vec3::ZERO)
-                    * connect::probability(world.lights, index, vertex.point, vertex.in_medium);
+                let from = (vertex.point, vertex.in_medium);
+                let pdf = connect::pdf(world.lights, index, from, ray.direction, f32::INFINITY, Vec3::ZERO);
                 mis::power(vertex.pdf, pdf)
             }
             _ => 1.0,
