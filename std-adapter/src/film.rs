@@ -4,7 +4,7 @@ use core::fmt;
 
 use fogbow::spectrum::Spectrum;
 
-/// Width and height beyond which no picture is made: 2²⁸ pixels.
+/// Number of pixels beyond which no picture is made.
 pub const MAX_PIXELS: u64 = 1 << 28;
 
 /// A picture: `width × height` colours, row 0 at the top.
@@ -61,6 +61,8 @@ pub enum SizeError {
     Memory,
     /// A film without layers.
     NoLayers,
+    /// A layer of a film without a name, or two of one name: a file could not tell them apart.
+    LayerNames,
 }
 
 impl fmt::Display for SizeError {
@@ -70,6 +72,7 @@ impl fmt::Display for SizeError {
             Self::TooLarge => "the picture has more than 2^28 pixels",
             Self::Memory => "there is no memory for the picture",
             Self::NoLayers => "the film has no layers",
+            Self::LayerNames => "a layer of the film has no name, or that of another",
         })
     }
 }
@@ -104,19 +107,23 @@ impl Film {
     /// An empty film; `layers` are their names, the first being the picture's.
     ///
     /// # Errors
-    /// A size of zero or beyond [`MAX_PIXELS`], no layers, no memory.
+    /// A size of zero or beyond [`MAX_PIXELS`], no layers, layers without a name of their own, no memory.
     pub fn new<N: AsRef<str>>(width: u32, height: u32, layers: &[N]) -> Result<Self, SizeError> {
         let count = pixel_count(width, height)?;
         let total = match layers.len() {
             0 => return Err(SizeError::NoLayers),
             n => count.checked_mul(n).ok_or(SizeError::TooLarge)?,
         };
+        let names: Vec<String> = layers.iter().map(|n| n.as_ref().to_owned()).collect();
+        if names.iter().enumerate().any(|(i, name)| name.is_empty() || names[..i].contains(name)) {
+            return Err(SizeError::LayerNames);
+        }
         let (mut sums, mut counts) = (Vec::new(), Vec::new());
         sums.try_reserve_exact(total).map_err(|_| SizeError::Memory)?;
         counts.try_reserve_exact(count).map_err(|_| SizeError::Memory)?;
         sums.resize(total, [0.0; 3]);
         counts.resize(count, 0);
-        Ok(Self { width, height, names: layers.iter().map(|n| n.as_ref().to_owned()).collect(), sums, counts })
+        Ok(Self { width, height, names, sums, counts })
     }
 
     /// Columns.
@@ -167,7 +174,7 @@ impl Film {
         if let Some(i) = self.index(x, y) {
             let layers = self.names.len();
             accumulate(&mut self.sums[i * layers..][..layers], colours);
-            self.counts[i] += 1;
+            self.counts[i] = self.counts[i].saturating_add(1);
         }
     }
 
@@ -223,5 +230,48 @@ pub(crate) fn accumulate(sums: &mut [[f64; 3]], colours: &[Spectrum]) {
         for (s, c) in sum.iter_mut().zip(colour.0) {
             *s += f64::from(c);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn impossible_films_are_errors() {
+        let new = |width, height, layers: &[&str]| Film::new(width, height, layers).unwrap_err();
+        assert_eq!(new(0, 5, &["a"]), SizeError::Empty);
+        assert_eq!(new(5, 0, &["a"]), SizeError::Empty);
+        assert_eq!(new(u32::MAX, u32::MAX, &["a"]), SizeError::TooLarge);
+        assert_eq!(new(1, 1, &[]), SizeError::NoLayers);
+        assert_eq!(new(1, 1, &["a", "b", "a"]), SizeError::LayerNames);
+        assert_eq!(new(1, 1, &["a", ""]), SizeError::LayerNames);
+        assert_eq!(Image::new(0, 1, Spectrum::ONE).unwrap_err(), SizeError::Empty);
+    }
+
+    #[test]
+    fn pixels_outside_and_without_samples_are_harmless() {
+        let mut film = Film::new(2, 2, &["a", "b"]).unwrap();
+        film.add(2, 0, &[Spectrum::ONE]);
+        film.add(0, 1, &[Spectrum::ONE]);
+        assert_eq!((film.total_count(), film.min_count(), film.count(0, 1), film.count(9, 9)), (1, 0, 1, 0));
+        let image = film.mean(0).unwrap();
+        assert_eq!(image.get(0, 1), Some(Spectrum::ONE));
+        assert_eq!((image.get(0, 0), image.get(2, 0), image.get(0, 2)), (Some(Spectrum::ZERO), None, None));
+        assert!(film.mean(2).is_none());
+        film.clear();
+        assert_eq!(film, Film::new(2, 2, &["a", "b"]).unwrap());
+    }
+
+    #[test]
+    fn many_samples_do_not_lose_small_ones() {
+        // In f32 the sum would stand still at 2²⁴.
+        let mut film = Film::new(1, 1, &["a"]).unwrap();
+        film.add(0, 0, &[Spectrum::splat(1e9)]);
+        for _ in 0..1000 {
+            film.add(0, 0, &[Spectrum::ONE]);
+        }
+        let mean = film.mean(0).unwrap().pixels[0][0];
+        assert_eq!(mean, (1_000_001_000.0_f64 / 1001.0) as f32);
     }
 }
