@@ -7,6 +7,17 @@ use std::sync::Mutex;
 use std::time::Instant;
 
 /// How far a render is.
+///
+/// ```
+/// use core::time::Duration;
+/// use fogbow_std::progress::Progress;
+/// let elapsed = Duration::from_secs(3);
+/// let progress = Progress { done: 30, total: 90, before: 0, elapsed, budget: None };
+/// assert_eq!(progress.remaining().unwrap().as_secs_f64().round(), 6.0);
+/// // A resumed render counts from where it began; limited time counts where it is further.
+/// assert_eq!(Progress { before: 30, ..progress }.fraction(), 0.0);
+/// assert_eq!(Progress { budget: Some(elapsed), ..progress }.fraction(), 1.0);
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Progress {
     /// Samples in the film, over all pixels.
@@ -42,6 +53,15 @@ impl Progress {
 }
 
 /// The host's hands on a running render. The default has none.
+///
+/// ```
+/// use core::sync::atomic::{AtomicBool, Ordering};
+/// use fogbow_std::progress::Control;
+/// let flag = AtomicBool::new(false);
+/// let control = Control { cancel: Some(&flag), ..Control::default() };
+/// flag.store(true, Ordering::Relaxed);
+/// assert!(control.is_cancelled());
+/// ```
 #[derive(Clone, Copy, Default)]
 pub struct Control<'a> {
     /// Set by the host (from another thread, a signal handler, the progress function) to stop soon.

@@ -21,6 +21,14 @@ pub enum Sequence {
 
 impl Sequence {
     /// The generator of one sample of one pixel ([`pixel_key`]).
+    ///
+    /// ```
+    /// use fogbow::rand_core::Rng;
+    /// use fogbow_std::seed::{Sequence, pixel_key};
+    /// let first = |x, y| Sequence::LowDiscrepancy.start(1, pixel_key(x, y), 0).next_u32();
+    /// assert_eq!(first(3, 4), first(3, 4));
+    /// assert_ne!(first(3, 4), first(4, 3));
+    /// ```
     #[inline]
     #[must_use]
     pub fn start(self, seed: u64, pixel: u64, sample: u32) -> SampleRng {

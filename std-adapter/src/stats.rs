@@ -106,6 +106,15 @@ impl<S: Scene> Scene for CountingScene<'_, S> {
 }
 
 /// A medium that counts what it is asked.
+///
+/// ```
+/// use fogbow::{glam::Vec3, host::{Empty, Medium}};
+/// use fogbow_std::stats::{CountingMedium, Tally};
+/// let tally = Tally::default();
+/// let medium = CountingMedium { medium: &Empty, tally: &tally };
+/// medium.extinction(Vec3::ZERO);
+/// assert_eq!(tally.counters().lookups, 1);
+/// ```
 #[derive(Debug, Clone, Copy)]
 pub struct CountingMedium<'t, M> {
     /// The medium that answers.

@@ -187,7 +187,7 @@ where
         {
             let per_sample = (now - before).as_secs_f64() / f64::from(until - done);
             let affordable = (budget.saturating_sub(now).as_secs_f64() / per_sample).min(1e6);
-            if affordable < 1.0 {
+            if now >= budget || affordable < 1.0 {
                 return (Reason::TimeUp, counters);
             }
             // Passes vary in speed: most of what is left now, the rest by a better estimate.

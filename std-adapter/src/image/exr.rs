@@ -4,8 +4,8 @@ use std::io::Cursor;
 
 use ::exr::meta::MetaData;
 use ::exr::prelude::{
-    AnyChannel, AnyChannels, Encoding, FlatSamples, Image as ExrImage, Layer as Part, LayerAttributes, ReadChannels,
-    ReadLayers, WritableImage, read,
+    AnyChannel, AnyChannels, Compression, Encoding, FlatSamples, Image as ExrImage, Layer as Part, LayerAttributes,
+    ReadChannels, ReadLayers, WritableImage, read,
 };
 use fogbow::spectrum::Spectrum;
 
@@ -68,16 +68,23 @@ pub fn decode(bytes: &[u8]) -> Result<Image, ErrorKind> {
 
 /// Refuses sizes that the bytes cannot hold, before anything of that size is allocated.
 fn plausible(bytes: &[u8]) -> Result<(), ErrorKind> {
-    /// No method of the format packs denser: deflate takes at least a bit for 129 bytes.
-    const DENSEST: u64 = 1100;
-    /// A part so small needs no check.
-    const SMALL: u64 = 1 << 20;
+    /// A part (64 MiB) that may as well be tried.
+    const SMALL: u64 = 1 << 26;
     let meta = MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(format)?;
     for header in &meta.headers {
         let side = |n: usize| u32::try_from(n).map_err(|_| ErrorKind::Size(SizeError::TooLarge));
         let count = pixel_count(side(header.layer_size.width())?, side(header.layer_size.height())?)?;
         let size = (count as u64).saturating_mul(header.channels.bytes_per_pixel as u64);
-        if size > SMALL.max(DENSEST.saturating_mul(bytes.len() as u64)) {
+        // How many bytes one byte of the file may stand for.
+        let densest = match header.compression {
+            Compression::Uncompressed => 1,
+            Compression::RLE => 64,
+            // Deflate takes at least a bit for 129 bytes.
+            Compression::ZIP1 | Compression::ZIP16 | Compression::PXR24 => 1100,
+            // Constant pictures in blocks.
+            _ => 1 << 16,
+        };
+        if size > SMALL.max((bytes.len() as u64).saturating_mul(densest)) {
             return Err(ErrorKind::Format(format!("the file is too short for {count} pixels")));
         }
     }

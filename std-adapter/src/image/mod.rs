@@ -110,6 +110,20 @@ pub fn is_writable(path: impl AsRef<Path>) -> bool {
 ///
 /// # Errors
 /// An unknown extension, no layers or different sizes, or what the system says.
+///
+/// ```
+/// use fogbow::spectrum::Spectrum;
+/// use fogbow_std::{film::Image, image::{Layer, read, write}};
+/// let image = Image::new(4, 3, Spectrum::splat(0.5))?;
+/// let file = std::env::temp_dir().join("fogbow-std-write.pfm");
+/// write(&file, &[Layer { name: "total", image: &image }], 0.0)?;
+/// assert_eq!(read(&file)?, image);
+/// # std::fs::remove_file(&file)?;
+///
+/// let error = write("picture.jpeg", &[Layer { name: "total", image: &image }], 0.0).unwrap_err();
+/// assert!(error.to_string().starts_with("picture.jpeg: the extension is none of png, pfm"));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn write(path: impl AsRef<Path>, layers: &[Layer<'_>], exposure: f32) -> Result<(), ImageError> {
     let path = path.as_ref();
     encode(&extension(path), layers, exposure)
