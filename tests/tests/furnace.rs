@@ -279,7 +279,7 @@ fn single_scattering_of_every_kind_of_light_matches_quadrature() {
                                 f64::from(incident.irradiance[0]) * share,
                             ));
                         }
-                        if light.position().is_some() {
+                        if matches!(light, Light::Point(_) | Light::Spot(_)) {
                             // One sample says it all.
                             parts.truncate(1);
                             if let Some(part) = parts.first_mut() {
