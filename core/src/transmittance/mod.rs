@@ -1,1 +1,11 @@
-//! To come.
+//! Layer 4: how light gets through a medium.
+//!
+//! | file | holds |
+//! |---|---|
+//! | [`tracking`] | flights to the next collision (delta tracking), transmittance (ratio tracking) |
+//!
+//! Closed forms wherever a [`Stretch`](crate::host::Stretch) says that the medium is constant.
+
+pub mod tracking;
+
+pub use tracking::{Flight, flight, transmittance};
