@@ -29,6 +29,13 @@ fn surface_sample(from: Vec3, position: Vec3, normal: Vec3, radiance: Spectrum, 
     Some(LightSample { source, incident: Incident { to_light, distance, irradiance: radiance / pdf }, pdf })
 }
 
+/// A density over area (m⁻²) as one over solid angle (sr⁻¹); 0 from behind.
+#[inline]
+pub(super) fn to_solid_angle(pdf_area: f32, to_light: Vec3, distance: f32, normal: Vec3) -> f32 {
+    let cosine = -normal.dot(to_light);
+    if cosine <= 0.0 { 0.0 } else { pdf_area * distance * distance / cosine }
+}
+
 fn importance(radiance: Spectrum, area: f32, centre: Vec3, from: Vec3) -> f32 {
     // Near the light the inverse square overshoots; a hemisphere full of light is the most there is.
     radiance.mean() * (area / centre.distance_squared(from).max(1e-30)).min(2.0 * PI)
@@ -78,8 +85,16 @@ impl QuadLight {
         self.normal
     }
 
-    fn centre(&self) -> Vec3 {
+    /// Centre (m).
+    #[must_use]
+    pub fn centre(&self) -> Vec3 {
         self.corner + (self.edge_u + self.edge_v) * 0.5
+    }
+
+    #[inline]
+    pub(super) fn anchor(&self, u: Vec2) -> Source {
+        let position = self.corner + self.edge_u * u.x + self.edge_v * u.y;
+        Source { position, normal: self.normal, weight: self.radiance * self.area, falloff: Falloff::Area }
     }
 
     /// Near a rectangle the solid angle is sampled, farther away the area: there both agree, and
@@ -111,19 +126,17 @@ impl QuadLight {
                 pdf,
             });
         }
-        let position = self.corner + self.edge_u * u.x + self.edge_v * u.y;
-        surface_sample(from, position, self.normal, self.radiance, 1.0 / self.area)
+        surface_sample(from, self.anchor(u).position, self.normal, self.radiance, 1.0 / self.area)
     }
 
     #[inline]
     pub(super) fn pdf(&self, from: Vec3, to_light: Vec3, distance: f32) -> f32 {
-        let cosine = -self.normal.dot(to_light);
-        if cosine <= 0.0 || self.normal.dot(from - self.corner) <= 0.0 {
+        if self.normal.dot(from - self.corner) <= 0.0 {
             return 0.0;
         }
         match self.seen_from(from) {
             Some(seen) => 1.0 / seen.solid_angle,
-            None => distance * distance / (cosine * self.area),
+            None => to_solid_angle(1.0 / self.area, to_light, distance, self.normal),
         }
     }
 
@@ -228,6 +241,12 @@ impl SphereLight {
         Ok(Self { centre, radius, radiance })
     }
 
+    /// Area (m²).
+    #[must_use]
+    pub fn area(&self) -> f32 {
+        4.0 * PI * self.radius * self.radius
+    }
+
     /// `1 − cos` of the half angle under which the sphere is seen; `None` from inside.
     #[inline]
     fn cone(&self, from: Vec3) -> Option<f32> {
@@ -326,21 +345,32 @@ impl<'a> MeshLight<'a> {
         self.area
     }
 
+    /// Centre of gravity (m).
+    #[must_use]
+    pub fn centre(&self) -> Vec3 {
+        self.centre
+    }
+
     #[inline]
-    pub(super) fn sample(&self, from: Vec3, u: Vec2) -> Option<LightSample> {
+    pub(super) fn anchor(&self, u: Vec2) -> Option<Source> {
         let choice = discrete::choose_cumulated(self.areas, u.x);
         let triangle = &self.triangles[choice.index];
         let [a, b, c] = triangle.corners;
         let at = warp::uniform_triangle(Vec2::new(choice.remainder, u.y));
         let position = a + (b - a) * at.x + (c - a) * at.y;
         let normal = triangle.cross().try_normalize()?;
+        Some(Source { position, normal, weight: self.radiance * self.area, falloff: Falloff::Area })
+    }
+
+    #[inline]
+    pub(super) fn sample(&self, from: Vec3, u: Vec2) -> Option<LightSample> {
+        let Source { position, normal, .. } = self.anchor(u)?;
         surface_sample(from, position, normal, self.radiance, 1.0 / self.area)
     }
 
     #[inline]
     pub(super) fn pdf(&self, to_light: Vec3, distance: f32, normal: Vec3) -> f32 {
-        let cosine = -normal.dot(to_light);
-        if cosine <= 0.0 { 0.0 } else { distance * distance / (cosine * self.area) }
+        to_solid_angle(1.0 / self.area, to_light, distance, normal)
     }
 
     pub(super) fn importance(&self, from: Vec3) -> f32 {

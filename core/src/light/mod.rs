@@ -22,7 +22,7 @@ pub use distant::{EnvironmentMap, Sun};
 pub use geometry::{Falloff, Incident, Source};
 pub use point::{PhongLight, PointLight, SpotLight};
 
-use crate::math::Bounds;
+use crate::math::{Bounds, Ray};
 use crate::spectrum::Spectrum;
 
 /// A light.
@@ -79,6 +79,53 @@ impl core::fmt::Display for LightError {
 }
 
 impl core::error::Error for LightError {}
+
+/// Squared radius of a light's near field over its area.
+///
+/// Larger: more of the medium is reached by connections that know nothing of its density.
+/// Smaller: collisions close to the light make outliers.
+const NEAR_FIELD_AREAS: f32 = 0.25;
+
+/// The ball around a light in which its `1/r²` rules: see [`Light::near_field`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct NearField {
+    centre: Vec3,
+    radius2: f32,
+}
+
+impl NearField {
+    /// Whether the point lies inside.
+    #[inline]
+    #[must_use]
+    pub fn contains(&self, point: Vec3) -> bool {
+        // Written so that an infinite radius takes in everything.
+        !(self.centre.distance_squared(point) >= self.radius2)
+    }
+
+    /// The part of `ray` between `near` and `far` (m) that lies inside; `None` if none does.
+    #[inline]
+    #[must_use]
+    pub fn interval(&self, ray: &Ray, near: f32, far: f32) -> Option<(f32, f32)> {
+        if self.radius2.is_infinite() {
+            return Some((near, far));
+        }
+        let closest = ray.direction.dot(self.centre - ray.origin);
+        let half2 = self.radius2 - ray.at(closest).distance_squared(self.centre);
+        if half2 <= 0.0 {
+            return None;
+        }
+        let half = crate::math::float::sqrt(half2);
+        let (low, high) = ((closest - half).max(near), (closest + half).min(far));
+        (high > low).then_some((low, high))
+    }
+
+    /// Centre (m).
+    #[inline]
+    #[must_use]
+    pub fn centre(&self) -> Vec3 {
+        self.centre
+    }
+}
 
 /// A light sampled from a point.
 #[derive(Debug, Clone, Copy)]
@@ -159,15 +206,76 @@ impl Light<'_> {
         }
     }
 
-    /// The position of a light without extent, to which equiangular connections go.
+    /// The ball around a light of finite size within which connections from a medium should be
+    /// spread along the ray instead of leaving from collisions: there `1/r²` rules the variance.
+    /// Everything, for lights without extent; `None` for lights at infinity.
     #[inline]
     #[must_use]
-    pub fn position(&self) -> Option<Vec3> {
+    pub fn near_field(&self) -> Option<NearField> {
+        let (centre, area) = match self {
+            Self::Point(light) => (light.position, f32::INFINITY),
+            Self::Phong(light) => (light.position, f32::INFINITY),
+            Self::Spot(light) => (light.position, f32::INFINITY),
+            Self::Quad(light) => (light.centre(), light.area()),
+            Self::Sphere(light) => (light.centre, light.area()),
+            Self::Mesh(light) => (light.centre(), light.area()),
+            Self::Sun(_) | Self::Constant(_) | Self::Environment(_) => return None,
+        };
+        Some(NearField { centre, radius2: NEAR_FIELD_AREAS * area })
+    }
+
+    /// A point of the light to spread a connection around, before it is known where on a ray the
+    /// connection starts. The source is `None` for a sphere, whose visible cap has to be sampled
+    /// from there.
+    #[inline]
+    #[must_use]
+    pub fn anchor(&self, u: Vec2) -> Option<(Vec3, Option<Source>)> {
+        let source = match self {
+            Self::Point(light) => light.source(),
+            Self::Phong(light) => light.source(),
+            Self::Spot(light) => light.source(),
+            Self::Quad(light) => light.anchor(u),
+            Self::Mesh(light) => light.anchor(u)?,
+            Self::Sphere(light) => return Some((light.centre, None)),
+            Self::Sun(_) | Self::Constant(_) | Self::Environment(_) => return None,
+        };
+        Some((source.position, Some(source)))
+    }
+
+    /// Density (sr⁻¹) at `from` of a point drawn by [`Light::anchor`]; arguments as [`Light::pdf`].
+    #[inline]
+    #[must_use]
+    pub fn anchor_pdf(&self, from: Vec3, to_light: Vec3, distance: f32, normal: Vec3) -> f32 {
         match self {
-            Self::Point(light) => Some(light.position),
-            Self::Phong(light) => Some(light.position),
-            Self::Spot(light) => Some(light.position),
-            _ => None,
+            Self::Quad(light) => area::to_solid_angle(1.0 / light.area(), to_light, distance, normal),
+            _ => self.pdf(from, to_light, distance, normal),
+        }
+    }
+
+    /// The most radiant intensity (W/sr, mean of the channels) a light of finite size sends to a far
+    /// point; 0 for lights at infinity.
+    #[inline]
+    #[must_use]
+    pub fn intensity(&self) -> f32 {
+        match self {
+            Self::Point(light) => light.intensity.mean(),
+            Self::Phong(light) => light.intensity.mean(),
+            Self::Spot(light) => light.intensity.mean(),
+            Self::Quad(light) => light.radiance.mean() * light.area(),
+            Self::Sphere(light) => light.radiance.mean() * 0.25 * light.area(),
+            Self::Mesh(light) => light.radiance.mean() * 0.5 * light.area(),
+            Self::Sun(_) | Self::Constant(_) | Self::Environment(_) => 0.0,
+        }
+    }
+
+    /// The part of `ray` between `near` and `far` (m) that lies in the light's near field and that it
+    /// can reach; `None` if there is none. Never too small: a spot's cone is a little widened.
+    #[inline]
+    #[must_use]
+    pub fn near_interval(&self, ray: &Ray, near: f32, far: f32) -> Option<(f32, f32)> {
+        match self {
+            Self::Spot(light) => light.lit_interval(ray, near, far),
+            _ => self.near_field()?.interval(ray, near, far),
         }
     }
 
@@ -200,7 +308,7 @@ impl Light<'_> {
             Self::Phong(light) => light.power(),
             Self::Spot(light) => light.power(),
             Self::Quad(light) => light.radiance * (PI * light.area()),
-            Self::Sphere(light) => light.radiance * (4.0 * PI * PI * light.radius * light.radius),
+            Self::Sphere(light) => light.radiance * (PI * light.area()),
             Self::Mesh(light) => light.radiance * (PI * light.area()),
             Self::Sun(light) => light.irradiance * disc,
             Self::Constant(radiance) => *radiance * (4.0 * PI * disc),

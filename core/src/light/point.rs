@@ -5,7 +5,7 @@ use glam::Vec3;
 use super::LightError;
 use super::geometry::{Falloff, Source, spot};
 use crate::math::float::{self, PI};
-use crate::math::quadrature;
+use crate::math::{Ray, quadrature};
 use crate::spectrum::Spectrum;
 
 fn check(position: Vec3, axis: Vec3, intensity: Spectrum) -> Result<Vec3, LightError> {
@@ -131,6 +131,8 @@ pub struct SpotLight {
     pub cutoff: f32,
     /// Radiant intensity on the axis (W/sr).
     pub intensity: Spectrum,
+    /// Cosine a little beyond the cut-off, so that rounding cannot hide a point that is still lit.
+    outer_cosine: f32,
 }
 
 impl SpotLight {
@@ -144,7 +146,8 @@ impl SpotLight {
         if !(beam >= 0.0 && beam <= cutoff && cutoff > 0.0 && cutoff <= PI + 1e-6) {
             return Err(LightError::Cone);
         }
-        Ok(Self { position, axis, beam, cutoff: cutoff.min(PI), intensity })
+        let outer_cosine = libm::cosf((cutoff + 1e-3).min(PI)) - 1e-6;
+        Ok(Self { position, axis, beam, cutoff: cutoff.min(PI), intensity, outer_cosine })
     }
 
     /// Radiant power (W): `2π I ∫ f(γ) sin γ dγ`.
@@ -167,11 +170,49 @@ impl SpotLight {
 
     pub(super) fn importance(&self, from: Vec3) -> f32 {
         let to_point = from - self.position;
-        let cosine = self.axis.dot(to_point) / to_point.length().max(1e-30);
-        // A little beyond the border, so that rounding cannot hide a point that is still lit.
-        if cosine < libm::cosf((self.cutoff + 1e-3).min(PI)) - 1e-6 {
+        if self.axis.dot(to_point) < self.outer_cosine * to_point.length() {
             return 0.0;
         }
         self.intensity.mean() * inverse_square(self.position, from)
+    }
+
+    /// The part of a ray that lies in the cone: roots of `(a·x)² = cos² |x|²` along it.
+    pub(super) fn lit_interval(&self, ray: &Ray, near: f32, far: f32) -> Option<(f32, f32)> {
+        let (o, d, a) = (ray.origin - self.position, ray.direction, self.axis);
+        let cos = self.outer_cosine;
+        // A cone wider than a hemisphere is no convex body: leave the ray whole.
+        if cos <= 1e-3 {
+            return Some((near, far));
+        }
+        let (ad, ao, cos2) = (a.dot(d), a.dot(o), cos * cos);
+        let qa = ad * ad - cos2;
+        let qb = ad * ao - cos2 * d.dot(o);
+        let qc = ao * ao - cos2 * o.dot(o);
+        // Nearly parallel to the border: the roots are badly conditioned, the whole ray is right.
+        if qa.abs() < 1e-4 {
+            return Some((near, far));
+        }
+        let discriminant = float::difference_of_products(qb, qb, qa, qc);
+        if discriminant < 0.0 {
+            // Steep rays cross the border twice or run through the apex; flat ones may miss.
+            return if qa > 0.0 { Some((near, far)) } else { None };
+        }
+        let root = float::sqrt(discriminant);
+        let q = -(qb + root.copysign(qb));
+        let (t0, t1) = if q == 0.0 { (0.0, 0.0) } else { (q / qa, qc / q) };
+        let (low, high) = (t0.min(t1), t0.max(t1));
+        let (low, high) = if qa < 0.0 {
+            // Between the roots the ray is inside one of the two nappes.
+            if ao + ad * 0.5 * (low + high) <= 0.0 {
+                return None;
+            }
+            (low, high)
+        } else if ad > 0.0 {
+            (high, far)
+        } else {
+            (near, low)
+        };
+        let (low, high) = (low.max(near), high.min(far));
+        (high > low).then_some((low, high))
     }
 }

@@ -2,51 +2,11 @@
 
 use glam::Vec3;
 
+use super::MediumError;
 use crate::host::{Gradients, Medium, Properties, Stretch};
 use crate::math::Ray;
-use crate::phase::{LobeError, Phase};
+use crate::phase::Phase;
 use crate::spectrum::{Hessian, Spectrum};
-
-/// A value of a medium outside its range.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum MediumError {
-    /// Coefficients must be finite and not negative.
-    Coefficients,
-    /// Emission must be finite and not negative.
-    Emission,
-    /// A phase function's parameter.
-    Phase(LobeError),
-    /// A placement must be finite and invertible.
-    Placement,
-    /// A size of zero, or values that do not fill it.
-    Size,
-    /// Densities must be finite and not negative.
-    Density,
-    /// Overlapping media with too many different lobes.
-    TooManyLobes,
-}
-
-impl core::fmt::Display for MediumError {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        f.write_str(match self {
-            Self::Coefficients => "absorption and scattering must be finite and not negative",
-            Self::Emission => "emission must be finite and not negative",
-            Self::Phase(error) => return error.fmt(f),
-            Self::Placement => "the placement must be finite and invertible",
-            Self::Size => "the grid's size is zero or its values do not fill it",
-            Self::Density => "densities must be finite and not negative",
-            Self::TooManyLobes => "overlapping media have too many different phase functions",
-        })
-    }
-}
-
-impl core::error::Error for MediumError {}
-
-impl From<LobeError> for MediumError {
-    fn from(error: LobeError) -> Self {
-        Self::Phase(error)
-    }
-}
 
 /// A medium that is the same everywhere.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -83,6 +43,13 @@ impl Homogeneous {
         }
         self.properties.emission = emission;
         Ok(self)
+    }
+
+    /// Angular law of scattering; the same everywhere.
+    #[inline]
+    #[must_use]
+    pub fn phase(&self) -> Phase {
+        self.properties.phase
     }
 }
 

@@ -1,9 +1,48 @@
 //! Layer 4: media that need no host.
 //!
+//! A medium answers for its coefficients at a point and for bounds on extinction along a stretch
+//! of ray:
+//!
+//! ```text
+//! minorant ≤ σₜ(x + t ω) ≤ majorant   for t in [from, until],   until > from
+//! ```
+//!
+//! Following calls from one `until` to the next passes any distance in finitely many steps.
+//! Rounding of positions is accounted for, except at faces: within rounding of one, the two sides
+//! cannot be told apart.
+//!
 //! | file | holds |
 //! |---|---|
 //! | [`homogeneous`] | the same everywhere |
+//! | [`grid`] | voxels, trilinear between cell centres |
+//! | [`density`], [`majorant`] | its storage and interpolation; its blocks of bounds and the walk through them |
+//! | [`noise`] | fractal noise |
+//! | [`region`] | parts of space: boxes, balls |
+//! | [`placed`] | a medium in a region, with holes |
+//! | [`overlap`] | several in the same space |
+//! | [`any`] | one of the above as plain data |
+//! | [`error`] | what constructors refuse |
 
+pub mod any;
+mod ball;
+pub mod density;
+pub mod error;
+pub mod grid;
 pub mod homogeneous;
+pub mod majorant;
+pub mod noise;
+pub mod overlap;
+mod perlin;
+pub mod placed;
+pub mod region;
 
-pub use homogeneous::{Homogeneous, MediumError};
+pub use any::AnyMedium;
+pub use density::Density;
+pub use error::MediumError;
+pub use grid::Grid;
+pub use homogeneous::Homogeneous;
+pub use majorant::{BLOCK, MinMax};
+pub use noise::{FractalNoise, MAX_OCTAVES, Noise};
+pub use overlap::Overlap;
+pub use placed::Placed;
+pub use region::{BoxRegion, Crossing, Region, SphereRegion};

@@ -21,7 +21,7 @@
 //! | file | holds |
 //! |---|---|
 //! | `weight` | [`Weight`]: a path's weight and its gradient, in forward mode |
-//! | `flight` | the distance to the next collision: spectral delta tracking, or J's Eq. 29 |
+//! | `flight` | the distance to the next collision: delta tracking, or J's Eq. 29 |
 //! | `walk` | [`Walk`]: one path; [`Incoming`]: the light it brings |
 //! | `estimate` | [`sample`], [`sample_directional`]: sums over paths |
 

@@ -3,14 +3,14 @@
 use glam::{Vec2, Vec3};
 
 use super::Weight;
-use super::flight::{Lengths, fly};
+use super::flight::{Collision, Lengths, fly, own};
 use crate::host::{Hit, Medium, Properties, Rng, Scene};
 use crate::light::Light;
 use crate::math::Ray;
 use crate::phase::{self, Phase};
 use crate::sampling::discrete::choose;
 use crate::sampling::distance::Equiangular;
-use crate::sampling::{uniform, uniform2, warp};
+use crate::sampling::{Generator, uniform, uniform2, warp};
 use crate::sh::Coefficient;
 use crate::single_scatter::{self, Arrival, Contribution, nearest_surface, shadow_ray};
 use crate::spectrum::{Gradient, Spectrum};
@@ -103,6 +103,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Walk<'_, M, S> {
         mut outgoing: impl FnMut(&Ray, &Hit) -> Spectrum,
         rng: &mut (impl Rng + ?Sized),
     ) -> Incoming {
+        let rng = &mut own(rng);
         let to_light = warp::uniform_sphere(first);
         let mut ray = Ray::new(point, to_light);
         ray.length = nearest_surface(&ray, self.scene).map_or(f32::INFINITY, |hit| hit.distance);
@@ -112,17 +113,16 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Walk<'_, M, S> {
         for vertex in 1..=self.settings.max_vertices {
             total += self.points_along(&ray, &weight, kappa, rng);
             let marching = self.marching(rng);
-            let Some(flight) = fly(&ray, self.medium, self.settings.lengths, marching, rng) else { break };
-            let segment = ray.with_length(flight.distance);
-            let at = ray.at(flight.distance);
-            let properties = self.medium.properties(at);
-            let step = kappa * flight.factor * properties.scattering;
+            let hit = fly(&ray, self.medium, self.settings.lengths, weight.value * kappa, marching, rng);
+            let Some(Collision { distance, properties, factor }) = hit else { break };
+            let (segment, at) = (ray.with_length(distance), ray.at(distance));
+            let step = kappa * factor * properties.scattering;
             if step.is_black() || !step.is_finite() {
                 break;
             }
             let slope = optical_thickness_with_gradients(&segment, self.medium, marching).gradient_joint;
             let next = self.medium.gradients(at).scattering;
-            weight = weight.advance(kappa, flight.factor, &slope, properties.scattering, &next);
+            weight = weight.advance(kappa, factor, &slope, properties.scattering, &next);
             if vertex >= self.settings.roulette_from {
                 let survival = step.max_element().clamp(MIN_SURVIVAL, 1.0);
                 if uniform(rng) >= survival {
@@ -154,18 +154,12 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Walk<'_, M, S> {
     }
 
     #[inline]
-    fn marching(&self, rng: &mut (impl Rng + ?Sized)) -> Marching {
+    fn marching(&self, rng: &mut Generator) -> Marching {
         Marching { steps: self.settings.steps, offset: uniform(rng) }
     }
 
     /// Single scattering of lights with extent (and of suns) at a vertex.
-    fn lights_at(
-        &self,
-        at: Vec3,
-        to_eye: Vec3,
-        properties: &Properties,
-        rng: &mut (impl Rng + ?Sized),
-    ) -> Contribution {
+    fn lights_at(&self, at: Vec3, to_eye: Vec3, properties: &Properties, rng: &mut Generator) -> Contribution {
         let importance = |i: usize| {
             let light = &self.lights[i];
             if light.position().is_some() { 0.0 } else { light.importance(at) }
@@ -216,11 +210,11 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Walk<'_, M, S> {
 
     /// Sum of `connect` over all lights with positive importance, or its value for one of them over
     /// the probability it was chosen with.
-    fn each_light<R: Rng + ?Sized>(
+    fn each_light(
         &self,
         importance: impl Fn(usize) -> f32,
-        rng: &mut R,
-        mut connect: impl FnMut(&Light<'_>, f32, &mut R) -> Option<Contribution>,
+        rng: &mut Generator,
+        mut connect: impl FnMut(&Light<'_>, f32, &mut Generator) -> Option<Contribution>,
     ) -> Contribution {
         let mut sum = Contribution::ZERO;
         if self.settings.one_light {

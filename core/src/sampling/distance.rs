@@ -73,17 +73,18 @@ pub struct Equiangular {
 }
 
 impl Equiangular {
-    /// For the part from `near` to `far` (m) of the ray `origin + t·direction`, and a light at
+    /// For the part from `near` to `far` (m, may be infinite) of the ray `origin + t·direction`, and a light at
     /// `light`. `None` if the part has no length.
     #[inline]
     #[must_use]
     pub fn new(origin: glam::Vec3, direction: glam::Vec3, light: glam::Vec3, near: f32, far: f32) -> Option<Self> {
-        if !(far > near && far.is_finite()) {
+        if !(far > near && near.is_finite()) {
             return None;
         }
         let closest = direction.dot(light - origin);
         // A light on the ray itself would make all angles ±π/2; a millionth of the way keeps the map regular.
-        let floor = 1e-6 * (far - near).max((far - closest).abs()).max((near - closest).abs());
+        let reach = if far.is_finite() { (far - closest).abs() } else { 0.0 };
+        let floor = 1e-6 * reach.max((near - closest).abs()).max(1e-20);
         let height = (origin + direction * closest).distance(light).max(floor);
         let near_angle = float::atan((near - closest) / height);
         let angle = float::atan((far - closest) / height) - near_angle;
@@ -104,5 +105,14 @@ impl Equiangular {
     pub fn pdf(&self, distance: f32) -> f32 {
         let offset = distance - self.closest;
         self.height / (self.angle * (self.height * self.height + offset * offset))
+    }
+}
+
+impl Equiangular {
+    /// `∫ dt/r²` over the interval (m⁻¹): what a point light of intensity 1 sends to it.
+    #[inline]
+    #[must_use]
+    pub fn weight(&self) -> f32 {
+        self.angle / self.height
     }
 }

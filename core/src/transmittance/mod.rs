@@ -1,3 +1,13 @@
-//! To come.
+//! Layer 4: how light gets through a medium.
+//!
+//! | file | holds |
+//! |---|---|
+//! | [`tracking`] | flights to the next collision (delta tracking), transmittance (ratio tracking) |
+//! | [`thickness`] | optical thickness by closed forms and marching, with both gradients |
+//!
+//! Closed forms wherever a [`Stretch`](crate::host::Stretch) says that the medium is constant.
 
 pub mod thickness;
+pub mod tracking;
+
+pub use tracking::{Flight, flight, transmittance};

@@ -1,0 +1,131 @@
+//! Densities on a lattice, trilinear between cell centres.
+
+use glam::Vec3;
+
+use super::MediumError;
+
+/// Densities of the cells of a grid, x fastest: cell `(x, y, z)` of `(nx, ny, nz)` has index
+/// `(z·ny + y)·nx + x`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Density<'a> {
+    /// Any finite value that is not negative.
+    F32(&'a [f32]),
+    /// 0 to 255 for a density of 0 to 1.
+    U8(&'a [u8]),
+}
+
+impl Density<'_> {
+    /// Number of cells.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        match self {
+            Self::F32(values) => values.len(),
+            Self::U8(values) => values.len(),
+        }
+    }
+
+    /// Whether there are none.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Density of one cell; 0 beyond the last.
+    #[inline]
+    #[must_use]
+    pub fn value(&self, index: usize) -> f32 {
+        match self {
+            Self::F32(values) => values.get(index).copied().unwrap_or(0.0),
+            Self::U8(values) => values.get(index).map_or(0.0, |v| f32::from(*v) * (1.0 / 255.0)),
+        }
+    }
+
+    /// Whether there is one valid value for every cell of `size`.
+    pub(super) fn check(&self, size: [u32; 3]) -> Result<(), MediumError> {
+        if cell_count(size) != Some(self.len()) || self.is_empty() {
+            return Err(MediumError::Size);
+        }
+        match self {
+            Self::F32(values) if !values.iter().all(|v| *v >= 0.0 && *v < f32::INFINITY) => Err(MediumError::Density),
+            _ => Ok(()),
+        }
+    }
+}
+
+/// Number of cells of a grid, where that is a number.
+pub(super) fn cell_count(size: [u32; 3]) -> Option<usize> {
+    // Lookups count cells in f32, where 2²³ and a half is still a number of its own.
+    if size.iter().any(|&n| n > 1 << 22) {
+        return None;
+    }
+    size.iter().try_fold(1_usize, |product, &n| product.checked_mul(usize::try_from(n).ok()?))
+}
+
+/// Where a point falls between cell centres.
+///
+/// `q = p·n − 1/2` for local `p` in [0, 1]; between cells `⌊q⌋` and `⌊q⌋ + 1`, both clamped to the
+/// grid, so that densities are constant in the outer half cells.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Cell {
+    /// Indices of the eight corners, x fastest.
+    corners: [usize; 8],
+    fraction: Vec3,
+}
+
+impl Cell {
+    /// From `p·n + 1/2`, which lies in [1/2, n + 1/2] inside the grid; farther out, clamped.
+    #[inline]
+    pub(super) fn at(shifted: Vec3, size: [u32; 3]) -> Self {
+        // Shifted by one, a truncation is the floor, and the fraction lies in [0, 1) exactly.
+        let axis = |s: f32, n: u32| {
+            let upper = (s as u32).min(n);
+            ((upper.saturating_sub(1)) as usize, upper.min(n - 1) as usize, (s - upper as f32).clamp(0.0, 1.0))
+        };
+        let (x0, x1, fx) = axis(shifted.x, size[0]);
+        let (y0, y1, fy) = axis(shifted.y, size[1]);
+        let (z0, z1, fz) = axis(shifted.z, size[2]);
+        let (nx, ny) = (size[0] as usize, size[1] as usize);
+        let row = |y: usize, z: usize| (z * ny + y) * nx;
+        let (r00, r10, r01, r11) = (row(y0, z0), row(y1, z0), row(y0, z1), row(y1, z1));
+        Self {
+            corners: [r00 + x0, r00 + x1, r10 + x0, r10 + x1, r01 + x0, r01 + x1, r11 + x0, r11 + x1],
+            fraction: Vec3::new(fx, fy, fz),
+        }
+    }
+
+    #[inline]
+    fn corner_values(&self, density: &Density<'_>) -> ([f32; 8], f32) {
+        match density {
+            Density::F32(values) => (self.corners.map(|i| values.get(i).copied().unwrap_or(0.0)), 1.0),
+            Density::U8(values) => (self.corners.map(|i| f32::from(values.get(i).copied().unwrap_or(0))), 1.0 / 255.0),
+        }
+    }
+
+    /// Density.
+    #[inline]
+    pub(super) fn value(&self, density: &Density<'_>) -> f32 {
+        let (v, unit) = self.corner_values(density);
+        let f = self.fraction;
+        // `a + (b − a) f` returns a constant unchanged, which weights that sum to 1 would not.
+        let (y0, y1) = (lerp(v[0], v[1], f.x), lerp(v[2], v[3], f.x));
+        let (y2, y3) = (lerp(v[4], v[5], f.x), lerp(v[6], v[7], f.x));
+        lerp(lerp(y0, y1, f.y), lerp(y2, y3, f.y), f.z) * unit
+    }
+
+    /// Gradient of density, per cell, in cell coordinates.
+    #[inline]
+    pub(super) fn gradient(&self, density: &Density<'_>) -> Vec3 {
+        let (v, unit) = self.corner_values(density);
+        let f = self.fraction;
+        let bilinear = |a: f32, b: f32, c: f32, d: f32, s: f32, t: f32| lerp(lerp(a, b, s), lerp(c, d, s), t);
+        let x = bilinear(v[1] - v[0], v[3] - v[2], v[5] - v[4], v[7] - v[6], f.y, f.z);
+        let y = bilinear(v[2] - v[0], v[3] - v[1], v[6] - v[4], v[7] - v[5], f.x, f.z);
+        let z = bilinear(v[4] - v[0], v[5] - v[1], v[6] - v[2], v[7] - v[3], f.x, f.y);
+        Vec3::new(x, y, z) * unit
+    }
+}
+
+#[inline]
+fn lerp(a: f32, b: f32, t: f32) -> f32 {
+    a + (b - a) * t
+}

@@ -1,0 +1,420 @@
+//! A voxel grid.
+
+use glam::{Affine3, Mat3, Vec3};
+
+use super::density::{Cell, Density, cell_count};
+use super::majorant::{self, MinMax, Run, blocks_along};
+use super::region::{BoxRegion, LocalLine};
+use super::{MediumError, ball};
+use crate::host::{Face, Gradients, Medium, Properties, Stretch};
+use crate::math::Ray;
+use crate::phase::Phase;
+use crate::spectrum::{Gradient, Hessian, Spectrum};
+
+/// A density with the bounds of its blocks.
+#[derive(Debug, Clone, Copy)]
+struct Field<'a> {
+    density: Density<'a>,
+    blocks: &'a [MinMax],
+    whole: MinMax,
+}
+
+impl<'a> Field<'a> {
+    fn new(density: Density<'a>, size: [u32; 3], blocks: &'a mut [MinMax]) -> Result<Self, MediumError> {
+        density.check(size)?;
+        if blocks.len() != Grid::block_count(size) {
+            return Err(MediumError::Blocks);
+        }
+        let whole = majorant::fill(blocks, &density, size);
+        Ok(Self { density, blocks, whole })
+    }
+
+    #[inline]
+    fn bounds(&self, block: Option<usize>) -> MinMax {
+        block.map_or(self.whole, |i| self.blocks.get(i).copied().unwrap_or(self.whole))
+    }
+
+    #[inline]
+    fn is_empty(&self, block: usize) -> bool {
+        self.blocks.get(block).is_some_and(|b| b.max == 0.0)
+    }
+}
+
+/// A voxel grid: densities in lent memory, trilinear between cell centres, placed anywhere.
+///
+/// ```text
+/// σₛ(x) = d(p) · scattering,   σₐ(x) = d(p) · absorption,   p = local(x) in [0, 1]³
+/// ```
+///
+/// With `q = p·n − 1/2`, density is interpolated between cells `⌊q⌋` and `⌊q⌋ + 1`, clamped to the
+/// grid: constant in the outer half cells, as in Mitsuba 3 (wrap mode `clamp`). Outside the unit
+/// cube there is nothing; where border cells are not empty, the box has faces.
+///
+/// Bounds along a ray come from blocks of [`BLOCK`](super::BLOCK)³ cells.
+///
+/// ```
+/// # use fogbow::host::Medium;
+/// # use fogbow::math::{Affine3, Vec3};
+/// # use fogbow::medium::{Density, Grid, MinMax};
+/// # use fogbow::{phase::Phase, spectrum::Spectrum};
+/// let values = [0.0, 1.0];
+/// let mut blocks = [MinMax::default(); 1];
+/// assert_eq!(blocks.len(), Grid::block_count([2, 1, 1]));
+/// let grid = Grid::new(
+///     [2, 1, 1],
+///     Density::F32(&values),
+///     Spectrum::splat(0.1),
+///     Spectrum::splat(0.9),
+///     Phase::ISOTROPIC,
+///     Affine3::IDENTITY,
+///     &mut blocks,
+/// )
+/// .unwrap();
+/// // Cell centres lie at 1/4 and 3/4; halfway, density is 1/2.
+/// assert_eq!(grid.extinction(Vec3::new(0.5, 0.2, 0.9))[0], 0.5);
+/// assert_eq!(grid.extinction(Vec3::new(0.9, 0.2, 0.9))[0], 1.0);
+/// ```
+#[derive(Debug, Clone, Copy)]
+pub struct Grid<'a> {
+    size: [u32; 3],
+    /// From the world to `p·n + 1/2`.
+    shifted_from_world: Affine3,
+    /// From the world to `p·n`.
+    cells_from_world: Affine3,
+    /// Cells that a metre may span, in the worst direction; largest coordinate of the world's origin.
+    reach: (f32, f32),
+    resolution: f32,
+    density: Field<'a>,
+    absorption_density: Option<Field<'a>>,
+    emission_density: Option<Field<'a>>,
+    scattering: Spectrum,
+    absorption: Spectrum,
+    emission: Spectrum,
+    phase: Phase,
+    region: BoxRegion,
+}
+
+impl<'a> Grid<'a> {
+    /// Number of blocks whose bounds the host lends room for; 0 for a size no grid can have.
+    ///
+    /// A size from a file ought to be compared with the number of densities first.
+    ///
+    /// ```
+    /// # use fogbow::medium::{BLOCK, Grid};
+    /// assert_eq!(Grid::block_count([BLOCK, BLOCK + 1, 1]), 2);
+    /// assert_eq!(Grid::block_count([0, 5, 5]), 0);
+    /// ```
+    #[must_use]
+    pub fn block_count(size: [u32; 3]) -> usize {
+        if cell_count(size).is_none() {
+            return 0;
+        }
+        blocks_along(size).iter().map(|&n| n as usize).product()
+    }
+
+    /// One density for everything: `absorption` and `scattering` are the coefficients (m⁻¹) where
+    /// density is 1. `local_to_world` places the unit cube; `blocks` is filled here.
+    ///
+    /// # Errors
+    /// Whatever is not finite, not invertible, negative or of the wrong size.
+    pub fn new(
+        size: [u32; 3],
+        density: Density<'a>,
+        absorption: Spectrum,
+        scattering: Spectrum,
+        phase: impl Into<Phase>,
+        local_to_world: Affine3,
+        blocks: &'a mut [MinMax],
+    ) -> Result<Self, MediumError> {
+        if !(absorption.is_valid() && scattering.is_valid()) {
+            return Err(MediumError::Coefficients);
+        }
+        let phase = phase.into().check()?;
+        let region = BoxRegion::new(local_to_world)?;
+        if cell_count(size).is_none() || size.contains(&0) {
+            return Err(MediumError::Size);
+        }
+        let cells = size.map(|n| n as f32);
+        let local = region.local_from_world();
+        let scale = Mat3::from_diagonal(Vec3::from_array(cells));
+        let cells_from_world = Affine3 { matrix3: scale * local.matrix3, translation: scale * local.translation };
+        let shifted_from_world =
+            Affine3 { translation: cells_from_world.translation + Vec3::splat(0.5), ..cells_from_world };
+        if !(cells_from_world.is_finite()) {
+            return Err(MediumError::Placement);
+        }
+        let row = |i: usize| cells_from_world.matrix3.row(i).abs().element_sum();
+        let edges = [local_to_world.matrix3.x_axis, local_to_world.matrix3.y_axis, local_to_world.matrix3.z_axis];
+        let edge = |i: usize| edges[i].length() / cells[i];
+        let grid = Self {
+            size,
+            shifted_from_world,
+            cells_from_world,
+            reach: (row(0).max(row(1)).max(row(2)), cells_from_world.translation.abs().max_element()),
+            resolution: edge(0).min(edge(1)).min(edge(2)).max(f32::MIN_POSITIVE),
+            density: Field::new(density, size, blocks)?,
+            absorption_density: None,
+            emission_density: None,
+            scattering,
+            absorption,
+            emission: Spectrum::ZERO,
+            phase,
+            region,
+        };
+        grid.check()
+    }
+
+    /// The same grid with a second density, of the same size, for absorption: σₐ is then
+    /// `absorption` times this one, and the first scatters only.
+    ///
+    /// # Errors
+    /// As in [`Grid::new`].
+    pub fn with_absorption_grid(mut self, density: Density<'a>, blocks: &'a mut [MinMax]) -> Result<Self, MediumError> {
+        self.absorption_density = Some(Field::new(density, self.size, blocks)?);
+        self.check()
+    }
+
+    /// The same grid emitting `emission` (W·m⁻³·sr⁻¹) where density is 1, in proportion to it.
+    ///
+    /// # Errors
+    /// Emission that is negative or not finite.
+    pub fn with_emission(mut self, emission: Spectrum) -> Result<Self, MediumError> {
+        self.emission = emission;
+        self.check()
+    }
+
+    /// The same grid with a density of its own, of the same size, for emission: `emission`
+    /// (W·m⁻³·sr⁻¹) where that is 1.
+    ///
+    /// # Errors
+    /// As in [`Grid::new`]; emission that is negative or not finite.
+    pub fn with_emission_grid(
+        mut self,
+        density: Density<'a>,
+        emission: Spectrum,
+        blocks: &'a mut [MinMax],
+    ) -> Result<Self, MediumError> {
+        self.emission_density = Some(Field::new(density, self.size, blocks)?);
+        self.emission = emission;
+        self.check()
+    }
+
+    /// Whether the largest coefficients are finite.
+    fn check(self) -> Result<Self, MediumError> {
+        if !(self.emission.is_valid() && (self.emission * self.emission_field().whole.max).is_finite()) {
+            return Err(MediumError::Emission);
+        }
+        let bounds = self.bounds(None);
+        if bounds.majorant.is_finite() { Ok(self) } else { Err(MediumError::Coefficients) }
+    }
+
+    /// Angular law of scattering; the same everywhere.
+    #[inline]
+    #[must_use]
+    pub fn phase(&self) -> Phase {
+        self.phase
+    }
+
+    /// The unit cube's place in the world.
+    #[must_use]
+    pub fn region(&self) -> BoxRegion {
+        self.region
+    }
+
+    /// Number of cells along each axis.
+    #[must_use]
+    pub fn size(&self) -> [u32; 3] {
+        self.size
+    }
+
+    #[inline]
+    fn absorption_field(&self) -> &Field<'a> {
+        self.absorption_density.as_ref().unwrap_or(&self.density)
+    }
+
+    #[inline]
+    fn emission_field(&self) -> &Field<'a> {
+        self.emission_density.as_ref().unwrap_or(&self.density)
+    }
+
+    /// The cell around a point of the box; `None` outside.
+    #[inline]
+    fn cell(&self, point: Vec3) -> Option<Cell> {
+        let shifted = self.shifted_from_world.transform_point3(point);
+        let end = Vec3::new(self.size[0] as f32, self.size[1] as f32, self.size[2] as f32) + Vec3::splat(0.5);
+        let is_inside = shifted.cmpge(Vec3::splat(0.5)).all() && shifted.cmple(end).all();
+        is_inside.then(|| Cell::at(shifted, self.size))
+    }
+
+    /// Extinction at a cell position, from one density if one serves both.
+    #[inline]
+    fn extinction_in(&self, cell: &Cell) -> Spectrum {
+        let density = cell.value(&self.density.density);
+        match &self.absorption_density {
+            None => (self.absorption + self.scattering) * density,
+            Some(field) => self.scattering * density + self.absorption * cell.value(&field.density),
+        }
+    }
+
+    /// Bounds of a block, or of the whole grid, as a stretch without end.
+    #[inline]
+    fn bounds(&self, block: Option<usize>) -> Stretch {
+        let density = self.density.bounds(block);
+        let (minorant, majorant) = match &self.absorption_density {
+            None => {
+                let extinction = self.absorption + self.scattering;
+                (extinction * density.min, extinction * density.max)
+            }
+            Some(field) => {
+                let other = field.bounds(block);
+                let sum = |s: f32, a: f32| self.scattering * s + self.absorption * a;
+                (sum(density.min, other.min), sum(density.max, other.max))
+            }
+        };
+        let mut stretch = Stretch { until: f32::INFINITY, minorant, majorant };
+        if stretch.is_constant() {
+            self.keep_promises(block, &mut stretch);
+        }
+        stretch
+    }
+
+    /// Equal bounds promise that everything is constant: not so where only emission, or the two
+    /// parts of extinction in a sum that rounding makes constant, vary.
+    #[cold]
+    fn keep_promises(&self, block: Option<usize>, stretch: &mut Stretch) {
+        let is_constant = |field: &Field<'_>, coefficient: Spectrum| {
+            let bounds = field.bounds(block);
+            coefficient.is_black() || bounds.min == bounds.max
+        };
+        let emits = !self.emission.is_black() && self.emission_field().bounds(block).max > 0.0;
+        let holds = is_constant(&self.density, self.scattering)
+            && is_constant(self.absorption_field(), self.absorption)
+            && is_constant(self.emission_field(), self.emission)
+            && !(emits && stretch.majorant.is_black());
+        if !holds {
+            stretch.majorant = stretch.majorant.map(|c| c.max(f32::MIN_POSITIVE) * (1.0 + 2.0 * f32::EPSILON));
+        }
+    }
+
+    #[inline]
+    fn is_empty(&self, block: usize) -> bool {
+        let empty = |field: &Option<Field<'_>>| field.as_ref().is_none_or(|f| f.is_empty(block));
+        self.density.is_empty(block) && empty(&self.absorption_density) && empty(&self.emission_density)
+    }
+
+    /// From a gradient in cell coordinates to one in the world.
+    #[inline]
+    fn gradient_to_world(&self, gradient: Vec3) -> Vec3 {
+        let m = &self.cells_from_world.matrix3;
+        Vec3::new(gradient.dot(m.x_axis), gradient.dot(m.y_axis), gradient.dot(m.z_axis))
+    }
+}
+
+impl Medium for Grid<'_> {
+    #[inline]
+    fn properties(&self, point: Vec3) -> Properties {
+        let Some(cell) = self.cell(point) else { return Properties::VACUUM };
+        let density = cell.value(&self.density.density);
+        let of = |field: &Option<Field<'_>>| field.as_ref().map_or(density, |f| cell.value(&f.density));
+        Properties {
+            absorption: self.absorption * of(&self.absorption_density),
+            scattering: self.scattering * density,
+            emission: self.emission * of(&self.emission_density),
+            phase: self.phase,
+        }
+    }
+
+    #[inline]
+    fn stretch(&self, ray: &Ray, from: f32) -> Stretch {
+        let line = LocalLine::new(&self.cells_from_world, ray);
+        let start = self.reach.0 * ray.origin.abs().max_element() + self.reach.1;
+        let run =
+            majorant::walk(&line, self.size, from, ray.length, (self.reach.0, start), |block| self.is_empty(block));
+        match run {
+            Run::Vacuum(until) => Stretch::vacuum(until),
+            Run::Block(block, until) => Stretch { until, ..self.bounds(Some(block)) },
+            Run::Whole(until) => Stretch { until, ..self.bounds(None) },
+        }
+    }
+
+    #[inline]
+    fn extinction(&self, point: Vec3) -> Spectrum {
+        self.cell(point).map_or(Spectrum::ZERO, |cell| self.extinction_in(&cell))
+    }
+
+    /// The shortest edge of a cell (m).
+    fn resolution(&self) -> f32 {
+        self.resolution
+    }
+
+    /// The gradient of the interpolant itself: piecewise, jumping between cells (the upper one
+    /// counts at a plane of centres), zero in the outer half cells along their axis.
+    fn gradients(&self, point: Vec3) -> Gradients {
+        let Some(cell) = self.cell(point) else { return Gradients::default() };
+        let of = |field: &Field<'_>| self.gradient_to_world(cell.gradient(&field.density));
+        let density = of(&self.density);
+        let scattering = Gradient::outer(self.scattering, density);
+        let absorption = Gradient::outer(self.absorption, self.absorption_density.as_ref().map_or(density, of));
+        Gradients { extinction: scattering + absorption, scattering }
+    }
+
+    /// Central differences over one cell along the grid's own axes (sheet § 2.3), carried into the
+    /// world: within a cell the interpolant has no pure second derivatives, its curvature sits in
+    /// the kinks between cells. The box's faces do not count as curvature; zero outside.
+    fn extinction_hessian(&self, point: Vec3) -> Hessian {
+        if self.cell(point).is_none() {
+            return Hessian::ZERO;
+        }
+        let centre = self.shifted_from_world.transform_point3(point);
+        let at = |offset: Vec3| self.extinction_in(&Cell::at(centre + offset, self.size));
+        let here = at(Vec3::ZERO);
+        let second = |a: Vec3| at(a) + at(-a) - here * 2.0;
+        let mixed = |a: Vec3, b: Vec3| (at(a + b) + at(-a - b) - at(a - b) - at(b - a)) * 0.25;
+        let (x, y, z) = (Vec3::X, Vec3::Y, Vec3::Z);
+        let local =
+            Hessian { xx: second(x), xy: mixed(x, y), xz: mixed(x, z), yy: second(y), yz: mixed(y, z), zz: second(z) };
+        let m = &self.cells_from_world.matrix3;
+        let (x, y, z) = (m.x_axis, m.y_axis, m.z_axis);
+        Hessian {
+            xx: local.between(x, x),
+            xy: local.between(x, y),
+            xz: local.between(x, z),
+            yy: local.between(y, y),
+            yz: local.between(y, z),
+            zz: local.between(z, z),
+        }
+    }
+
+    /// From about one point per cell that the ball spans, between 32 and 900; outside the grid
+    /// counts as nothing.
+    fn mean_extinction(&self, centre: Vec3, radius: f32) -> Spectrum {
+        if radius.max(0.0) == 0.0 {
+            return self.extinction(centre);
+        }
+        let across = 2.0 * radius / self.resolution;
+        let per_axis = 2 * ((0.5 * across) as u32).clamp(2, ball::MAX_PER_AXIS / 2);
+        ball::mean(centre, radius, per_axis, |point| self.extinction(point))
+    }
+
+    fn faces(&self, ray: &Ray, visit: &mut dyn FnMut(Face)) {
+        let Some(crossings) = self.region.crossings(ray) else { return };
+        for crossing in crossings.into_iter().filter(|c| c.distance >= 0.0 && c.distance <= ray.length) {
+            let shifted = self.shifted_from_world.transform_point3(ray.at(crossing.distance));
+            let inside = self.extinction_in(&Cell::at(shifted, self.size));
+            if !inside.is_black() {
+                visit(Face { distance: crossing.distance, normal: crossing.normal, jump: -inside });
+            }
+        }
+    }
+
+    fn is_grey(&self) -> bool {
+        match self.absorption_density {
+            None => (self.absorption + self.scattering).is_grey(),
+            Some(_) => self.absorption.is_grey() && self.scattering.is_grey(),
+        }
+    }
+
+    fn is_emissive(&self) -> bool {
+        !self.emission.is_black()
+    }
+}

@@ -1,0 +1,284 @@
+//! Procedural density: fractal noise.
+
+use glam::Vec3;
+
+use super::MediumError;
+use super::perlin::{self, MAX_SLOPE, MAX_VALUE};
+use crate::host::{Gradients, Medium, Properties, Stretch};
+use crate::math::Ray;
+use crate::phase::Phase;
+use crate::spectrum::{Gradient, Spectrum};
+
+/// Most octaves of [`FractalNoise`].
+pub const MAX_OCTAVES: u32 = 16;
+
+/// Shape of a fractal noise.
+///
+/// ```text
+/// d(x) = clamp(offset + amplitude · Σᵢ gainⁱ noise(frequency · lacunarityⁱ · x), 0, max_density)
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FractalNoise {
+    /// Cells per metre of the first octave (m⁻¹).
+    pub frequency: f32,
+    /// Number of octaves, 1 to [`MAX_OCTAVES`].
+    pub octaves: u32,
+    /// Ratio of frequencies of one octave and the last; at least 1.
+    pub lacunarity: f32,
+    /// Ratio of amplitudes of one octave and the last; in [0, 1].
+    pub gain: f32,
+    /// Mean density before clamping; negative values leave islands of medium in vacuum.
+    pub offset: f32,
+    /// Amplitude of the first octave, of which values lie in about ±1.
+    pub amplitude: f32,
+    /// Largest density.
+    pub max_density: f32,
+    /// Noises of different seeds have nothing in common.
+    pub seed: u32,
+}
+
+impl Default for FractalNoise {
+    /// Three octaves of cells of 1 m, density around 1/2.
+    fn default() -> Self {
+        Self {
+            frequency: 1.0,
+            octaves: 3,
+            lacunarity: 2.0,
+            gain: 0.5,
+            offset: 0.5,
+            amplitude: 1.0,
+            max_density: 1.0,
+            seed: 0,
+        }
+    }
+}
+
+impl FractalNoise {
+    fn check(self) -> Result<Self, MediumError> {
+        let highest = self.octave_scales().fold(0.0, |_, (frequency, _)| frequency);
+        let is_positive = |v: f32| v > 0.0 && v < f32::INFINITY;
+        let is_valid = (1..=MAX_OCTAVES).contains(&self.octaves)
+            && is_positive(self.frequency)
+            && self.lacunarity >= 1.0
+            && is_positive(highest)
+            && (1.0 / self.frequency).is_finite()
+            && (0.0..=1.0).contains(&self.gain)
+            && self.offset.is_finite()
+            && self.amplitude >= 0.0
+            && (self.amplitude * (MAX_SLOPE * MAX_OCTAVES as f32) * highest).is_finite()
+            && is_positive(self.max_density);
+        if is_valid { Ok(self) } else { Err(MediumError::Noise) }
+    }
+
+    /// Frequency (m⁻¹) and amplitude of each octave.
+    #[inline]
+    fn octave_scales(self) -> impl Iterator<Item = (f32, f32)> {
+        let first = (self.frequency, self.amplitude);
+        let next = move |&(f, a): &(f32, f32)| Some((f * self.lacunarity, a * self.gain));
+        core::iter::successors(Some(first), next).take(self.octaves as usize)
+    }
+
+    /// Each octave's frequency (m⁻¹), amplitude, and noise at a point with its gradient per cell.
+    #[inline]
+    fn octaves_at(self, point: Vec3) -> impl Iterator<Item = (f32, f32, (f32, Vec3))> {
+        (0_u32..).zip(self.octave_scales()).map(move |(i, (frequency, amplitude))| {
+            let seed = self.seed.wrapping_add(i.wrapping_mul(0x9e37_79b9));
+            (frequency, amplitude, perlin::noise(point * frequency, seed))
+        })
+    }
+
+    /// Density at a point.
+    #[must_use]
+    pub fn density(self, point: Vec3) -> f32 {
+        let sum = self.octaves_at(point).map(|(_, amplitude, (value, _))| amplitude * value).sum::<f32>();
+        (self.offset + sum).max(0.0).min(self.max_density)
+    }
+
+    /// Gradient of density (m⁻¹); zero where it is clamped.
+    #[must_use]
+    pub fn density_gradient(self, point: Vec3) -> Vec3 {
+        let (mut sum, mut gradient) = (self.offset, Vec3::ZERO);
+        for (frequency, amplitude, (value, slope)) in self.octaves_at(point) {
+            sum += amplitude * value;
+            gradient += slope * (amplitude * frequency);
+        }
+        if sum > 0.0 && sum < self.max_density { gradient } else { Vec3::ZERO }
+    }
+
+    /// Bounds of density within `radius` (m) of a point: of each octave, what its steepest slope
+    /// leaves possible around its value there.
+    fn density_bounds(self, centre: Vec3, radius: f32) -> (f32, f32) {
+        // Rounding of one octave's value and of the sums.
+        const ROUNDING: f32 = 1e-5;
+        let (mut low, mut high) = (self.offset, self.offset);
+        for (frequency, amplitude, (value, _)) in self.octaves_at(centre) {
+            let change = MAX_SLOPE * frequency * radius + ROUNDING;
+            low += amplitude * (value - change).max(-MAX_VALUE);
+            high += amplitude * (value + change).min(MAX_VALUE);
+        }
+        let slack = 4.0 * f32::EPSILON * (low.abs() + high.abs());
+        let clamp = |v: f32| v.max(0.0).min(self.max_density);
+        (clamp(low - slack), clamp(high + slack))
+    }
+}
+
+/// A medium whose density is fractal noise, everywhere.
+///
+/// ```text
+/// σₛ(x) = d(x) · scattering,   σₐ(x) = d(x) · absorption
+/// ```
+///
+/// ```
+/// # use fogbow::host::Medium;
+/// # use fogbow::math::{Ray, Vec3};
+/// # use fogbow::medium::{FractalNoise, Noise};
+/// # use fogbow::{phase::Phase, spectrum::Spectrum};
+/// let shape = FractalNoise { frequency: 2.0, offset: -0.1, ..FractalNoise::default() };
+/// let cloud = Noise::new(shape, Spectrum::ZERO, Spectrum::splat(5.0), Phase::ISOTROPIC).unwrap();
+/// let ray = Ray::new(Vec3::ZERO, Vec3::X);
+/// let stretch = cloud.stretch(&ray, 0.0);
+/// let middle = cloud.extinction(ray.at(0.5 * stretch.until));
+/// assert!(stretch.minorant[0] <= middle[0] && middle[0] <= stretch.majorant[0]);
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Noise {
+    shape: FractalNoise,
+    scattering: Spectrum,
+    absorption: Spectrum,
+    emission: Spectrum,
+    phase: Phase,
+    /// Length of a stretch (m).
+    step: f32,
+}
+
+impl Noise {
+    /// From the shape of the density, and the coefficients (m⁻¹) where density is 1.
+    ///
+    /// # Errors
+    /// A parameter out of its range.
+    pub fn new(
+        shape: FractalNoise,
+        absorption: Spectrum,
+        scattering: Spectrum,
+        phase: impl Into<Phase>,
+    ) -> Result<Self, MediumError> {
+        let shape = shape.check()?;
+        let largest = (absorption + scattering) * shape.max_density;
+        if !(absorption.is_valid() && scattering.is_valid() && largest.is_finite()) {
+            return Err(MediumError::Coefficients);
+        }
+        let phase = phase.into().check()?;
+        // A stretch costs about as much as a collision: long enough for one of each, short enough
+        // for the first octave to be told from its extremes.
+        let (_, dense) = shape.density_bounds(Vec3::ZERO, f32::MAX);
+        let thickest = ((absorption + scattering) * dense).max_element();
+        let cell = 1.0 / shape.frequency;
+        let step = (1.0 / thickest).clamp(cell / 16.0, cell / 2.0);
+        Ok(Self { shape, scattering, absorption, emission: Spectrum::ZERO, phase, step })
+    }
+
+    /// The same medium, emitting `emission` (W·m⁻³·sr⁻¹) where density is 1, in proportion to it.
+    ///
+    /// # Errors
+    /// Emission that is negative or not finite.
+    pub fn with_emission(mut self, emission: Spectrum) -> Result<Self, MediumError> {
+        if !(emission.is_valid() && (emission * self.shape.max_density).is_finite()) {
+            return Err(MediumError::Emission);
+        }
+        self.emission = emission;
+        Ok(self)
+    }
+
+    /// Angular law of scattering; the same everywhere.
+    #[inline]
+    #[must_use]
+    pub fn phase(&self) -> Phase {
+        self.phase
+    }
+
+    /// Shape of the density.
+    #[inline]
+    #[must_use]
+    pub fn shape(&self) -> FractalNoise {
+        self.shape
+    }
+}
+
+impl Medium for Noise {
+    fn properties(&self, point: Vec3) -> Properties {
+        let density = self.shape.density(point);
+        Properties {
+            absorption: self.absorption * density,
+            scattering: self.scattering * density,
+            emission: self.emission * density,
+            phase: self.phase,
+        }
+    }
+
+    /// Bounds from the value in the middle of a step and the steepest slope of every octave; up to
+    /// eight empty steps are merged.
+    fn stretch(&self, ray: &Ray, from: f32) -> Stretch {
+        const MERGED: u32 = 8;
+        // Seven roundings of 2⁻²⁴ lie between a distance and a lattice coordinate.
+        const ROUNDING: f32 = 1e-6;
+        let mut t = from;
+        for _ in 0..MERGED {
+            // Where positions are coarser than a step, the least step there is.
+            let until = (t + self.step).max(t.next_up());
+            let middle = ray.at(t + 0.5 * (until - t));
+            let coordinate = ray.origin.abs().max_element() + until;
+            let radius = 0.5 * (until - t) + ROUNDING * coordinate;
+            let (low, high) = self.shape.density_bounds(middle, radius);
+            if high > 0.0 {
+                return if t > from { Stretch::vacuum(t) } else { self.bounded(until, low, high) };
+            }
+            t = until;
+            if t > ray.length {
+                break;
+            }
+        }
+        Stretch::vacuum(t)
+    }
+
+    fn extinction(&self, point: Vec3) -> Spectrum {
+        (self.absorption + self.scattering) * self.shape.density(point)
+    }
+
+    /// A quarter of a cell of the last octave (m).
+    fn resolution(&self) -> f32 {
+        let highest = self.shape.octave_scales().fold(self.shape.frequency, |_, (frequency, _)| frequency);
+        0.25 / highest
+    }
+
+    fn gradients(&self, point: Vec3) -> Gradients {
+        let gradient = self.shape.density_gradient(point);
+        Gradients {
+            extinction: Gradient::outer(self.absorption + self.scattering, gradient),
+            scattering: Gradient::outer(self.scattering, gradient),
+        }
+    }
+
+    fn is_grey(&self) -> bool {
+        (self.absorption + self.scattering).is_grey()
+    }
+
+    fn is_emissive(&self) -> bool {
+        !self.emission.is_black()
+    }
+}
+
+impl Noise {
+    #[inline]
+    fn bounded(&self, until: f32, low: f32, high: f32) -> Stretch {
+        let extinction = self.absorption + self.scattering;
+        let mut stretch = Stretch { until, minorant: extinction * low, majorant: extinction * high };
+        if stretch.is_constant() && low < high && self.is_emissive() {
+            // Only emission varies here, yet equal bounds would promise that nothing does.
+            stretch.majorant = stretch.majorant.map(|c| c.max(f32::MIN_POSITIVE) * (1.0 + 2.0 * f32::EPSILON));
+        }
+        if stretch.majorant.is_black() && self.is_emissive() {
+            stretch.majorant = Spectrum::splat(f32::MIN_POSITIVE);
+        }
+        stretch
+    }
+}

@@ -1,0 +1,175 @@
+//! Connections from a path to the lights.
+
+use glam::{Vec2, Vec3};
+
+use super::World;
+use crate::host::{Medium, Scene};
+use crate::light::{Incident, Light, LightSample};
+use crate::math::Ray;
+use crate::phase::deflection;
+use crate::sampling::distance::Equiangular;
+use crate::sampling::{Generator, discrete, mis};
+use crate::spectrum::Spectrum;
+use crate::transmittance::{Flight, transmittance};
+
+/// A shadow ray ends this share of its length before the light's own surface.
+const SHADOW_MARGIN: f32 = 1e-4;
+
+/// How important a light is for next-event estimation at `point`. In the medium, a light's near
+/// field is left to [`along`].
+#[inline]
+fn importance(light: &Light<'_>, point: Vec3, in_medium: bool) -> f32 {
+    if in_medium && is_near(light, point) { 0.0 } else { light.importance(point) }
+}
+
+#[inline]
+fn is_near(light: &Light<'_>, point: Vec3) -> bool {
+    light.near_field().is_some_and(|field| field.contains(point))
+}
+
+/// Density (sr⁻¹) with which connections from a vertex choose and sample the light `index`, where
+/// a ray from there meets it: what the weight of that hit is measured against.
+///
+/// For points in the near field the distance's density is left out on both sides: weights may be
+/// any partition of 1.
+#[inline]
+pub(super) fn pdf(
+    lights: &[Light<'_>],
+    index: usize,
+    vertex: (Vec3, bool),
+    to_light: Vec3,
+    distance: f32,
+    normal: Vec3,
+) -> f32 {
+    let (light, (point, in_medium)) = (&lights[index], vertex);
+    if in_medium && is_near(light, point) {
+        return light.anchor_pdf(point, to_light, distance, normal);
+    }
+    let pdf = light.pdf(point, to_light, distance, normal);
+    if lights.len() == 1 || pdf <= 0.0 {
+        return pdf;
+    }
+    let own = importance(light, point, in_medium);
+    let total: f32 = lights.iter().map(|light| importance(light, point, in_medium)).sum();
+    if total > 0.0 { pdf * own / total } else { 0.0 }
+}
+
+/// A light chosen and sampled for next-event estimation; `pdf` includes the choice.
+#[inline]
+pub(super) fn choose(
+    lights: &[Light<'_>],
+    point: Vec3,
+    in_medium: bool,
+    choice: f32,
+    u: Vec2,
+) -> Option<(LightSample, f32)> {
+    let chosen = discrete::choose(lights.len(), |i| importance(&lights[i], point, in_medium), choice)?;
+    let sample = lights[chosen.index].sample(point, u)?;
+    Some((sample, chosen.probability))
+}
+
+/// Transmittance times visibility between `origin` and a light, 0 or more per channel.
+#[inline]
+pub(super) fn reach<M: Medium + ?Sized, S: Scene + ?Sized>(
+    world: &World<'_, M, S>,
+    origin: Vec3,
+    incident: &Incident,
+    rng: &mut Generator,
+) -> Spectrum {
+    let ray = Ray { origin, direction: incident.to_light, length: incident.distance };
+    let shadow = ray.with_length(incident.distance * (1.0 - SHADOW_MARGIN));
+    if world.scene.is_blocked(&shadow) { Spectrum::ZERO } else { transmittance(world.medium, &ray, rng) }
+}
+
+/// Next-event estimation: `value(to_light)` gives the scattering function (with the cosine, at a
+/// surface) and the density with which the walk itself would go there.
+#[inline]
+pub(super) fn next_event<M: Medium + ?Sized, S: Scene + ?Sized>(
+    world: &World<'_, M, S>,
+    point: Vec3,
+    in_medium: bool,
+    origin: impl Fn(Vec3) -> Vec3,
+    value: impl Fn(Vec3) -> (Spectrum, f32),
+    random: (f32, Vec2),
+    rng: &mut Generator,
+) -> Spectrum {
+    let Some((sample, probability)) = choose(world.lights, point, in_medium, random.0, random.1) else {
+        return Spectrum::ZERO;
+    };
+    let incident = sample.incident;
+    let (scattered, walk_pdf) = value(incident.to_light);
+    if scattered.is_black() {
+        return Spectrum::ZERO;
+    }
+    let weight = if sample.pdf > 0.0 { mis::power(sample.pdf * probability, walk_pdf) } else { 1.0 };
+    let arriving = reach(world, origin(incident.to_light), &incident, rng);
+    scattered * arriving * incident.irradiance * (weight / probability)
+}
+
+/// Light from the near field of a light, scattered towards the eye somewhere along a flight, over
+/// the throughput at the flight's start: an equiangular connection (Kulla and Fajardo 2012).
+///
+/// Grey media: the point lies on the part that was flown, whose survival already holds the
+/// transmittance. Coloured ones: on the whole segment, with an estimate of the transmittance.
+#[inline]
+pub(super) fn along<M: Medium + ?Sized, S: Scene + ?Sized>(
+    world: &World<'_, M, S>,
+    segment: &Ray,
+    flight: &Flight,
+    random: (f32, f32, Vec2),
+    rng: &mut Generator,
+) -> Spectrum {
+    let flown = world.medium.is_grey();
+    let (near, far) = (flight.span.0, if flown { flight.span.1 } else { segment.length });
+    let lights = world.lights;
+    let around =
+        |pivot: Vec3, (near, far): (f32, f32)| Equiangular::new(segment.origin, segment.direction, pivot, near, far);
+    let strength = |i: usize| {
+        let light = &lights[i];
+        let Some(interval) = light.near_interval(segment, near, far) else { return 0.0 };
+        if lights.len() == 1 {
+            return 1.0;
+        }
+        let centre = light.near_field().map(|field| field.centre());
+        centre.and_then(|centre| around(centre, interval)).map_or(0.0, |e| e.weight() * light.intensity())
+    };
+    let Some(chosen) = discrete::choose(lights.len(), strength, random.0) else {
+        return Spectrum::ZERO;
+    };
+    let light = &lights[chosen.index];
+    let Some(interval) = light.near_interval(segment, near, far) else {
+        return Spectrum::ZERO;
+    };
+    let Some((pivot, source)) = light.anchor(random.2) else {
+        return Spectrum::ZERO;
+    };
+    let Some(equiangular) = around(pivot, interval) else {
+        return Spectrum::ZERO;
+    };
+    let distance = equiangular.sample(random.1).clamp(interval.0, interval.1);
+    let point = segment.at(distance);
+    let sampled = match source {
+        Some(source) => source
+            .incident(point)
+            .map(|incident| (incident, light.anchor_pdf(point, incident.to_light, incident.distance, source.normal))),
+        None => light.sample(point, random.2).map(|sample| (sample.incident, sample.pdf)),
+    };
+    let Some((incident, pdf)) = sampled else {
+        return Spectrum::ZERO;
+    };
+    let properties = world.medium.properties(point);
+    let deflection = deflection(incident.to_light, -segment.direction);
+    let scattered = properties.scattering * properties.phase.value(deflection);
+    if scattered.is_black() {
+        return Spectrum::ZERO;
+    }
+    let weight = if pdf > 0.0 { mis::power(pdf, properties.phase.pdf(deflection)) } else { 1.0 };
+    let mut arriving = reach(world, point, &incident, rng);
+    if arriving.is_black() {
+        return Spectrum::ZERO;
+    }
+    if !flown {
+        arriving *= transmittance(world.medium, &segment.with_length(distance), rng);
+    }
+    scattered * arriving * incident.irradiance * (weight / (equiangular.pdf(distance) * chosen.probability))
+}

@@ -1,0 +1,261 @@
+//! The walk of the path tracer.
+
+use glam::Vec3;
+
+use super::{Radiance, Settings, World, connect};
+use crate::host::{Hit, Medium, Rng, Scene};
+use crate::math::Ray;
+use crate::phase::deflection;
+use crate::sampling::{Generator, mis, uniform, uniform2};
+use crate::spectrum::Spectrum;
+use crate::surface::Surface;
+use crate::transmittance::flight;
+
+/// Rays leave a surface this far above it, relative to the size of the coordinates: 64 roundings.
+const OFFSET: f32 = 64.0 * f32::EPSILON;
+
+/// A path longer than this ends, whatever the settings say: a guard against worlds without
+/// absorption, where roulette may never come up.
+const MAX_SEGMENTS: u32 = 100_000;
+
+/// `point` moved off its surface to the side of `direction`.
+#[inline]
+fn leave(point: Vec3, normal: Vec3, direction: Vec3, distance: f32) -> Vec3 {
+    let size = point.abs().max_element().max(distance) * OFFSET;
+    point + normal * size.copysign(normal.dot(direction))
+}
+
+/// The last scattering event, as far as weights of what the path hits next depend on it.
+#[derive(Clone, Copy)]
+struct Vertex {
+    point: Vec3,
+    in_medium: bool,
+    /// Density (sr⁻¹) of the direction taken; 0 if it was discrete.
+    pdf: f32,
+}
+
+/// Where light goes in [`Radiance`]: what the eye saw first.
+#[derive(Clone, Copy, PartialEq)]
+enum First {
+    Nothing,
+    Surface,
+    Medium,
+}
+
+struct Path {
+    radiance: Radiance,
+    throughput: Spectrum,
+    first: First,
+    scatterings: u32,
+    last: Option<Vertex>,
+}
+
+impl Path {
+    /// Adds light that was scattered `scatterings` times, first at `first`.
+    #[inline]
+    fn add(&mut self, light: Spectrum, first: First, scatterings: u32) {
+        let layer = match (first, scatterings) {
+            (First::Nothing, _) => &mut self.radiance.emitted,
+            (First::Surface, 1) => &mut self.radiance.surface_direct,
+            (First::Surface, _) => &mut self.radiance.surface_indirect,
+            (First::Medium, 1) => &mut self.radiance.medium_single,
+            (First::Medium, _) => &mut self.radiance.medium_multiple,
+        };
+        *layer += light;
+    }
+
+    #[inline]
+    fn arrive(&mut self, first: First) {
+        self.scatterings += 1;
+        if self.first == First::Nothing {
+            self.first = first;
+        }
+    }
+}
+
+/// Radiance that arrives at the origin of `ray` from its direction: an unbiased estimate from one
+/// path.
+///
+/// The number of draws from `rng` per vertex does not depend on what the path meets, so a
+/// low-discrepancy sequence keeps its alignment. Infinite variance remains where a point light
+/// lies inside the medium; the mean is right (sheet § 1.7).
+///
+/// ```
+/// # use fogbow::{host::Empty, light::Light, math::*, medium::Homogeneous, phase::Lobe};
+/// # use fogbow::{path::{self, Settings, World}, sampling::Generator, spectrum::Spectrum};
+/// // Fog that glows and absorbs: from within, everything looks like ε/σₐ.
+/// let fog = Homogeneous::new(Spectrum::splat(2.0), Spectrum::ZERO, Lobe::Isotropic)?
+///     .with_emission(Spectrum::splat(6.0))?;
+/// let world = World { medium: &fog, scene: &Empty, lights: &[] };
+/// let ray = Ray::new(Vec3::ZERO, Vec3::Z);
+/// let seen = path::radiance(&ray, &world, &Settings::default(), &mut Generator::new(1));
+/// assert_eq!(seen.total(), Spectrum::splat(3.0));
+/// # Ok::<(), fogbow::medium::MediumError>(())
+/// ```
+pub fn radiance<M: Medium + ?Sized, S: Scene + ?Sized>(
+    ray: &Ray,
+    world: &World<'_, M, S>,
+    settings: &Settings,
+    rng: &mut (impl Rng + ?Sized),
+) -> Radiance {
+    let mut path = Path {
+        radiance: Radiance::default(),
+        throughput: Spectrum::ONE,
+        first: First::Nothing,
+        scatterings: 0,
+        last: None,
+    };
+    let has_near_fields = world.lights.iter().any(|light| light.near_field().is_some());
+    let mut ray = *ray;
+    for segment_index in 0..MAX_SEGMENTS {
+        let hit = world.scene.closest_hit(&ray);
+        let segment = hit.map_or(ray, |hit| ray.with_length(hit.distance));
+        let u_distance = uniform(rng);
+        let mut child = Generator::new(u64::from(rng.next_u32()) | u64::from(segment_index) << 32);
+        let flown = flight(world.medium, &segment, path.throughput, u_distance, &mut child);
+        path.add(path.throughput * flown.emission, path.first, path.scatterings);
+        if has_near_fields {
+            let random = (uniform(rng), uniform(rng), uniform2(rng));
+            if path.scatterings < settings.max_scatterings && flown.span.1 > flown.span.0 {
+                let light = connect::along(world, &segment, &flown, random, &mut child);
+                let first = if path.first == First::Nothing { First::Medium } else { path.first };
+                path.add(path.throughput * light, first, path.scatterings + 1);
+            }
+        }
+        path.throughput *= flown.weight;
+
+        // Every vertex uses as many numbers, whatever it is.
+        let light_choice = uniform(rng);
+        let light_u = uniform2(rng);
+        let lobe_choice = uniform(rng);
+        let lobe_u = uniform2(rng);
+        let survival = uniform(rng);
+
+        let next = if let Some(properties) = flown.collision {
+            path.arrive(First::Medium);
+            path.throughput *= properties.albedo();
+            if path.scatterings > settings.max_scatterings || path.throughput.is_black() {
+                break;
+            }
+            let point = segment.at(flown.distance);
+            let to_eye = -ray.direction;
+            let phase = properties.phase;
+            let light = connect::next_event(
+                world,
+                point,
+                true,
+                |_| point,
+                |to_light| {
+                    let deflection = deflection(to_light, to_eye);
+                    let value = phase.value(deflection);
+                    (value, phase.pdf(deflection))
+                },
+                (light_choice, light_u),
+                &mut child,
+            );
+            path.add(path.throughput * light, path.first, path.scatterings);
+            let sample = phase.sample(to_eye, lobe_u);
+            path.throughput *= sample.weight;
+            path.last = Some(Vertex { point, in_medium: true, pdf: sample.pdf });
+            Ray::new(point, sample.to_light)
+        } else if let Some(hit) = hit {
+            let point = segment.at(hit.distance);
+            let hidden = path.scatterings == 0 && !settings.lights_visible && hit.light.is_some();
+            if hidden || hit.surface == Surface::Null {
+                let origin = leave(point, hit.normal, ray.direction, hit.distance);
+                ray = Ray { origin, direction: ray.direction, length: ray.length - hit.distance };
+                continue;
+            }
+            emitted(&mut path, world, &ray, &hit, point);
+            path.arrive(First::Surface);
+            if path.scatterings > settings.max_scatterings {
+                break;
+            }
+            let to_eye = -ray.direction;
+            let surface = hit.surface;
+            if !surface.is_discrete() {
+                let light = connect::next_event(
+                    world,
+                    point,
+                    false,
+                    |to_light| leave(point, hit.normal, to_light, hit.distance),
+                    |to_light| {
+                        let cosine = hit.normal.dot(to_light).abs();
+                        let value = surface.value(hit.normal, to_eye, to_light) * cosine;
+                        (value, surface.pdf(hit.normal, to_eye, to_light))
+                    },
+                    (light_choice, light_u),
+                    &mut child,
+                );
+                path.add(path.throughput * light, path.first, path.scatterings);
+            }
+            let Some(sample) = surface.sample(hit.normal, to_eye, lobe_choice, lobe_u) else {
+                break;
+            };
+            path.throughput *= sample.weight;
+            path.last = Some(Vertex { point, in_medium: false, pdf: sample.pdf });
+            Ray::new(leave(point, hit.normal, sample.to_light, hit.distance), sample.to_light)
+        } else {
+            background(&mut path, world, &ray, settings);
+            break;
+        };
+
+        let strength = path.throughput.max_element();
+        if path.scatterings >= settings.roulette_after {
+            let survives = (2.0 * strength).min(0.95);
+            if survival >= survives {
+                break;
+            }
+            path.throughput *= 1.0 / survives;
+        } else if strength <= 0.0 {
+            break;
+        }
+        ray = next;
+    }
+    path.radiance
+}
+
+/// Light from a surface the path ran into.
+#[inline]
+fn emitted<M: ?Sized, S: ?Sized>(path: &mut Path, world: &World<'_, M, S>, ray: &Ray, hit: &Hit, point: Vec3) {
+    let Some((index, light)) = hit.light.and_then(|i| Some((i as usize, world.lights.get(i as usize)?))) else {
+        return;
+    };
+    let radiance = light.radiance(hit.normal, -ray.direction);
+    if radiance.is_black() {
+        return;
+    }
+    let weight = match path.last {
+        Some(vertex) if vertex.pdf > 0.0 => {
+            let distance = vertex.point.distance(point);
+            let from = (vertex.point, vertex.in_medium);
+            let pdf = connect::pdf(world.lights, index, from, ray.direction, distance, hit.normal);
+            mis::power(vertex.pdf, pdf)
+        }
+        _ => 1.0,
+    };
+    path.add(path.throughput * radiance * weight, path.first, path.scatterings);
+}
+
+/// Light from infinity.
+#[inline]
+fn background<M: ?Sized, S: ?Sized>(path: &mut Path, world: &World<'_, M, S>, ray: &Ray, settings: &Settings) {
+    if path.scatterings == 0 && !settings.lights_visible {
+        return;
+    }
+    for (index, light) in world.lights.iter().enumerate() {
+        let radiance = light.background(ray.direction);
+        if radiance.is_black() {
+            continue;
+        }
+        let weight = match path.last {
+            Some(vertex) if vertex.pdf > 0.0 => {
+                let from = (vertex.point, vertex.in_medium);
+                let pdf = connect::pdf(world.lights, index, from, ray.direction, f32::INFINITY, Vec3::ZERO);
+                mis::power(vertex.pdf, pdf)
+            }
+            _ => 1.0,
+        };
+        path.add(path.throughput * radiance * weight, path.first, path.scatterings);
+    }
+}

@@ -1,0 +1,288 @@
+//! Free flights and transmittance by null collisions.
+//!
+//! Delta tracking (Woodcock et al. 1965) and residual ratio tracking (Novák et al. 2014) over the
+//! bounds that [`Medium::stretch`] gives; coloured extinction by one-sample multiple importance
+//! sampling over the channels (Wilkie et al. 2014; Miller et al. 2019). On constant stretches both
+//! turn into closed forms without a special case.
+
+use crate::host::{Medium, Properties, Rng};
+use crate::math::{Ray, float};
+use crate::sampling::{Generator, uniform};
+use crate::spectrum::Spectrum;
+
+/// A flight through a medium up to its next collision.
+#[derive(Debug, Clone, Copy)]
+pub struct Flight {
+    /// Where it ended (m): at the collision, or at the ray's length.
+    pub distance: f32,
+    /// Properties at the collision; `None` if the ray's end was reached.
+    pub collision: Option<Properties>,
+    /// Transmittance (times extinction, for a collision) over density: 1 in grey media. The albedo
+    /// is not in it.
+    pub weight: Spectrum,
+    /// Light emitted along the way (W·m⁻²·sr⁻¹), an unbiased estimate of `∫ T ε dt`.
+    pub emission: Spectrum,
+    /// Where the medium began and ended along the flight (m); equal if there was none.
+    pub span: (f32, f32),
+}
+
+/// Flies along `ray` until a collision or the ray's end.
+///
+/// `throughput` weighs the channels where extinction is coloured; `u` decides the first tentative
+/// collision, so that stratified numbers keep their strata; later ones draw from `rng`.
+///
+/// ```
+/// # use fogbow::{math::*, medium::Homogeneous, phase::Lobe, sampling::Generator, spectrum::Spectrum};
+/// # use fogbow::transmittance::flight;
+/// let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::splat(2.0), Lobe::Isotropic)?;
+/// let ray = Ray::new(Vec3::ZERO, Vec3::X);
+/// let flown = flight(&fog, &ray, Spectrum::ONE, 0.5, &mut Generator::new(1));
+/// assert!((flown.distance - 0.5 * core::f32::consts::LN_2).abs() < 1e-6);   // the median
+/// # Ok::<(), fogbow::medium::MediumError>(())
+/// ```
+#[inline]
+pub fn flight(medium: &(impl Medium + ?Sized), ray: &Ray, throughput: Spectrum, u: f32, rng: &mut Generator) -> Flight {
+    if medium.is_grey() { grey(medium, ray, u, rng) } else { coloured(medium, ray, throughput, u, rng) }
+}
+
+/// Bookkeeping of the part of a ray that holds a medium.
+struct Span(Option<(f32, f32)>);
+
+impl Span {
+    #[inline]
+    fn extend(&mut self, from: f32, to: f32) {
+        let start = self.0.map_or(from, |s| s.0);
+        self.0 = Some((start, to));
+    }
+
+    #[inline]
+    fn finish(self, end: f32) -> (f32, f32) {
+        self.0.unwrap_or((end, end))
+    }
+}
+
+fn grey(medium: &(impl Medium + ?Sized), ray: &Ray, u: f32, rng: &mut Generator) -> Flight {
+    let emissive = medium.is_emissive();
+    let mut emission = Spectrum::ZERO;
+    let mut span = Span(None);
+    let mut t = 0.0;
+    // Optical thickness up to the next tentative collision; what a stretch does not use up is
+    // carried into the next.
+    let mut thickness = -float::ln_1p(-u);
+    while t < ray.length {
+        let stretch = medium.stretch(ray, t);
+        let end = stretch.until.min(ray.length);
+        let bound = stretch.majorant[0];
+        if bound > 0.0 {
+            let sure = stretch.minorant[0];
+            let inverse = 1.0 / bound;
+            let start = t;
+            loop {
+                let step = thickness * inverse;
+                if t + step >= end {
+                    thickness = (thickness - (end - t) * bound).max(0.0);
+                    break;
+                }
+                t += step;
+                let point = ray.at(t);
+                if emissive {
+                    emission += medium.properties(point).emission * inverse;
+                }
+                // Below the minorant a collision is real without a look.
+                let level = if sure < bound { uniform(rng) * bound } else { 0.0 };
+                if level < sure || level < medium.extinction(point)[0] {
+                    let properties = medium.properties(point);
+                    span.extend(start, t);
+                    return Flight {
+                        distance: t,
+                        collision: Some(properties),
+                        weight: Spectrum::ONE,
+                        emission,
+                        span: span.finish(t),
+                    };
+                }
+                thickness = -float::ln_1p(-uniform(rng));
+            }
+            span.extend(start, end);
+        }
+        t = end;
+    }
+    Flight { distance: ray.length, collision: None, weight: Spectrum::ONE, emission, span: span.finish(ray.length) }
+}
+
+fn coloured(medium: &(impl Medium + ?Sized), ray: &Ray, throughput: Spectrum, u: f32, rng: &mut Generator) -> Flight {
+    let emissive = medium.is_emissive();
+    let total = throughput[0] + throughput[1] + throughput[2];
+    let share = if total > 0.0 { throughput / total } else { Spectrum::splat(1.0 / 3.0) };
+    let mut pick = uniform(rng);
+    let channel = (0..3)
+        .find(|&c| {
+            pick -= share[c];
+            pick < 0.0
+        })
+        .unwrap_or_else(|| (0..3).max_by(|&a, &b| share[a].total_cmp(&share[b])).unwrap_or(0));
+    // Density of the flight so far in each channel over that in the chosen one.
+    let mut relative = Spectrum::ONE;
+    let mixture = |relative: Spectrum| (share * relative).0.iter().sum::<f32>();
+    let mut emission = Spectrum::ZERO;
+    let mut span = Span(None);
+    let mut t = 0.0;
+    let mut thickness = -float::ln_1p(-u);
+    while t < ray.length {
+        let stretch = medium.stretch(ray, t);
+        let end = stretch.until.min(ray.length);
+        let majorant = stretch.majorant;
+        let start = t;
+        if majorant.max_element() > 0.0 {
+            let bound = majorant[channel];
+            loop {
+                let step = if bound > 0.0 { thickness / bound } else { f32::INFINITY };
+                let travelled = step.min(end - t);
+                relative = passed(relative, majorant, channel, travelled);
+                if t + step >= end {
+                    thickness = (thickness - (end - t) * bound).max(0.0);
+                    break;
+                }
+                t += step;
+                let properties = medium.properties(ray.at(t));
+                if emissive {
+                    let density = mixture(relative * majorant);
+                    emission += properties.emission * relative / density;
+                }
+                let extinction = properties.extinction();
+                if stretch.is_constant() || uniform(rng) * bound < extinction[channel] {
+                    relative *= extinction / extinction[channel];
+                    span.extend(start, t);
+                    return Flight {
+                        distance: t,
+                        collision: Some(properties),
+                        weight: relative / mixture(relative),
+                        emission,
+                        span: span.finish(t),
+                    };
+                }
+                let null = (majorant - extinction).max(Spectrum::ZERO);
+                relative *= null / null[channel];
+                thickness = -float::ln_1p(-uniform(rng));
+            }
+            span.extend(start, end);
+        }
+        t = end;
+    }
+    let weight = relative / mixture(relative);
+    Flight { distance: ray.length, collision: None, weight, emission, span: span.finish(ray.length) }
+}
+
+/// Densities after a step without tentative collision, relative to the chosen channel's.
+#[inline]
+fn passed(relative: Spectrum, majorant: Spectrum, channel: usize, distance: f32) -> Spectrum {
+    if distance.is_infinite() {
+        // Only channels without extinction get through to infinity.
+        return relative.zip(majorant, |r, m| if m > majorant[channel] { 0.0 } else { r });
+    }
+    let difference = (majorant - Spectrum::splat(majorant[channel])) * distance;
+    // A ratio beyond e⁸⁰ overflows; the mixture's weight then saturates at 1/share.
+    relative.zip(difference, |r, d| (r * float::exp((-d).clamp(-80.0, 80.0))).min(1e30))
+}
+
+/// Unbiased estimate of the transmittance along `ray`; exact where the medium is constant.
+///
+/// Residual ratio tracking (Novák et al. 2014) with the minorant as control:
+///
+/// ```text
+/// T = e^{−∫σ_min dt} · Π (1 − (σₜ(t_i) − σ_min)/(σ_max − σ_min))
+/// ```
+///
+/// Where little is left, roulette ends the walk without bias.
+///
+/// ```
+/// # use fogbow::{math::*, medium::Homogeneous, phase::Lobe, sampling::Generator, spectrum::Spectrum};
+/// # use fogbow::transmittance::transmittance;
+/// let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::splat(0.5), Lobe::Isotropic)?;
+/// let ray = Ray::between(Vec3::ZERO, Vec3::new(0.0, 2.0, 0.0));
+/// let t = transmittance(&fog, &ray, &mut Generator::new(1));
+/// assert!((t[0] - (-1.0f32).exp()).abs() < 1e-6);
+/// # Ok::<(), fogbow::medium::MediumError>(())
+/// ```
+#[inline]
+pub fn transmittance(medium: &(impl Medium + ?Sized), ray: &Ray, rng: &mut (impl Rng + ?Sized)) -> Spectrum {
+    if medium.is_grey() {
+        Spectrum::splat(grey_transmittance(medium, ray, rng))
+    } else {
+        coloured_transmittance(medium, ray, rng)
+    }
+}
+
+/// Below this, [`transmittance`] plays roulette with survival probability one half.
+const ROULETTE_BELOW: f32 = 0.05;
+
+fn grey_transmittance(medium: &(impl Medium + ?Sized), ray: &Ray, rng: &mut (impl Rng + ?Sized)) -> f32 {
+    let mut closed = 0.0;
+    let mut ratio = 1.0;
+    let mut t = 0.0;
+    while t < ray.length {
+        let stretch = medium.stretch(ray, t);
+        let end = stretch.until.min(ray.length);
+        let (low, high) = (stretch.minorant[0], stretch.majorant[0]);
+        if low > 0.0 {
+            closed += low * (end - t);
+        }
+        let range = high - low;
+        if range > 0.0 {
+            let inverse = 1.0 / range;
+            loop {
+                t -= float::ln_1p(-uniform(rng)) * inverse;
+                if t >= end {
+                    break;
+                }
+                ratio *= 1.0 - (medium.extinction(ray.at(t))[0] - low) * inverse;
+                if ratio < ROULETTE_BELOW {
+                    if uniform(rng) < 0.5 {
+                        return 0.0;
+                    }
+                    ratio *= 2.0;
+                }
+            }
+        }
+        if closed > float::OPAQUE {
+            return 0.0;
+        }
+        t = end;
+    }
+    if closed > 0.0 { ratio * float::exp(-closed) } else { ratio }
+}
+
+fn coloured_transmittance(medium: &(impl Medium + ?Sized), ray: &Ray, rng: &mut (impl Rng + ?Sized)) -> Spectrum {
+    let mut closed = Spectrum::ZERO;
+    let mut ratio = Spectrum::ONE;
+    let mut t = 0.0;
+    while t < ray.length {
+        let stretch = medium.stretch(ray, t);
+        let end = stretch.until.min(ray.length);
+        let (low, high) = (stretch.minorant, stretch.majorant);
+        // 0 · ∞ in vacuum would be NaN.
+        closed += low.map(|c| if c > 0.0 { c * (end - t) } else { 0.0 });
+        let range = (high - low).max_element();
+        if range > 0.0 {
+            let inverse = 1.0 / range;
+            loop {
+                t -= float::ln_1p(-uniform(rng)) * inverse;
+                if t >= end {
+                    break;
+                }
+                ratio *= Spectrum::ONE - (medium.extinction(ray.at(t)) - low) * inverse;
+                if ratio.max_element() < ROULETTE_BELOW {
+                    if uniform(rng) < 0.5 {
+                        return Spectrum::ZERO;
+                    }
+                    ratio *= 2.0;
+                }
+            }
+        }
+        if closed.min_element() > float::OPAQUE {
+            return Spectrum::ZERO;
+        }
+        t = end;
+    }
+    ratio * closed.transmitted()
+}

@@ -1,0 +1,277 @@
+//! Running sums per pixel, in named layers, and the pictures made of them.
+
+use core::fmt;
+
+use fogbow::spectrum::Spectrum;
+
+/// Number of pixels beyond which no picture is made.
+pub const MAX_PIXELS: u64 = 1 << 28;
+
+/// A picture: `width × height` colours, row 0 at the top.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Image {
+    /// Columns.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// Colours, row by row from the top, each from the left.
+    pub pixels: Vec<Spectrum>,
+}
+
+impl Image {
+    /// A picture all of one colour.
+    ///
+    /// # Errors
+    /// A size of zero or beyond [`MAX_PIXELS`].
+    pub fn new(width: u32, height: u32, colour: Spectrum) -> Result<Self, SizeError> {
+        let count = pixel_count(width, height)?;
+        let mut pixels = Vec::new();
+        pixels.try_reserve_exact(count).map_err(|_| SizeError::Memory)?;
+        pixels.resize(count, colour);
+        Ok(Self { width, height, pixels })
+    }
+
+    /// The colour at column `x` of row `y`, or `None` outside.
+    #[must_use]
+    pub fn get(&self, x: u32, y: u32) -> Option<Spectrum> {
+        if x >= self.width {
+            return None;
+        }
+        self.pixels.get(y as usize * self.width as usize + x as usize).copied()
+    }
+}
+
+/// Number of pixels of a picture of this size.
+pub(crate) fn pixel_count(width: u32, height: u32) -> Result<usize, SizeError> {
+    match u64::from(width) * u64::from(height) {
+        0 => Err(SizeError::Empty),
+        count if count > MAX_PIXELS => Err(SizeError::TooLarge),
+        count => usize::try_from(count).map_err(|_| SizeError::TooLarge),
+    }
+}
+
+/// Why a film or a picture cannot be made.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum SizeError {
+    /// Width or height is zero.
+    Empty,
+    /// More than [`MAX_PIXELS`].
+    TooLarge,
+    /// There is no memory for it.
+    Memory,
+    /// A film without layers.
+    NoLayers,
+    /// A layer of a film without a name, or two of one name: a file could not tell them apart.
+    LayerNames,
+}
+
+impl fmt::Display for SizeError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Empty => "the picture's width or height is zero",
+            Self::TooLarge => "the picture has more than 2^28 pixels",
+            Self::Memory => "there is no memory for the picture",
+            Self::NoLayers => "the film has no layers",
+            Self::LayerNames => "a layer of the film has no name, or that of another",
+        })
+    }
+}
+
+impl core::error::Error for SizeError {}
+
+/// Sums of samples, in named layers. Layer 0 is the picture, the others whatever the host splits it into.
+///
+/// Sums are `f64`, so a pixel may take millions of samples; each pixel has its own count, so a
+/// film stopped half-way is still a valid picture.
+///
+/// ```
+/// use fogbow::spectrum::Spectrum;
+/// use fogbow_std::film::Film;
+/// let mut film = Film::new(2, 1, &["total", "emitted"]).unwrap();
+/// film.add(0, 0, &[Spectrum::splat(1.0), Spectrum::ZERO]);
+/// film.add(0, 0, &[Spectrum::splat(3.0), Spectrum::ONE]);
+/// assert_eq!(film.mean(0).unwrap().pixels, [Spectrum::splat(2.0), Spectrum::ZERO]);
+/// assert_eq!(film.mean(1).unwrap().pixels[0], Spectrum::splat(0.5));
+/// ```
+#[derive(Debug, Clone, PartialEq)]
+pub struct Film {
+    width: u32,
+    height: u32,
+    names: Vec<String>,
+    /// Pixel by pixel, within each layer by layer.
+    sums: Vec<[f64; 3]>,
+    counts: Vec<u32>,
+}
+
+impl Film {
+    /// An empty film; `layers` are their names, the first being the picture's.
+    ///
+    /// # Errors
+    /// A size of zero or beyond [`MAX_PIXELS`], no layers, layers without a name of their own, no memory.
+    pub fn new<N: AsRef<str>>(width: u32, height: u32, layers: &[N]) -> Result<Self, SizeError> {
+        let count = pixel_count(width, height)?;
+        let total = match layers.len() {
+            0 => return Err(SizeError::NoLayers),
+            n => count.checked_mul(n).ok_or(SizeError::TooLarge)?,
+        };
+        let names: Vec<String> = layers.iter().map(|n| n.as_ref().to_owned()).collect();
+        if names.iter().enumerate().any(|(i, name)| name.is_empty() || names[..i].contains(name)) {
+            return Err(SizeError::LayerNames);
+        }
+        let (mut sums, mut counts) = (Vec::new(), Vec::new());
+        sums.try_reserve_exact(total).map_err(|_| SizeError::Memory)?;
+        counts.try_reserve_exact(count).map_err(|_| SizeError::Memory)?;
+        sums.resize(total, [0.0; 3]);
+        counts.resize(count, 0);
+        Ok(Self { width, height, names, sums, counts })
+    }
+
+    /// Columns.
+    #[must_use]
+    pub fn width(&self) -> u32 {
+        self.width
+    }
+
+    /// Rows.
+    #[must_use]
+    pub fn height(&self) -> u32 {
+        self.height
+    }
+
+    /// Names of the layers.
+    #[must_use]
+    pub fn layers(&self) -> &[String] {
+        &self.names
+    }
+
+    /// Bytes of memory used for sums and counts.
+    #[must_use]
+    pub fn bytes(&self) -> usize {
+        size_of_val(self.sums.as_slice()) + size_of_val(self.counts.as_slice())
+    }
+
+    /// Samples of the pixel at column `x` of row `y`; 0 outside.
+    #[must_use]
+    pub fn count(&self, x: u32, y: u32) -> u32 {
+        self.index(x, y).map_or(0, |i| self.counts[i])
+    }
+
+    /// The smallest number of samples any pixel has.
+    #[must_use]
+    pub fn min_count(&self) -> u32 {
+        self.counts.iter().copied().min().unwrap_or(0)
+    }
+
+    /// Samples of all pixels together.
+    #[must_use]
+    pub fn total_count(&self) -> u64 {
+        self.counts.iter().map(|&n| u64::from(n)).sum()
+    }
+
+    /// Adds one sample to the pixel at column `x` of row `y`: a colour per layer (missing ones are
+    /// black). Outside the film nothing happens.
+    pub fn add(&mut self, x: u32, y: u32, colours: &[Spectrum]) {
+        if let Some(i) = self.index(x, y) {
+            let layers = self.names.len();
+            accumulate(&mut self.sums[i * layers..][..layers], colours);
+            self.counts[i] = self.counts[i].saturating_add(1);
+        }
+    }
+
+    /// Forgets all samples.
+    pub fn clear(&mut self) {
+        self.sums.fill([0.0; 3]);
+        self.counts.fill(0);
+    }
+
+    /// The mean of a layer's samples (black where there are none), or `None` if there is no such layer.
+    #[must_use]
+    pub fn mean(&self, layer: usize) -> Option<Image> {
+        let layers = self.names.len();
+        if layer >= layers {
+            return None;
+        }
+        let mean = |(sums, &count): (&[[f64; 3]], &u32)| {
+            let weight = if count == 0 { 0.0 } else { 1.0 / f64::from(count) };
+            Spectrum(sums[layer].map(|sum| (sum * weight) as f32))
+        };
+        let pixels = self.sums.chunks_exact(layers).zip(&self.counts).map(mean).collect();
+        Some(Image { width: self.width, height: self.height, pixels })
+    }
+
+    /// Sums and count of row `y`, columns `from..to`; the caller stays inside.
+    pub(crate) fn row(&self, y: u32, from: u32, to: u32) -> (&[[f64; 3]], &[u32]) {
+        let (a, b) = self.span(y, from, to);
+        let layers = self.names.len();
+        (&self.sums[a * layers..b * layers], &self.counts[a..b])
+    }
+
+    /// As [`Film::row`], to change in place.
+    pub(crate) fn row_mut(&mut self, y: u32, from: u32, to: u32) -> (&mut [[f64; 3]], &mut [u32]) {
+        let (a, b) = self.span(y, from, to);
+        let layers = self.names.len();
+        (&mut self.sums[a * layers..b * layers], &mut self.counts[a..b])
+    }
+
+    fn span(&self, y: u32, from: u32, to: u32) -> (usize, usize) {
+        let start = y as usize * self.width as usize;
+        (start + from as usize, start + to as usize)
+    }
+
+    fn index(&self, x: u32, y: u32) -> Option<usize> {
+        (x < self.width && y < self.height).then(|| y as usize * self.width as usize + x as usize)
+    }
+}
+
+/// Adds a sample to the sums of one pixel.
+#[inline]
+pub(crate) fn accumulate(sums: &mut [[f64; 3]], colours: &[Spectrum]) {
+    for (sum, colour) in sums.iter_mut().zip(colours) {
+        for (s, c) in sum.iter_mut().zip(colour.0) {
+            *s += f64::from(c);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn impossible_films_are_errors() {
+        let new = |width, height, layers: &[&str]| Film::new(width, height, layers).unwrap_err();
+        assert_eq!(new(0, 5, &["a"]), SizeError::Empty);
+        assert_eq!(new(5, 0, &["a"]), SizeError::Empty);
+        assert_eq!(new(u32::MAX, u32::MAX, &["a"]), SizeError::TooLarge);
+        assert_eq!(new(1, 1, &[]), SizeError::NoLayers);
+        assert_eq!(new(1, 1, &["a", "b", "a"]), SizeError::LayerNames);
+        assert_eq!(new(1, 1, &["a", ""]), SizeError::LayerNames);
+        assert_eq!(Image::new(0, 1, Spectrum::ONE).unwrap_err(), SizeError::Empty);
+    }
+
+    #[test]
+    fn pixels_outside_and_without_samples_are_harmless() {
+        let mut film = Film::new(2, 2, &["a", "b"]).unwrap();
+        film.add(2, 0, &[Spectrum::ONE]);
+        film.add(0, 1, &[Spectrum::ONE]);
+        assert_eq!((film.total_count(), film.min_count(), film.count(0, 1), film.count(9, 9)), (1, 0, 1, 0));
+        let image = film.mean(0).unwrap();
+        assert_eq!(image.get(0, 1), Some(Spectrum::ONE));
+        assert_eq!((image.get(0, 0), image.get(2, 0), image.get(0, 2)), (Some(Spectrum::ZERO), None, None));
+        assert!(film.mean(2).is_none());
+        film.clear();
+        assert_eq!(film, Film::new(2, 2, &["a", "b"]).unwrap());
+    }
+
+    #[test]
+    fn many_samples_do_not_lose_small_ones() {
+        // In f32 the sum would stand still at 2²⁴.
+        let mut film = Film::new(1, 1, &["a"]).unwrap();
+        film.add(0, 0, &[Spectrum::splat(1e9)]);
+        for _ in 0..1000 {
+            film.add(0, 0, &[Spectrum::ONE]);
+        }
+        let mean = film.mean(0).unwrap().pixels[0][0];
+        assert_eq!(mean, (1_000_001_000.0_f64 / 1001.0) as f32);
+    }
+}

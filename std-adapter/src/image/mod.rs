@@ -1,0 +1,212 @@
+//! Picture files, chosen by extension: PNG to look at, PFM and OpenEXR to measure.
+
+#[cfg(feature = "exr")]
+pub mod exr;
+pub mod pfm;
+pub mod png;
+
+use core::fmt;
+use std::io;
+use std::path::{Path, PathBuf};
+
+use crate::film::{Film, Image, SizeError};
+
+/// A picture with a name.
+#[derive(Debug, Clone, Copy)]
+pub struct Layer<'a> {
+    /// Name in the file; the first layer's is not used.
+    pub name: &'a str,
+    /// The picture.
+    pub image: &'a Image,
+}
+
+/// What is wrong with a picture file.
+#[derive(Debug)]
+pub struct ImageError {
+    /// The file.
+    pub path: PathBuf,
+    /// What is wrong.
+    pub kind: ErrorKind,
+}
+
+/// What is wrong with a picture or its bytes.
+#[derive(Debug)]
+#[non_exhaustive]
+pub enum ErrorKind {
+    /// The system cannot read or write the file.
+    Io(io::Error),
+    /// The extension is none of these known ones.
+    Extension(&'static [&'static str]),
+    /// No layers to write, layers of different sizes, or fewer pixels than the size says.
+    Layers,
+    /// An impossible size.
+    Size(SizeError),
+    /// The bytes are no picture of this format, or a damaged one; in what way.
+    Format(String),
+}
+
+impl fmt::Display for ImageError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}: {}", self.path.display(), self.kind)
+    }
+}
+
+impl fmt::Display for ErrorKind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Io(error) => error.fmt(f),
+            Self::Extension(known) => write!(f, "the extension is none of {}", known.join(", ")),
+            Self::Layers => f.write_str("no layers, or layers that differ in size"),
+            Self::Size(error) => error.fmt(f),
+            Self::Format(what) => f.write_str(what),
+        }
+    }
+}
+
+impl core::error::Error for ImageError {
+    fn source(&self) -> Option<&(dyn core::error::Error + 'static)> {
+        match &self.kind {
+            ErrorKind::Io(error) => Some(error),
+            _ => None,
+        }
+    }
+}
+
+impl From<SizeError> for ErrorKind {
+    fn from(error: SizeError) -> Self {
+        Self::Size(error)
+    }
+}
+
+/// Extensions that [`write`](fn@write) knows.
+#[cfg(feature = "exr")]
+pub const WRITABLE: &[&str] = &["png", "pfm", "exr"];
+/// Extensions that [`write`](fn@write) knows.
+#[cfg(not(feature = "exr"))]
+pub const WRITABLE: &[&str] = &["png", "pfm"];
+
+/// Extensions that [`read`] knows.
+#[cfg(feature = "exr")]
+pub const READABLE: &[&str] = &["pfm", "exr"];
+/// Extensions that [`read`] knows.
+#[cfg(not(feature = "exr"))]
+pub const READABLE: &[&str] = &["pfm"];
+
+fn extension(path: &Path) -> String {
+    path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default()
+}
+
+/// Whether [`write`](fn@write) knows the file's extension: a question to ask before a long render.
+#[must_use]
+pub fn is_writable(path: impl AsRef<Path>) -> bool {
+    WRITABLE.contains(&extension(path.as_ref()).as_str())
+}
+
+/// Writes layers of one size to a file in the format of its extension.
+///
+/// PNG (8-bit sRGB after `exposure` stops) and PFM take the first layer, OpenEXR all of them: the
+/// first as channels `R`, `G`, `B`, the others as `name.R` and so on. The measuring formats ignore
+/// `exposure`. All is encoded before the file is opened.
+///
+/// # Errors
+/// An unknown extension, no layers or different sizes, or what the system says.
+///
+/// ```
+/// use fogbow::spectrum::Spectrum;
+/// use fogbow_std::{film::Image, image::{Layer, read, write}};
+/// let image = Image::new(4, 3, Spectrum::splat(0.5))?;
+/// let file = std::env::temp_dir().join("fogbow-std-write.pfm");
+/// write(&file, &[Layer { name: "total", image: &image }], 0.0)?;
+/// assert_eq!(read(&file)?, image);
+/// # std::fs::remove_file(&file)?;
+///
+/// let error = write("picture.jpeg", &[Layer { name: "total", image: &image }], 0.0).unwrap_err();
+/// assert!(error.to_string().starts_with("picture.jpeg: the extension is none of png, pfm"));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn write(path: impl AsRef<Path>, layers: &[Layer<'_>], exposure: f32) -> Result<(), ImageError> {
+    let path = path.as_ref();
+    encode(&extension(path), layers, exposure)
+        .and_then(|bytes| std::fs::write(path, bytes).map_err(ErrorKind::Io))
+        .map_err(|kind| ImageError { path: path.to_owned(), kind })
+}
+
+/// Writes the means of a film's layers, as [`write`](fn@write).
+///
+/// # Errors
+/// As [`write`](fn@write).
+pub fn write_film(path: impl AsRef<Path>, film: &Film, exposure: f32) -> Result<(), ImageError> {
+    let images: Vec<_> = (0..film.layers().len()).filter_map(|i| film.mean(i)).collect();
+    let layers: Vec<_> = film.layers().iter().zip(&images).map(|(name, image)| Layer { name, image }).collect();
+    write(path, &layers, exposure)
+}
+
+fn encode(extension: &str, layers: &[Layer<'_>], exposure: f32) -> Result<Vec<u8>, ErrorKind> {
+    let Some(first) = layers.first() else { return Err(ErrorKind::Layers) };
+    let (width, height) = (first.image.width, first.image.height);
+    let count = crate::film::pixel_count(width, height)?;
+    let fits =
+        |layer: &Layer<'_>| (layer.image.width, layer.image.height, layer.image.pixels.len()) == (width, height, count);
+    if !layers.iter().all(fits) {
+        return Err(ErrorKind::Layers);
+    }
+    match extension {
+        "png" => png::encode(first.image, exposure),
+        "pfm" => Ok(pfm::encode(first.image)),
+        #[cfg(feature = "exr")]
+        "exr" => exr::encode(layers),
+        _ => Err(ErrorKind::Extension(WRITABLE)),
+    }
+}
+
+/// Reads a picture file in the format of its extension: PFM (grey or colour), or OpenEXR (the
+/// channels `R`, `G`, `B`, or `Y` alone).
+///
+/// # Errors
+/// An unknown extension, what the system says, or what is wrong with the bytes.
+pub fn read(path: impl AsRef<Path>) -> Result<Image, ImageError> {
+    let path = path.as_ref();
+    let decode: fn(&[u8]) -> Result<Image, ErrorKind> = match extension(path).as_str() {
+        "pfm" => pfm::decode,
+        #[cfg(feature = "exr")]
+        "exr" => exr::decode,
+        _ => return Err(ImageError { path: path.to_owned(), kind: ErrorKind::Extension(READABLE) }),
+    };
+    std::fs::read(path)
+        .map_err(ErrorKind::Io)
+        .and_then(|bytes| decode(&bytes))
+        .map_err(|kind| ImageError { path: path.to_owned(), kind })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use fogbow::spectrum::Spectrum;
+
+    #[test]
+    fn errors_name_the_file_and_nothing_is_left_behind() {
+        let folder = std::env::temp_dir().join(format!("fogbow-image-{}", std::process::id()));
+        let image = Image::new(2, 2, Spectrum::ONE).unwrap();
+        let smaller = Image::new(1, 2, Spectrum::ONE).unwrap();
+        let layers = [Layer { name: "total", image: &image }];
+        let said = |result: Result<(), ImageError>| result.unwrap_err().to_string();
+        let missing = folder.join("x.pfm");
+        assert!(said(write(&missing, &layers, 0.0)).contains("x.pfm: "));
+        assert!(read(&missing).unwrap_err().to_string().contains("x.pfm: "));
+        std::fs::create_dir_all(&folder).unwrap();
+        for name in ["x.tiff", "x", "pfm"] {
+            assert!(said(write(folder.join(name), &layers, 0.0)).contains("the extension is none of png, pfm"));
+        }
+        assert!(said(write(folder.join("x.png"), &[], 0.0)).contains("no layers"));
+        let uneven = [layers[0], Layer { name: "other", image: &smaller }];
+        assert!(said(write(folder.join("x.png"), &uneven, 0.0)).contains("differ in size"));
+        let lying = Image { pixels: Vec::new(), ..image.clone() };
+        assert!(said(write(folder.join("x.PNG"), &[Layer { name: "", image: &lying }], 0.0)).contains("no layers"));
+        assert_eq!(std::fs::read_dir(&folder).unwrap().count(), 0);
+        for name in READABLE.iter().map(|extension| format!("x.{extension}")) {
+            write(folder.join(&name), &layers, 1.0).unwrap();
+            assert_eq!(read(folder.join(&name)).unwrap(), image, "{name}");
+        }
+        std::fs::remove_dir_all(&folder).unwrap();
+    }
+}

@@ -1,0 +1,282 @@
+//! Random numbers of each pixel and sample: seeds hash the pixel and the sample, never a thread.
+
+use core::convert::Infallible;
+
+use fogbow::rand_core::TryRng;
+use fogbow::sampling::Generator;
+use fogbow::sampling::uniform::mix;
+use sobol_burley::NUM_DIMENSION_SETS_4D;
+use sobol_burley::parts::{Int4, hash, hash_int4, owen_scramble_int4_rev, owen_scramble_rev, sobol_int4_rev};
+
+/// Which random numbers a picture is made of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Sequence {
+    /// Every number independent of all others.
+    Independent,
+    /// The samples of a pixel fill the space of their first 256 numbers evenly
+    /// ([`LowDiscrepancy`]): less noise for the same number of samples.
+    #[default]
+    LowDiscrepancy,
+}
+
+impl Sequence {
+    /// The generator of one sample of one pixel ([`pixel_key`]).
+    ///
+    /// ```
+    /// use fogbow::rand_core::Rng;
+    /// use fogbow_std::seed::{Sequence, pixel_key};
+    /// let first = |x, y| Sequence::LowDiscrepancy.start(1, pixel_key(x, y), 0).next_u32();
+    /// assert_eq!(first(3, 4), first(3, 4));
+    /// assert_ne!(first(3, 4), first(4, 3));
+    /// ```
+    #[inline]
+    #[must_use]
+    pub fn start(self, seed: u64, pixel: u64, sample: u32) -> SampleRng {
+        match self {
+            Self::Independent => SampleRng::Independent(independent(seed, pixel, sample)),
+            Self::LowDiscrepancy => SampleRng::LowDiscrepancy(LowDiscrepancy::new(seed, pixel, sample)),
+        }
+    }
+}
+
+/// One number for a pixel, whatever the size of the picture.
+#[inline]
+#[must_use]
+pub fn pixel_key(x: u32, y: u32) -> u64 {
+    u64::from(y) << 32 | u64::from(x)
+}
+
+/// A generator whose numbers have nothing to do with those of any other pixel, sample or seed.
+///
+/// ```
+/// use fogbow::sampling::uniform;
+/// use fogbow_std::seed::independent;
+/// let (mut a, mut b) = (independent(1, 7, 0), independent(1, 7, 1));
+/// assert_ne!(uniform(&mut a), uniform(&mut b));
+/// ```
+#[inline]
+#[must_use]
+pub fn independent(seed: u64, pixel: u64, sample: u32) -> Generator {
+    Generator::new(mix(pixel_seed(seed, pixel)).wrapping_add(u64::from(sample)))
+}
+
+/// Seed of a pixel: two rounds of hashing, so that neither sums nor exclusive-ors of seed and pixel coincide.
+#[inline]
+fn pixel_seed(seed: u64, pixel: u64) -> u64 {
+    mix(mix(seed) ^ pixel)
+}
+
+/// The generator of one sample, as [`Sequence::start`] chose it.
+#[derive(Debug, Clone)]
+pub enum SampleRng {
+    /// See [`Sequence::Independent`].
+    Independent(Generator),
+    /// See [`Sequence::LowDiscrepancy`].
+    LowDiscrepancy(LowDiscrepancy),
+}
+
+impl TryRng for SampleRng {
+    type Error = Infallible;
+
+    #[inline]
+    fn try_next_u32(&mut self) -> Result<u32, Infallible> {
+        match self {
+            Self::Independent(rng) => rng.try_next_u32(),
+            Self::LowDiscrepancy(rng) => rng.try_next_u32(),
+        }
+    }
+
+    #[inline]
+    fn try_next_u64(&mut self) -> Result<u64, Infallible> {
+        match self {
+            Self::Independent(rng) => rng.try_next_u64(),
+            Self::LowDiscrepancy(rng) => rng.try_next_u64(),
+        }
+    }
+
+    fn try_fill_bytes(&mut self, bytes: &mut [u8]) -> Result<(), Infallible> {
+        match self {
+            Self::Independent(rng) => rng.try_fill_bytes(bytes),
+            Self::LowDiscrepancy(rng) => rng.try_fill_bytes(bytes),
+        }
+    }
+}
+
+/// A point of an Owen-scrambled Sobol sequence, number by number (Burley 2020, Practical
+/// Hash-based Owen Scrambling; tables and hash of the crate `sobol_burley`).
+///
+/// The sample is the point's index, the pixel scrambles; after 256 numbers an
+/// [`independent`] generator goes on. The tables hold 2¹⁶ points: every further 2¹⁶ samples are a
+/// new scramble. All 32 bits are scrambled, so the 24 that `fogbow::sampling::uniform` reads are
+/// in [0, 1) and distributed as independent ones.
+///
+/// ```
+/// use fogbow::sampling::uniform;
+/// use fogbow_std::seed::LowDiscrepancy;
+/// // Of the first 16 samples, one lies in each sixteenth.
+/// let mut seen: Vec<u32> = (0..16).map(|i| (uniform(&mut LowDiscrepancy::new(1, 7, i)) * 16.0) as u32).collect();
+/// seen.sort();
+/// assert!(seen.iter().copied().eq(0..16));
+/// ```
+#[derive(Debug, Clone)]
+pub struct LowDiscrepancy {
+    /// Four dimensions at a time, which is what the tables are laid out for.
+    ready: [u32; 4],
+    /// How many of `ready` are used.
+    used: u32,
+    /// The next four dimensions.
+    set: u32,
+    /// Index in the sequence, shuffled by the seed; its bits reversed.
+    index: u32,
+    seed: u32,
+    rest: Generator,
+}
+
+impl LowDiscrepancy {
+    /// Sample number `sample` of a pixel ([`pixel_key`]).
+    #[inline]
+    #[must_use]
+    pub fn new(seed: u64, pixel: u64, sample: u32) -> Self {
+        let key = pixel_seed(seed, pixel);
+        // The high half of the hash, so that this is not the start of `rest`'s.
+        let scramble = (mix(key ^ u64::from(sample >> 16)) >> 32) as u32;
+        let index = owen_scramble_rev((sample & 0xffff).reverse_bits(), hash(scramble ^ 0x79c6_8e4a));
+        Self { ready: [0; 4], used: 4, set: 0, index, seed: scramble, rest: independent(seed, pixel, sample) }
+    }
+
+    #[inline]
+    fn refill(&mut self) {
+        self.ready = if self.set < NUM_DIMENSION_SETS_4D {
+            // As `sobol_burley::sample_4d`, but the index is shuffled once per sample and all bits are kept.
+            let points = sobol_int4_rev(self.index, self.set);
+            let scramble = Int4::from([self.seed.wrapping_mul(0x9c8f_2d3b); 4])
+                ^ Int4::from([self.set; 4])
+                ^ Int4::from([0x912f_69ba, 0x174f_18ab, 0x691e_72ca, 0xb40c_c1b8]);
+            self.set += 1;
+            owen_scramble_int4_rev(points, hash_int4(scramble)).reverse_bits().into()
+        } else {
+            let Ok(a) = self.rest.try_next_u64();
+            let Ok(b) = self.rest.try_next_u64();
+            [a as u32, (a >> 32) as u32, b as u32, (b >> 32) as u32]
+        };
+        self.used = 0;
+    }
+}
+
+impl TryRng for LowDiscrepancy {
+    type Error = Infallible;
+
+    #[inline]
+    fn try_next_u32(&mut self) -> Result<u32, Infallible> {
+        if self.used >= 4 {
+            self.refill();
+        }
+        let value = self.ready[(self.used & 3) as usize];
+        self.used += 1;
+        Ok(value)
+    }
+
+    #[inline]
+    fn try_next_u64(&mut self) -> Result<u64, Infallible> {
+        let high = self.try_next_u32()?;
+        Ok(u64::from(high) << 32 | u64::from(self.try_next_u32()?))
+    }
+
+    fn try_fill_bytes(&mut self, bytes: &mut [u8]) -> Result<(), Infallible> {
+        for chunk in bytes.chunks_mut(4) {
+            let word = self.try_next_u32()?.to_le_bytes();
+            chunk.copy_from_slice(&word[..chunk.len()]);
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use fogbow::sampling::uniform;
+
+    #[test]
+    fn agrees_with_the_crate_in_the_bits_it_keeps() {
+        for sample in [0, 1, 77, 65_535] {
+            let mut rng = LowDiscrepancy::new(3, pixel_key(4, 5), sample);
+            let seed = rng.seed;
+            for set in 0..NUM_DIMENSION_SETS_4D {
+                for expected in sobol_burley::sample_4d(sample, set, seed) {
+                    let found = uniform(&mut rng);
+                    let beyond = found - expected;
+                    assert!((0.0..=f32::EPSILON / 2.0).contains(&beyond), "{found} {expected}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn numbers_lie_in_the_unit_interval_and_are_uniform_in_every_dimension() {
+        const DIMENSIONS: usize = 300; // Beyond the tables.
+        const SAMPLES: u32 = 4096;
+        let mut bins = vec![[0u32; 16]; DIMENSIONS];
+        for sample in 0..SAMPLES {
+            let mut rng = LowDiscrepancy::new(11, 0, sample);
+            for bin in &mut bins {
+                let u = uniform(&mut rng);
+                assert!((0.0..1.0).contains(&u));
+                bin[(u * 16.0) as usize] += 1;
+            }
+        }
+        for (dimension, bin) in bins.iter().enumerate() {
+            // Inside the tables exactly even; beyond, six standard deviations of a binomial.
+            let slack = if dimension < 256 { 0 } else { 94 };
+            assert!(bin.iter().all(|&n| n.abs_diff(SAMPLES / 16) <= slack), "dimension {dimension}: {bin:?}");
+        }
+    }
+
+    /// Error of the mean of a smooth function of dimensions 2 and 3, exact integral 1.
+    fn error(sequence: Sequence, pixel: u64, samples: u32) -> f64 {
+        let mut sum = 0.0;
+        for sample in 0..samples {
+            let mut rng = sequence.start(5, pixel, sample);
+            let [_, _, x, y] = [(); 4].map(|()| f64::from(uniform(&mut rng)));
+            sum += 4.0 * x * y;
+        }
+        sum / f64::from(samples) - 1.0
+    }
+
+    fn rms(sequence: Sequence, samples: u32) -> f64 {
+        ((0..200).map(|p| error(sequence, p, samples).powi(2)).sum::<f64>() / 200.0).sqrt()
+    }
+
+    #[test]
+    fn converges_faster_than_the_root_of_the_number_of_samples() {
+        let (few, many) = (rms(Sequence::LowDiscrepancy, 16), rms(Sequence::LowDiscrepancy, 1024));
+        // Independent samples gain a factor of 8; scrambled nets of a smooth function 64 and more.
+        assert!(many < few / 40.0, "{few} {many}");
+        assert!(many < rms(Sequence::Independent, 1024) / 20.0);
+        let gain = rms(Sequence::Independent, 16) / rms(Sequence::Independent, 1024);
+        assert!((6.0..11.0).contains(&gain), "{gain}");
+    }
+
+    #[test]
+    fn neighbouring_pixels_are_uncorrelated() {
+        for sequence in [Sequence::Independent, Sequence::LowDiscrepancy] {
+            for (dx, dy) in [(1, 0), (0, 1), (1, 1)] {
+                let (mut ab, mut aa, mut bb) = (0.0, 0.0, 0.0);
+                for (x, y) in (0..64).flat_map(|y| (0..64).map(move |x| (2 * x, 2 * y))) {
+                    let a = error(sequence, pixel_key(x, y), 4);
+                    let b = error(sequence, pixel_key(x + dx, y + dy), 4);
+                    (ab, aa, bb) = (ab + a * b, aa + a * a, bb + b * b);
+                }
+                // 4096 pairs: standard error 1/64.
+                let correlation = ab / f64::sqrt(aa * bb);
+                assert!(correlation.abs() < 4.5 / 64.0, "{sequence:?}: {correlation}");
+            }
+        }
+    }
+
+    #[test]
+    fn samples_beyond_the_tables_differ_from_those_within() {
+        let first = |sample| uniform(&mut LowDiscrepancy::new(1, 2, sample));
+        let same = (0..1000).filter(|&i| first(i) == first(i + 65_536)).count();
+        assert!(same < 3);
+    }
+}

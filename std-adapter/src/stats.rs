@@ -1,0 +1,258 @@
+//! What a render took: seconds per phase, queries of the host's world, bytes.
+
+use core::cell::Cell;
+use core::ops::{Add, AddAssign};
+use std::time::Instant;
+
+use fogbow::glam::Vec3;
+use fogbow::host::{Face, Gradients, Hit, Medium, Properties, Scene, Stretch};
+use fogbow::math::Ray;
+use fogbow::spectrum::{Hessian, Spectrum};
+
+/// How often the world was asked.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Counters {
+    /// Samples in the film.
+    pub samples: u64,
+    /// Closest-hit queries.
+    pub rays: u64,
+    /// Visibility queries.
+    pub shadow_rays: u64,
+    /// Queries of a medium at a point: properties, extinction, derivatives.
+    pub lookups: u64,
+    /// Queries of a medium's bounds along a ray.
+    pub stretches: u64,
+    /// Samples that were no finite numbers and were taken for black: 0 unless something is wrong.
+    pub non_finite: u64,
+}
+
+impl Add for Counters {
+    type Output = Self;
+    fn add(self, o: Self) -> Self {
+        Self {
+            samples: self.samples + o.samples,
+            rays: self.rays + o.rays,
+            shadow_rays: self.shadow_rays + o.shadow_rays,
+            lookups: self.lookups + o.lookups,
+            stretches: self.stretches + o.stretches,
+            non_finite: self.non_finite + o.non_finite,
+        }
+    }
+}
+
+impl AddAssign for Counters {
+    fn add_assign(&mut self, other: Self) {
+        *self = *self + other;
+    }
+}
+
+/// Counters that many wrappers of one thread may raise.
+#[derive(Debug, Default)]
+pub struct Tally {
+    rays: Cell<u64>,
+    shadow_rays: Cell<u64>,
+    lookups: Cell<u64>,
+    stretches: Cell<u64>,
+}
+
+impl Tally {
+    /// What was counted so far.
+    #[must_use]
+    pub fn counters(&self) -> Counters {
+        Counters {
+            rays: self.rays.get(),
+            shadow_rays: self.shadow_rays.get(),
+            lookups: self.lookups.get(),
+            stretches: self.stretches.get(),
+            ..Counters::default()
+        }
+    }
+}
+
+#[inline]
+fn raise(counter: &Cell<u64>) {
+    counter.set(counter.get() + 1);
+}
+
+/// A scene that counts what it is asked; two references, to be made where it is needed.
+///
+/// ```
+/// use fogbow::{glam::Vec3, host::{Empty, Scene}, math::Ray};
+/// use fogbow_std::stats::{CountingScene, Tally};
+/// let tally = Tally::default();
+/// let scene = CountingScene { scene: &Empty, tally: &tally };
+/// assert!(scene.closest_hit(&Ray::new(Vec3::ZERO, Vec3::X)).is_none());
+/// assert_eq!(tally.counters().rays, 1);
+/// ```
+#[derive(Debug, Clone, Copy)]
+pub struct CountingScene<'t, S> {
+    /// The scene that answers.
+    pub scene: S,
+    /// Where the queries are counted.
+    pub tally: &'t Tally,
+}
+
+impl<S: Scene> Scene for CountingScene<'_, S> {
+    #[inline]
+    fn closest_hit(&self, ray: &Ray) -> Option<Hit> {
+        raise(&self.tally.rays);
+        self.scene.closest_hit(ray)
+    }
+    #[inline]
+    fn is_blocked(&self, ray: &Ray) -> bool {
+        raise(&self.tally.shadow_rays);
+        self.scene.is_blocked(ray)
+    }
+}
+
+/// A medium that counts what it is asked.
+///
+/// ```
+/// use fogbow::{glam::Vec3, host::{Empty, Medium}};
+/// use fogbow_std::stats::{CountingMedium, Tally};
+/// let tally = Tally::default();
+/// let medium = CountingMedium { medium: &Empty, tally: &tally };
+/// medium.extinction(Vec3::ZERO);
+/// assert_eq!(tally.counters().lookups, 1);
+/// ```
+#[derive(Debug, Clone, Copy)]
+pub struct CountingMedium<'t, M> {
+    /// The medium that answers.
+    pub medium: M,
+    /// Where the queries are counted.
+    pub tally: &'t Tally,
+}
+
+impl<M: Medium> Medium for CountingMedium<'_, M> {
+    #[inline]
+    fn properties(&self, point: Vec3) -> Properties {
+        raise(&self.tally.lookups);
+        self.medium.properties(point)
+    }
+    #[inline]
+    fn stretch(&self, ray: &Ray, from: f32) -> Stretch {
+        raise(&self.tally.stretches);
+        self.medium.stretch(ray, from)
+    }
+    #[inline]
+    fn extinction(&self, point: Vec3) -> Spectrum {
+        raise(&self.tally.lookups);
+        self.medium.extinction(point)
+    }
+    #[inline]
+    fn resolution(&self) -> f32 {
+        self.medium.resolution()
+    }
+    fn gradients(&self, point: Vec3) -> Gradients {
+        raise(&self.tally.lookups);
+        self.medium.gradients(point)
+    }
+    fn extinction_hessian(&self, point: Vec3) -> Hessian {
+        raise(&self.tally.lookups);
+        self.medium.extinction_hessian(point)
+    }
+    fn mean_extinction(&self, centre: Vec3, radius: f32) -> Spectrum {
+        raise(&self.tally.lookups);
+        self.medium.mean_extinction(centre, radius)
+    }
+    fn faces(&self, ray: &Ray, visit: &mut dyn FnMut(Face)) {
+        self.medium.faces(ray, visit);
+    }
+    #[inline]
+    fn is_grey(&self) -> bool {
+        self.medium.is_grey()
+    }
+    #[inline]
+    fn is_emissive(&self) -> bool {
+        self.medium.is_emissive()
+    }
+}
+
+/// A length of time.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Seconds {
+    /// On the clock on the wall.
+    pub wall: f64,
+    /// Of all threads of the process together; `None` where the system does not say.
+    pub cpu: Option<f64>,
+}
+
+impl Add for Seconds {
+    type Output = Self;
+    fn add(self, other: Self) -> Self {
+        Self { wall: self.wall + other.wall, cpu: self.cpu.zip(other.cpu).map(|(a, b)| a + b) }
+    }
+}
+
+/// A running clock.
+///
+/// ```
+/// let clock = fogbow_std::stats::Stopwatch::start();
+/// assert!(clock.elapsed().wall >= 0.0);
+/// ```
+#[derive(Debug, Clone, Copy)]
+pub struct Stopwatch {
+    wall: Instant,
+    cpu: Option<f64>,
+}
+
+impl Stopwatch {
+    /// Starts now.
+    #[must_use]
+    pub fn start() -> Self {
+        Self { wall: Instant::now(), cpu: cpu_seconds() }
+    }
+
+    /// Time since the start.
+    #[must_use]
+    pub fn elapsed(&self) -> Seconds {
+        let cpu = cpu_seconds().zip(self.cpu).map(|(now, then)| now - then);
+        Seconds { wall: self.wall.elapsed().as_secs_f64(), cpu }
+    }
+}
+
+/// CPU seconds of the process so far.
+#[cfg(any(unix, windows))]
+fn cpu_seconds() -> Option<f64> {
+    cpu_time::ProcessTime::try_now().ok().map(|time| time.as_duration().as_secs_f64())
+}
+
+#[cfg(not(any(unix, windows)))]
+fn cpu_seconds() -> Option<f64> {
+    None
+}
+
+/// What a program did, phase by phase: plain fields, for the host to print as it likes.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Statistics {
+    /// Phases with their times, in the order in which they first ended.
+    pub phases: Vec<(String, Seconds)>,
+    /// Queries of the world.
+    pub counters: Counters,
+    /// Bytes held by named things: film, grids, trees.
+    pub bytes: Vec<(String, u64)>,
+}
+
+impl Statistics {
+    /// Does `work` and adds its time to phase `name`.
+    ///
+    /// ```
+    /// let mut statistics = fogbow_std::stats::Statistics::default();
+    /// assert_eq!(statistics.time("read", || 42), 42);
+    /// assert_eq!(statistics.phases[0].0, "read");
+    /// ```
+    pub fn time<T>(&mut self, name: &str, work: impl FnOnce() -> T) -> T {
+        let clock = Stopwatch::start();
+        let result = work();
+        self.add(name, clock.elapsed());
+        result
+    }
+
+    /// Adds to the time of phase `name`.
+    pub fn add(&mut self, name: &str, seconds: Seconds) {
+        match self.phases.iter_mut().find(|(n, _)| n == name) {
+            Some((_, sum)) => *sum = *sum + seconds,
+            None => self.phases.push((name.to_owned(), seconds)),
+        }
+    }
+}
