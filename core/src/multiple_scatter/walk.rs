@@ -162,7 +162,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Walk<'_, M, S> {
     fn lights_at(&self, at: Vec3, to_eye: Vec3, properties: &Properties, rng: &mut Generator) -> Contribution {
         let importance = |i: usize| {
             let light = &self.lights[i];
-            if light.position().is_some() { 0.0 } else { light.importance(at) }
+            if without_extent(light).is_some() { 0.0 } else { light.importance(at) }
         };
         self.each_light(importance, rng, |light, share, rng| {
             let mut sample = light.sample(at, uniform2(rng))?;
@@ -174,13 +174,13 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Walk<'_, M, S> {
     }
 
     /// Light of point lights scattered somewhere along a segment and carried to the path's start.
-    fn points_along(&self, ray: &Ray, weight: &Weight, kappa: Spectrum, rng: &mut (impl Rng + ?Sized)) -> Contribution {
-        let importance = |i: usize| match (self.lights[i].position(), intensity(&self.lights[i])) {
-            (Some(position), Some(intensity)) => intensity / height(ray, position),
-            _ => 0.0,
+    fn points_along(&self, ray: &Ray, weight: &Weight, kappa: Spectrum, rng: &mut Generator) -> Contribution {
+        let importance = |i: usize| match without_extent(&self.lights[i]) {
+            Some((position, intensity)) => intensity.mean() / height(ray, position),
+            None => 0.0,
         };
         self.each_light(importance, rng, |light, share, rng| {
-            let position = light.position()?;
+            let (position, _) = without_extent(light)?;
             let end = ray.length.min(ENDLESS * ray.origin.distance(position).max(self.medium.resolution()));
             let law = Equiangular::new(ray.origin, ray.direction, position, 0.0, end)?;
             let distance = law.sample(uniform(rng)).clamp(0.0, end);
@@ -232,12 +232,12 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Walk<'_, M, S> {
     }
 }
 
-/// Radiant intensity on the axis of a light without extent, mean of the channels.
-fn intensity(light: &Light<'_>) -> Option<f32> {
+/// Position and radiant intensity on the axis (W/sr) of a light without extent.
+fn without_extent(light: &Light<'_>) -> Option<(Vec3, Spectrum)> {
     match light {
-        Light::Point(light) => Some(light.intensity.mean()),
-        Light::Phong(light) => Some(light.intensity.mean()),
-        Light::Spot(light) => Some(light.intensity.mean()),
+        Light::Point(light) => Some((light.position, light.intensity)),
+        Light::Phong(light) => Some((light.position, light.intensity)),
+        Light::Spot(light) => Some((light.position, light.intensity)),
         _ => None,
     }
 }
