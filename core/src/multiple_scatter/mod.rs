@@ -9,10 +9,11 @@
 //! start; phase functions, densities, lengths and roulette are frozen. Departs from the paper:
 //!
 //! - lengths come from delta tracking, which suits heterogeneous media; Eq. 29 remains as a choice;
-//! - lights without extent are joined not to the collisions but to a point of every segment,
+//! - within its near field ([`Light::near_field`](crate::light::Light::near_field): all of space for
+//!   lights without extent) a light is joined not to the collisions but to a point of every segment,
 //!   sampled equiangularly (Kulla and Fajardo 2012), which takes the `1/ρ²` out along the segment.
-//!   What is left of `‖∇L‖` still diverges logarithmically, so the fall-off may be held constant
-//!   within a small distance ([`Settings::closest`]);
+//!   What is left of `‖∇L‖` still diverges logarithmically, so the fall-off of lights without extent
+//!   may be held constant within a small distance ([`Settings::closest`]);
 //! - the light of surfaces enters through the direction in which the walk goes on anyway.
 //!
 //! `L_m` does not contain `σₛ` of the point itself. The light a surface sends straight to that

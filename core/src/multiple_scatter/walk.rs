@@ -5,7 +5,7 @@ use glam::{Vec2, Vec3};
 use super::Weight;
 use super::flight::{Collision, Lengths, fly, own};
 use crate::host::{Hit, Medium, Properties, Rng, Scene};
-use crate::light::Light;
+use crate::light::{Falloff, Light};
 use crate::math::Ray;
 use crate::phase::{self, Phase};
 use crate::sampling::discrete::choose;
@@ -13,7 +13,7 @@ use crate::sampling::distance::Equiangular;
 use crate::sampling::{Generator, uniform, uniform2, warp};
 use crate::sh::Coefficient;
 use crate::single_scatter::{self, Arrival, Contribution, nearest_surface, shadow_ray};
-use crate::spectrum::{Gradient, Spectrum};
+use crate::spectrum::Spectrum;
 use crate::transmittance::thickness::{Marching, Steps, optical_thickness_with_gradients};
 
 /// Beyond this many distances to the light an endless segment is not sampled equiangularly: 10⁻⁴ of
@@ -111,7 +111,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Walk<'_, M, S> {
         let mut weight = Weight::ONE;
         let mut total = Contribution::ZERO;
         for vertex in 1..=self.settings.max_vertices {
-            total += self.points_along(&ray, &weight, kappa, rng);
+            total += self.near_lights(&ray, &weight, kappa, rng);
             let marching = self.marching(rng);
             let hit = fly(&ray, self.medium, self.settings.lengths, weight.value * kappa, marching, rng);
             let Some(Collision { distance, properties, factor }) = hit else { break };
@@ -158,11 +158,11 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Walk<'_, M, S> {
         Marching { steps: self.settings.steps, offset: uniform(rng) }
     }
 
-    /// Single scattering of lights with extent (and of suns) at a vertex.
+    /// Single scattering at a vertex of the lights in whose near field it does not lie.
     fn lights_at(&self, at: Vec3, to_eye: Vec3, properties: &Properties, rng: &mut Generator) -> Contribution {
-        let importance = |i: usize| {
-            let light = &self.lights[i];
-            if without_extent(light).is_some() { 0.0 } else { light.importance(at) }
+        let importance = |light: &Light<'_>| {
+            let near = light.near_field().is_some_and(|field| field.contains(at));
+            if near { 0.0 } else { light.importance(at) }
         };
         self.each_light(importance, rng, |light, share, rng| {
             let mut sample = light.sample(at, uniform2(rng))?;
@@ -173,37 +173,37 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Walk<'_, M, S> {
         })
     }
 
-    /// Light of point lights scattered somewhere along a segment and carried to the path's start.
-    fn points_along(&self, ray: &Ray, weight: &Weight, kappa: Spectrum, rng: &mut Generator) -> Contribution {
-        let importance = |i: usize| match without_extent(&self.lights[i]) {
-            Some((position, intensity)) => intensity.mean() / height(ray, position),
+    /// Light scattered somewhere along a segment within a light's near field, carried to the start.
+    fn near_lights(&self, ray: &Ray, weight: &Weight, kappa: Spectrum, rng: &mut Generator) -> Contribution {
+        let importance = |light: &Light<'_>| match light.near_field() {
+            Some(field) => light.intensity() / height(ray, field.centre()),
             None => 0.0,
         };
         self.each_light(importance, rng, |light, share, rng| {
-            let (position, _) = without_extent(light)?;
+            let (position, source) = light.anchor(uniform2(rng))?;
             let end = ray.length.min(ENDLESS * ray.origin.distance(position).max(self.medium.resolution()));
-            let law = Equiangular::new(ray.origin, ray.direction, position, 0.0, end)?;
-            let distance = law.sample(uniform(rng)).clamp(0.0, end);
+            let (near, far) = light.near_interval(ray, 0.0, end)?;
+            let law = Equiangular::new(ray.origin, ray.direction, position, near, far)?;
+            let distance = law.sample(uniform(rng)).clamp(near, far);
             let (at, marching) = (ray.at(distance), self.marching(rng));
             let properties = self.medium.properties(at);
             if properties.scattering.is_black() {
                 return None;
             }
-            let source = light.sample(at, Vec2::ZERO)?.source;
-            let arrival = Arrival::from_source(at, self.medium, &source, marching, self.settings.closest)?;
+            let source = match source {
+                Some(source) => source,
+                None => light.sample(at, uniform2(rng))?.source,
+            };
+            let closest = if source.falloff == Falloff::Area { 0.0 } else { self.settings.closest };
+            let arrival = Arrival::from_source(at, self.medium, &source, marching, closest)?;
             if self.scene.is_blocked(&shadow_ray(at, &source)) {
                 return None;
             }
             let segment = optical_thickness_with_gradients(&ray.with_length(distance), self.medium, marching);
             let frozen = kappa / (law.pdf(distance) * share);
             let slope = self.medium.gradients(at).scattering;
-            let joined = weight.advance(
-                frozen,
-                segment.value.transmitted(),
-                &finite(segment.gradient_joint),
-                properties.scattering,
-                &slope,
-            );
+            let through = segment.value.transmitted();
+            let joined = weight.advance(frozen, through, &segment.gradient_joint, properties.scattering, &slope);
             Some(joined.carry(&arrival.scatter(-ray.direction, &properties.phase)))
         })
     }
@@ -212,19 +212,19 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Walk<'_, M, S> {
     /// the probability it was chosen with.
     fn each_light(
         &self,
-        importance: impl Fn(usize) -> f32,
+        importance: impl Fn(&Light<'_>) -> f32,
         rng: &mut Generator,
         mut connect: impl FnMut(&Light<'_>, f32, &mut Generator) -> Option<Contribution>,
     ) -> Contribution {
         let mut sum = Contribution::ZERO;
         if self.settings.one_light {
-            if let Some(choice) = choose(self.lights.len(), importance, uniform(rng)) {
+            if let Some(choice) = choose(self.lights.len(), |i| importance(&self.lights[i]), uniform(rng)) {
                 sum += connect(&self.lights[choice.index], choice.probability, rng).unwrap_or_default();
             }
             return sum;
         }
-        for (i, light) in self.lights.iter().enumerate() {
-            if importance(i) > 0.0 {
+        for light in self.lights {
+            if importance(light) > 0.0 {
                 sum += connect(light, 1.0, rng).unwrap_or_default();
             }
         }
@@ -232,25 +232,10 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Walk<'_, M, S> {
     }
 }
 
-/// Position and radiant intensity on the axis (W/sr) of a light without extent.
-fn without_extent(light: &Light<'_>) -> Option<(Vec3, Spectrum)> {
-    match light {
-        Light::Point(light) => Some((light.position, light.intensity)),
-        Light::Phong(light) => Some((light.position, light.intensity)),
-        Light::Spot(light) => Some((light.position, light.intensity)),
-        _ => None,
-    }
-}
-
 /// Distance (m) of a light from a ray: its light along the ray sums up to about π over this.
 fn height(ray: &Ray, position: Vec3) -> f32 {
     let along = ray.direction.dot(position - ray.origin).clamp(0.0, ray.length);
     ray.at(along).distance(position).max(1e-6)
-}
-
-/// Behind an endless medium there is neither light nor slope.
-fn finite(gradient: Gradient) -> Gradient {
-    if gradient.is_finite() { gradient } else { Gradient::ZERO }
 }
 
 #[cfg(test)]
