@@ -1,0 +1,1 @@
+//! Scenes whose answers are known.
