@@ -7,7 +7,9 @@
 #![no_std]
 
 mod digest;
+mod media;
 mod sections;
+mod walks;
 
 pub use digest::Digest;
 
