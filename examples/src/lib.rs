@@ -12,6 +12,8 @@
 extern crate alloc;
 
 pub mod camera;
+pub mod cli;
+pub mod compare;
 pub mod error;
 pub mod mesh;
 pub mod picture;

@@ -3,6 +3,9 @@
 use std::io::Cursor;
 use std::path::Path;
 
+use fogbow_std::film::Image;
+use fogbow_std::image::ErrorKind;
+
 use crate::error::{DataError, read_file};
 
 /// Linear RGB, row by row from the top.
@@ -40,8 +43,8 @@ impl Picture {
     /// As [`Picture::read`].
     pub fn from_bytes(file: &Path, extension: &str, bytes: &[u8]) -> Result<Self, DataError> {
         let picture = match extension {
-            "exr" => read_exr(bytes),
-            "pfm" => read_pfm(bytes),
+            "exr" => read_with_adapter(fogbow_std::image::exr::decode, bytes),
+            "pfm" => read_with_adapter(fogbow_std::image::pfm::decode, bytes),
             "npy" => read_npy(bytes),
             "hdr" => read_with_image(bytes, image::ImageFormat::Hdr),
             "png" => read_with_image(bytes, image::ImageFormat::Png),
@@ -62,31 +65,14 @@ fn check_size(width: u64, height: u64) -> Result<(), String> {
     }
 }
 
-fn read_exr(bytes: &[u8]) -> Result<Picture, String> {
-    use exr::prelude::{ReadChannels, ReadLayers, read};
-    let broken = |e: exr::error::Error| format!("is not a usable OpenEXR file: {e}");
-    let meta = exr::meta::MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(broken)?;
-    for header in &meta.headers {
-        check_size(header.layer_size.x() as u64, header.layer_size.y() as u64)?;
-    }
-    let image = read()
-        .no_deep_data()
-        .largest_resolution_level()
-        .rgb_channels(
-            |size, _| (size.x(), vec![[0.0_f32; 3]; size.area()]),
-            |(width, pixels), at, (r, g, b): (f32, f32, f32)| {
-                if let Some(pixel) = pixels.get_mut(at.y() * *width + at.x()) {
-                    *pixel = [r, g, b];
-                }
-            },
-        )
-        .first_valid_layer()
-        .all_attributes()
-        .non_parallel()
-        .from_buffered(Cursor::new(bytes))
-        .map_err(broken)?;
-    let size = image.layer_data.size;
-    Ok(Picture { width: size.x(), height: size.y(), pixels: image.layer_data.channel_data.pixels.1 })
+/// OpenEXR and PFM are what the adapter writes; it reads them too.
+fn read_with_adapter(decode: fn(&[u8]) -> Result<Image, ErrorKind>, bytes: &[u8]) -> Result<Picture, String> {
+    let image = decode(bytes).map_err(|e| e.to_string())?;
+    Ok(Picture {
+        width: image.width as usize,
+        height: image.height as usize,
+        pixels: image.pixels.iter().map(|colour| colour.0).collect(),
+    })
 }
 
 fn read_with_image(bytes: &[u8], format: image::ImageFormat) -> Result<Picture, String> {
@@ -109,39 +95,11 @@ fn linear(c: f32) -> f32 {
     if c <= 0.04045 { c / 12.92 } else { ((c + 0.055) / 1.055).powf(2.4) }
 }
 
-/// Splits off a line of text.
-fn line<'b>(rest: &mut &'b [u8]) -> Result<&'b str, String> {
-    let end = rest.iter().take(4096).position(|b| *b == b'\n').ok_or("the header is cut off")?;
-    let (head, tail) = rest.split_at(end);
-    *rest = tail.get(1..).unwrap_or_default();
-    core::str::from_utf8(head).map(str::trim).map_err(|_| "the header is not text".to_owned())
-}
-
-fn read_pfm(bytes: &[u8]) -> Result<Picture, String> {
-    let mut rest = bytes;
-    let channels = match line(&mut rest)? {
-        "PF" => 3,
-        "Pf" => 1,
-        _ => return Err("does not begin with PF or Pf".to_owned()),
-    };
-    let size: Vec<u64> = line(&mut rest)?.split_whitespace().filter_map(|w| w.parse().ok()).collect();
-    let [width, height] = size[..] else { return Err("the second line is not a size".to_owned()) };
-    let scale: f32 = line(&mut rest)?.parse().map_err(|_| "the third line is not a scale".to_owned())?;
-    check_size(width, height)?;
-    let values = floats(rest, width * height * channels, scale < 0.0)?;
-    let mut picture = from_values(width as usize, height as usize, channels as usize, &values);
-    // Rows go from the bottom up.
-    let rows: Vec<_> = picture.pixels.chunks(picture.width).rev().map(<[_]>::to_vec).collect();
-    picture.pixels = rows.concat();
-    Ok(picture)
-}
-
-fn floats(bytes: &[u8], count: u64, is_little: bool) -> Result<Vec<f32>, String> {
+fn floats(bytes: &[u8], count: u64) -> Result<Vec<f32>, String> {
     if bytes.len() as u64 != count * 4 {
         return Err(format!("{} bytes of values are due, but {} follow", count * 4, bytes.len()));
     }
-    let convert = |word: &[u8; 4]| if is_little { f32::from_le_bytes(*word) } else { f32::from_be_bytes(*word) };
-    Ok(bytes.as_chunks::<4>().0.iter().map(convert).collect())
+    Ok(bytes.as_chunks::<4>().0.iter().map(|word| f32::from_le_bytes(*word)).collect())
 }
 
 fn from_values(width: usize, height: usize, channels: usize, values: &[f32]) -> Picture {
@@ -176,7 +134,7 @@ fn read_npy(bytes: &[u8]) -> Result<Picture, String> {
     check_size(width, height)?;
     let count = width * height * channels;
     let values = if header.contains("'<f4'") {
-        floats(body, count, true)?
+        floats(body, count)?
     } else if header.contains("'<f8'") {
         if body.len() as u64 != count * 8 {
             return Err(format!("{} bytes of values are due, but {} follow", count * 8, body.len()));

@@ -91,6 +91,26 @@ impl Volume {
         Ok(Self { size, values })
     }
 
+    /// Whether the outermost cells hold nothing.
+    #[must_use]
+    pub fn has_empty_border(&self) -> bool {
+        let is_outer =
+            |at: usize| cell(at, self.size).iter().zip(self.size).any(|(c, n)| *c == 0 || *c + 1 == n as usize);
+        match &self.values {
+            Values::F32(values) => values.iter().enumerate().all(|(at, v)| *v == 0.0 || !is_outer(at)),
+            Values::U8(values) => values.iter().enumerate().all(|(at, v)| *v == 0 || !is_outer(at)),
+        }
+    }
+
+    /// Bytes of the values.
+    #[must_use]
+    pub fn bytes(&self) -> usize {
+        match &self.values {
+            Values::F32(values) => size_of_val(&**values),
+            Values::U8(values) => values.len(),
+        }
+    }
+
     /// The largest density.
     #[must_use]
     pub fn max(&self) -> f32 {

@@ -201,9 +201,12 @@ pub(super) fn check_far_plane(scene: &SceneFile, sensor: &Element<'_>) -> Result
 }
 
 impl MediumDescription {
-    /// Whether this is a grid.
+    /// Bytes of its densities.
     #[must_use]
-    pub fn is_grid(&self) -> bool {
-        matches!(self.matter, Matter::Grid { .. })
+    pub fn bytes(&self) -> usize {
+        match &self.matter {
+            Matter::Homogeneous { .. } => 0,
+            Matter::Grid { volume, .. } => volume.bytes(),
+        }
     }
 }

@@ -18,6 +18,9 @@ pub(super) fn read_integrator(element: &Element<'_>) -> Result<Integrator, Scene
         return Err(plugin.unknown_type("path, volpath, volpathmis"));
     }
     let max_depth = plugin.integer("max_depth", -1, -1..=1_000_000)?;
+    if max_depth == 0 {
+        return Err(element.error("max_depth 0 renders nothing; -1 is without limit"));
+    }
     let rr_depth = plugin.integer("rr_depth", 5, 1..=1_000_000)?;
     let hide_emitters = plugin.boolean("hide_emitters", false)?;
     plugin.finish()?;

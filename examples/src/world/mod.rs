@@ -23,6 +23,7 @@ use fogbow::math::{Bounds, Ray, Vec3};
 
 pub use build::bounds_of;
 pub use lights::Storage;
+pub use media::{Media, WithMedium};
 
 use crate::camera::Camera;
 use crate::error::SceneError;
@@ -69,7 +70,7 @@ pub struct World<'a> {
     triangle_parts: Vec<Part>,
     triangles: Option<Triangles>,
     lights: lights::Lights<'a>,
-    media: media::Media<'a>,
+    media: Media<'a>,
     bounds: Bounds,
 }
 
@@ -80,7 +81,7 @@ impl<'a> World<'a> {
     /// Lights and media whose values are out of range, or that cannot be built.
     pub fn new(scene: &'a SceneFile, storage: &'a mut Storage) -> Result<Self, SceneError> {
         let (light_tables, medium_tables) = storage.split();
-        let media = media::Media::new(scene, medium_tables)?;
+        let media = Media::new(scene, medium_tables)?;
         let lights = lights::Lights::new(scene, light_tables)?;
         let pieces = build::Pieces::new(scene);
         let is_few = pieces.primitives.len() <= FEW;
@@ -136,7 +137,7 @@ impl<'a> World<'a> {
 
     /// Media, with tables they lend.
     #[must_use]
-    pub fn media(&self) -> &media::Media<'a> {
+    pub fn media(&self) -> &Media<'a> {
         &self.media
     }
 
@@ -150,6 +151,15 @@ impl<'a> World<'a> {
     #[must_use]
     pub fn counts(&self) -> (usize, usize) {
         (self.primitives.len(), self.corners.len())
+    }
+
+    /// Bytes held for tracing rays, without tables lent.
+    #[must_use]
+    pub fn bytes(&self) -> usize {
+        let triangles = self.corners.len() * (2 * size_of::<[Vec3; 3]>() + size_of::<Part>());
+        let primitives = self.primitives.len() * (size_of::<analytic::Primitive>() + size_of::<Part>());
+        let trees = self.triangles.as_ref().map_or(0, Triangles::bytes);
+        triangles + primitives + trees
     }
 
     fn hit(&self, ray: &Ray, distance: f32, normal: Vec3, part: &Part) -> Option<Hit> {

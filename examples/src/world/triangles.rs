@@ -51,6 +51,11 @@ impl Triangles {
         Self { tree, corners, order }
     }
 
+    /// Bytes of the tree.
+    pub(super) fn bytes(&self) -> usize {
+        size_of_val(&*self.tree.nodes) + size_of_val(&*self.order)
+    }
+
     /// The nearest hit within `(0, length)`: distance and number of the triangle.
     #[inline]
     pub(super) fn closest(&self, ray: &Ray, length: f32) -> Option<(f32, u32)> {
