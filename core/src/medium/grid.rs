@@ -3,7 +3,7 @@
 use glam::{Affine3, Mat3, Vec3};
 
 use super::density::{Cell, Density, cell_count};
-use super::majorant::{self, MinMax, Run, blocks_along};
+use super::majorant::{Entry, Field, MinMax, Walk, blocks_along};
 use super::region::{BoxRegion, LocalLine};
 use super::{MediumError, ball};
 use crate::host::{Face, Gradients, Medium, Properties, Stretch};
@@ -11,32 +11,39 @@ use crate::math::Ray;
 use crate::phase::Phase;
 use crate::spectrum::{Gradient, Hessian, Spectrum};
 
-/// A density with the bounds of its blocks.
-#[derive(Debug, Clone, Copy)]
-struct Field<'a> {
-    density: Density<'a>,
-    blocks: &'a [MinMax],
-    whole: MinMax,
+/// Expected null collisions a joined stretch may add over its blocks by themselves. A collision
+/// costs about as much as asking for another stretch; see `tests/tests/media.rs`, `speed`.
+const WASTE: f32 = 0.3;
+
+/// Majorant thickness of a stretch at which no more is joined: a walk has most likely ended by then.
+const ENOUGH: f32 = 2.0;
+
+/// Bounds of the densities of a grid; those without a field repeat the first.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct FieldBounds {
+    density: MinMax,
+    absorption: MinMax,
+    emission: MinMax,
 }
 
-impl<'a> Field<'a> {
-    fn new(density: Density<'a>, size: [u32; 3], blocks: &'a mut [MinMax]) -> Result<Self, MediumError> {
-        density.check(size)?;
-        if blocks.len() != Grid::block_count(size) {
-            return Err(MediumError::Blocks);
+impl FieldBounds {
+    #[inline]
+    fn union(&self, other: &Self) -> Self {
+        Self {
+            density: self.density.union(other.density),
+            absorption: self.absorption.union(other.absorption),
+            emission: self.emission.union(other.emission),
         }
-        let whole = majorant::fill(blocks, &density, size);
-        Ok(Self { density, blocks, whole })
     }
 
     #[inline]
-    fn bounds(&self, block: Option<usize>) -> MinMax {
-        block.map_or(self.whole, |i| self.blocks.get(i).copied().unwrap_or(self.whole))
+    fn is_constant(&self) -> bool {
+        [self.density, self.absorption, self.emission].iter().all(|b| b.min == b.max)
     }
 
     #[inline]
-    fn is_empty(&self, block: usize) -> bool {
-        self.blocks.get(block).is_some_and(|b| b.max == 0.0)
+    fn is_empty(&self) -> bool {
+        self.density.max == 0.0 && self.absorption.max == 0.0 && self.emission.max == 0.0
     }
 }
 
@@ -84,6 +91,8 @@ pub struct Grid<'a> {
     /// Cells that a metre may span, in the worst direction; largest coordinate of the world's origin.
     reach: (f32, f32),
     resolution: f32,
+    /// Largest channel of extinction (m⁻¹) per unit of density, and of absorption density.
+    thickest: (f32, f32),
     density: Field<'a>,
     absorption_density: Option<Field<'a>>,
     emission_density: Option<Field<'a>>,
@@ -152,6 +161,7 @@ impl<'a> Grid<'a> {
             cells_from_world,
             reach: (row(0).max(row(1)).max(row(2)), cells_from_world.translation.abs().max_element()),
             resolution: edge(0).min(edge(1)).min(edge(2)).max(f32::MIN_POSITIVE),
+            thickest: ((absorption + scattering).max_element(), 0.0),
             density: Field::new(density, size, blocks)?,
             absorption_density: None,
             emission_density: None,
@@ -171,6 +181,7 @@ impl<'a> Grid<'a> {
     /// As in [`Grid::new`].
     pub fn with_absorption_grid(mut self, density: Density<'a>, blocks: &'a mut [MinMax]) -> Result<Self, MediumError> {
         self.absorption_density = Some(Field::new(density, self.size, blocks)?);
+        self.thickest = (self.scattering.max_element(), self.absorption.max_element());
         self.check()
     }
 
@@ -204,7 +215,7 @@ impl<'a> Grid<'a> {
         if !(self.emission.is_valid() && (self.emission * self.emission_field().whole.max).is_finite()) {
             return Err(MediumError::Emission);
         }
-        let bounds = self.bounds(None);
+        let bounds = self.stretch_of(&self.bounds(None), f32::INFINITY);
         if bounds.majorant.is_finite() { Ok(self) } else { Err(MediumError::Coefficients) }
     }
 
@@ -225,11 +236,6 @@ impl<'a> Grid<'a> {
     #[must_use]
     pub fn size(&self) -> [u32; 3] {
         self.size
-    }
-
-    #[inline]
-    fn absorption_field(&self) -> &Field<'a> {
-        self.absorption_density.as_ref().unwrap_or(&self.density)
     }
 
     #[inline]
@@ -256,24 +262,32 @@ impl<'a> Grid<'a> {
         }
     }
 
-    /// Bounds of a block, or of the whole grid, as a stretch without end.
+    /// Bounds of every density in a block, or in the whole grid.
     #[inline]
-    fn bounds(&self, block: Option<usize>) -> Stretch {
+    fn bounds(&self, block: Option<usize>) -> FieldBounds {
         let density = self.density.bounds(block);
-        let (minorant, majorant) = match &self.absorption_density {
-            None => {
-                let extinction = self.absorption + self.scattering;
-                (extinction * density.min, extinction * density.max)
-            }
-            Some(field) => {
-                let other = field.bounds(block);
-                let sum = |s: f32, a: f32| self.scattering * s + self.absorption * a;
-                (sum(density.min, other.min), sum(density.max, other.max))
-            }
+        let of = |field: &Option<Field<'_>>| field.as_ref().map_or(density, |f| f.bounds(block));
+        FieldBounds { density, absorption: of(&self.absorption_density), emission: of(&self.emission_density) }
+    }
+
+    /// Upper bound of extinction (m⁻¹) in any channel.
+    #[inline]
+    fn thickest(&self, bounds: &FieldBounds) -> f32 {
+        self.thickest.0 * bounds.density.max + self.thickest.1 * bounds.absorption.max
+    }
+
+    #[inline]
+    fn stretch_of(&self, bounds: &FieldBounds, until: f32) -> Stretch {
+        let sum = |s: f32, a: f32| match self.absorption_density {
+            // Rounded as in a lookup.
+            None => (self.absorption + self.scattering) * s,
+            Some(_) => self.scattering * s + self.absorption * a,
         };
-        let mut stretch = Stretch { until: f32::INFINITY, minorant, majorant };
+        let minorant = sum(bounds.density.min, bounds.absorption.min);
+        let majorant = sum(bounds.density.max, bounds.absorption.max);
+        let mut stretch = Stretch { until, minorant, majorant };
         if stretch.is_constant() {
-            self.keep_promises(block, &mut stretch);
+            self.keep_promises(bounds, &mut stretch);
         }
         stretch
     }
@@ -281,25 +295,16 @@ impl<'a> Grid<'a> {
     /// Equal bounds promise that everything is constant: not so where only emission, or the two
     /// parts of extinction in a sum that rounding makes constant, vary.
     #[cold]
-    fn keep_promises(&self, block: Option<usize>, stretch: &mut Stretch) {
-        let is_constant = |field: &Field<'_>, coefficient: Spectrum| {
-            let bounds = field.bounds(block);
-            coefficient.is_black() || bounds.min == bounds.max
-        };
-        let emits = !self.emission.is_black() && self.emission_field().bounds(block).max > 0.0;
-        let holds = is_constant(&self.density, self.scattering)
-            && is_constant(self.absorption_field(), self.absorption)
-            && is_constant(self.emission_field(), self.emission)
+    fn keep_promises(&self, bounds: &FieldBounds, stretch: &mut Stretch) {
+        let is_constant = |bounds: MinMax, coefficient: Spectrum| coefficient.is_black() || bounds.min == bounds.max;
+        let emits = !self.emission.is_black() && bounds.emission.max > 0.0;
+        let holds = is_constant(bounds.density, self.scattering)
+            && is_constant(bounds.absorption, self.absorption)
+            && is_constant(bounds.emission, self.emission)
             && !(emits && stretch.majorant.is_black());
         if !holds {
             stretch.majorant = stretch.majorant.map(|c| c.max(f32::MIN_POSITIVE) * (1.0 + 2.0 * f32::EPSILON));
         }
-    }
-
-    #[inline]
-    fn is_empty(&self, block: usize) -> bool {
-        let empty = |field: &Option<Field<'_>>| field.as_ref().is_none_or(|f| f.is_empty(block));
-        self.density.is_empty(block) && empty(&self.absorption_density) && empty(&self.emission_density)
     }
 
     /// From a gradient in cell coordinates to one in the world.
@@ -324,17 +329,53 @@ impl Medium for Grid<'_> {
         }
     }
 
+    /// The empty blocks ahead; or the first that is not, and those behind it as long as one bound
+    /// for all costs less than asking again.
     #[inline]
     fn stretch(&self, ray: &Ray, from: f32) -> Stretch {
         let line = LocalLine::new(&self.cells_from_world, ray);
         let start = self.reach.0 * ray.origin.abs().max_element() + self.reach.1;
-        let run =
-            majorant::walk(&line, self.size, from, ray.length, (self.reach.0, start), |block| self.is_empty(block));
-        match run {
-            Run::Vacuum(until) => Stretch::vacuum(until),
-            Run::Block(block, until) => Stretch { until, ..self.bounds(Some(block)) },
-            Run::Whole(until) => Stretch { until, ..self.bounds(None) },
+        let mut walk = match Walk::new(&line, self.size, from, (self.reach.0, start)) {
+            Entry::Miss => return Stretch::vacuum(f32::INFINITY),
+            Entry::Coarse(near, _) if near > from => return Stretch::vacuum(near),
+            Entry::Coarse(_, far) => return self.stretch_of(&self.bounds(None), far),
+            Entry::Blocks(walk) => walk,
+        };
+        let (mut run, mut until) = loop {
+            let Some(segment) = walk.next() else { return Stretch::vacuum(f32::INFINITY) };
+            let bounds = self.bounds(Some(segment.block));
+            if !bounds.is_empty() {
+                if segment.begin > from {
+                    return Stretch::vacuum(segment.begin);
+                }
+                break (bounds, segment.end);
+            }
+            if segment.end > ray.length {
+                return Stretch::vacuum(segment.end);
+            }
+        };
+        let is_constant = run.is_constant();
+        let mut thickness = self.thickest(&run) * (until - from);
+        while until < ray.length && (is_constant || thickness < ENOUGH) {
+            let Some(segment) = walk.next() else { break };
+            let bounds = self.bounds(Some(segment.block));
+            let joined = run.union(&bounds);
+            if is_constant {
+                if joined != run {
+                    break;
+                }
+            } else {
+                let higher = self.thickest(&joined);
+                thickness += self.thickest(&bounds) * (segment.end - until);
+                let is_wasteful = higher * (segment.end - from) - thickness > WASTE;
+                if is_wasteful || bounds.is_constant() && !bounds.is_empty() {
+                    break;
+                }
+                run = joined;
+            }
+            until = segment.end;
         }
+        self.stretch_of(&run, until)
     }
 
     #[inline]

@@ -3,8 +3,8 @@
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
-use super::Density;
 use super::region::{LocalLine, Slabs};
+use super::{Density, Grid, MediumError};
 
 /// Cells along the edge of a block.
 pub const BLOCK: u32 = 4;
@@ -74,15 +74,28 @@ pub(super) fn fill(blocks: &mut [MinMax], density: &Density<'_>, size: [u32; 3])
     whole
 }
 
-/// A run of blocks along a ray.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Run {
-    /// Nothing up to the distance (m), which may be infinite.
-    Vacuum(f32),
-    /// The block of this index up to the distance (m).
-    Block(usize, f32),
-    /// Positions are too coarse to tell blocks apart: all of the grid up to the distance (m).
-    Whole(f32),
+/// A density with the bounds of its blocks.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Field<'a> {
+    pub(super) density: Density<'a>,
+    blocks: &'a [MinMax],
+    pub(super) whole: MinMax,
+}
+
+impl<'a> Field<'a> {
+    pub(super) fn new(density: Density<'a>, size: [u32; 3], blocks: &'a mut [MinMax]) -> Result<Self, MediumError> {
+        density.check(size)?;
+        if blocks.len() != Grid::block_count(size) {
+            return Err(MediumError::Blocks);
+        }
+        let whole = fill(blocks, &density, size);
+        Ok(Self { density, blocks, whole })
+    }
+
+    #[inline]
+    pub(super) fn bounds(&self, block: Option<usize>) -> MinMax {
+        block.map_or(self.whole, |i| self.blocks.get(i).copied().unwrap_or(self.whole))
+    }
 }
 
 /// Where rounding of positions could reach this many cells, blocks are not told apart: 2¹⁸ cells
@@ -90,90 +103,130 @@ pub(super) enum Run {
 /// cell.
 const FAR: f32 = 262_144.0;
 
-/// Walks from `from` along a line, in cell coordinates `[0, size]`, to the end of the first block
-/// in which something is, or of the empty blocks before it.
-///
-/// `reach` is how many cells a distance of 1 m may span (largest row sum of the map) and the
-/// largest coordinate the line starts from.
-#[inline]
-pub(super) fn walk(
-    line: &LocalLine,
-    size: [u32; 3],
-    from: f32,
-    length: f32,
-    reach: (f32, f32),
-    is_empty: impl Fn(usize) -> bool,
-) -> Run {
-    let slabs: Slabs = line.slabs(Vec3::new(size[0] as f32, size[1] as f32, size[2] as f32));
-    let Some((near, far)) = slabs.interval() else { return Run::Vacuum(f32::INFINITY) };
-    if far <= from {
-        return Run::Vacuum(f32::INFINITY);
-    }
-    let mut t = near.max(from);
-    let is_precise = reach.0 * far + reach.1 <= FAR;
-    if !is_precise {
-        return if t > from { Run::Vacuum(t) } else { Run::Whole(far) };
-    }
-    let blocks = blocks_along(size);
-    let start = line.origin + line.direction * t;
-    const PER_CELL: f32 = 1.0 / BLOCK as f32;
-    // One axis of the walk: block index, its step, the plane where the block ends, the number of
-    // blocks left, and how far the index of the whole grid moves.
-    let axis = |i: usize, stride: usize| {
-        let index = ((start[i] * PER_CELL) as u32).min(blocks[i] - 1);
-        let forward = line.direction[i] > 0.0;
-        let plane = ((index + u32::from(forward)) * BLOCK) as f32;
-        Axis {
-            index: index as usize * stride,
+/// How a line meets a grid.
+#[derive(Debug)]
+pub(super) enum Entry {
+    /// Nothing of it lies ahead.
+    Miss,
+    /// Positions are too coarse to tell blocks apart: all of the grid between two distances (m).
+    Coarse(f32, f32),
+    /// Blocks, one after the other.
+    Blocks(Walk),
+}
+
+/// The part of a line in one block.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Segment {
+    pub(super) block: usize,
+    /// Distances (m) between which it lies there; the second is greater.
+    pub(super) begin: f32,
+    pub(super) end: f32,
+}
+
+/// A walk through the blocks along a line; after Amanatides and Woo 1987, but with every distance
+/// computed from the origin, since a sum of steps would drift.
+#[derive(Debug)]
+pub(super) struct Walk {
+    x: Axis,
+    y: Axis,
+    z: Axis,
+    block: usize,
+    t: f32,
+    far: f32,
+}
+
+#[derive(Debug)]
+struct Axis {
+    stride: usize,
+    step: f32,
+    /// The plane where the block ends, and the distance (m) to it.
+    plane: f32,
+    exit: f32,
+    /// Blocks left beyond it.
+    left: u32,
+    origin: f32,
+    inverse: f32,
+}
+
+impl Axis {
+    #[inline]
+    fn new(origin: f32, direction: f32, inverse: f32, start: f32, stride: usize, blocks: u32) -> (Self, usize) {
+        const EDGE: f32 = BLOCK as f32;
+        let index = ((start * (1.0 / EDGE)) as u32).min(blocks - 1);
+        let forward = direction > 0.0;
+        let plane = (index + u32::from(forward)) as f32 * EDGE;
+        let axis = Self {
             stride: if forward { stride } else { stride.wrapping_neg() },
-            step: if forward { BLOCK as f32 } else { -(BLOCK as f32) },
+            step: if forward { EDGE } else { -EDGE },
             plane,
-            left: if forward { blocks[i] - 1 - index } else { index },
-            exit: (plane - line.origin[i]) * line.inverse[i],
-        }
-    };
-    let mut x = axis(0, 1);
-    let mut y = axis(1, blocks[0] as usize);
-    let mut z = axis(2, blocks[0] as usize * blocks[1] as usize);
-    let mut index = x.index + y.index + z.index;
-    loop {
-        let exit = x.exit.min(y.exit).min(z.exit);
-        // A block that rounding makes shorter than nothing holds no distance to speak of.
-        if exit > t {
-            if !is_empty(index) {
-                return if t > from { Run::Vacuum(t) } else { Run::Block(index, exit.min(far)) };
-            }
-            t = exit;
-            if t >= far {
-                return Run::Vacuum(f32::INFINITY);
-            }
-            if t > length {
-                return Run::Vacuum(t);
-            }
-        }
-        let (axis, i) = if x.exit <= y.exit && x.exit <= z.exit {
-            (&mut x, 0)
-        } else if y.exit <= z.exit {
-            (&mut y, 1)
-        } else {
-            (&mut z, 2)
+            exit: (plane - origin) * inverse,
+            left: if forward { blocks - 1 - index } else { index },
+            origin,
+            inverse,
         };
-        if axis.left == 0 {
-            return Run::Vacuum(f32::INFINITY);
-        }
-        axis.left -= 1;
-        axis.plane += axis.step;
-        // From the origin each time: a sum of steps would drift.
-        axis.exit = (axis.plane - line.origin[i]) * line.inverse[i];
-        index = index.wrapping_add(axis.stride);
+        (axis, index as usize * stride)
+    }
+
+    /// Goes on to the next block; `None` if that lies outside.
+    #[inline(always)]
+    fn advance(&mut self, block: usize) -> Option<usize> {
+        self.left = self.left.checked_sub(1)?;
+        self.plane += self.step;
+        self.exit = (self.plane - self.origin) * self.inverse;
+        Some(block.wrapping_add(self.stride))
     }
 }
 
-struct Axis {
-    index: usize,
-    stride: usize,
-    step: f32,
-    plane: f32,
-    left: u32,
-    exit: f32,
+impl Walk {
+    /// From distance `from` (m) along a line in cell coordinates `[0, size]`.
+    ///
+    /// `reach` is how many cells a metre may span (largest row sum of the map) and the largest
+    /// coordinate, in cells, that the line's origin is computed from.
+    #[inline]
+    pub(super) fn new(line: &LocalLine, size: [u32; 3], from: f32, reach: (f32, f32)) -> Entry {
+        let slabs: Slabs = line.slabs(Vec3::new(size[0] as f32, size[1] as f32, size[2] as f32));
+        let Some((near, far)) = slabs.interval() else { return Entry::Miss };
+        if far <= from {
+            return Entry::Miss;
+        }
+        let t = near.max(from);
+        let is_precise = reach.0 * far + reach.1 <= FAR;
+        if !is_precise {
+            return Entry::Coarse(t, far);
+        }
+        let n = blocks_along(size);
+        let (o, d, inverse) = (line.origin, line.direction, line.inverse);
+        let start = o + d * t;
+        let (x, i) = Axis::new(o.x, d.x, inverse.x, start.x, 1, n[0]);
+        let (y, j) = Axis::new(o.y, d.y, inverse.y, start.y, n[0] as usize, n[1]);
+        let (z, k) = Axis::new(o.z, d.z, inverse.z, start.z, n[0] as usize * n[1] as usize, n[2]);
+        Entry::Blocks(Self { x, y, z, block: i + j + k, t, far })
+    }
+
+    /// The next block in which the line has a length; `None` beyond the last.
+    #[inline(always)]
+    pub(super) fn next(&mut self) -> Option<Segment> {
+        while self.t < self.far {
+            let end = self.x.exit.min(self.y.exit).min(self.z.exit);
+            let block = self.block;
+            let next = if self.x.exit <= self.y.exit && self.x.exit <= self.z.exit {
+                self.x.advance(block)
+            } else if self.y.exit <= self.z.exit {
+                self.y.advance(block)
+            } else {
+                self.z.advance(block)
+            };
+            let (begin, far) = (self.t, self.far);
+            match next {
+                Some(next) => self.block = next,
+                None => self.far = begin,
+            }
+            // Where rounding makes a block shorter than nothing, there is no distance to speak of.
+            if end > begin {
+                self.t = end.min(far);
+                return Some(Segment { block, begin, end: self.t });
+            }
+        }
+        None
+    }
 }
