@@ -3,7 +3,7 @@
 use glam::{Affine3, Mat3, Vec3};
 
 use super::density::{Cell, Density, cell_count};
-use super::majorant::{Entry, Field, MinMax, Walk, blocks_along};
+use super::majorant::{Entry, Field, MinMax, Reach, Walk, blocks_along};
 use super::region::{BoxRegion, LocalLine};
 use super::{MediumError, ball};
 use crate::host::{Face, Gradients, Medium, Properties, Stretch};
@@ -13,7 +13,7 @@ use crate::spectrum::{Gradient, Hessian, Spectrum};
 
 /// Expected null collisions a joined stretch may add over its blocks by themselves. A collision
 /// costs about as much as asking for another stretch; see `tests/tests/media.rs`, `speed`.
-const WASTE: f32 = 0.3;
+const WASTE: f32 = 0.5;
 
 /// Majorant thickness of a stretch at which no more is joined: a walk has most likely ended by then.
 const ENOUGH: f32 = 2.0;
@@ -88,8 +88,7 @@ pub struct Grid<'a> {
     shifted_from_world: Affine3,
     /// From the world to `p·n`.
     cells_from_world: Affine3,
-    /// Cells that a metre may span, in the worst direction; largest coordinate of the world's origin.
-    reach: (f32, f32),
+    reach: Reach,
     resolution: f32,
     /// Largest channel of extinction (m⁻¹) per unit of density, and of absorption density.
     thickest: (f32, f32),
@@ -152,14 +151,13 @@ impl<'a> Grid<'a> {
         if !(cells_from_world.is_finite()) {
             return Err(MediumError::Placement);
         }
-        let row = |i: usize| cells_from_world.matrix3.row(i).abs().element_sum();
         let edges = [local_to_world.matrix3.x_axis, local_to_world.matrix3.y_axis, local_to_world.matrix3.z_axis];
         let edge = |i: usize| edges[i].length() / cells[i];
         let grid = Self {
             size,
             shifted_from_world,
             cells_from_world,
-            reach: (row(0).max(row(1)).max(row(2)), cells_from_world.translation.abs().max_element()),
+            reach: Reach::new(&cells_from_world, edges.iter().map(|e| e.length()).sum()),
             resolution: edge(0).min(edge(1)).min(edge(2)).max(f32::MIN_POSITIVE),
             thickest: ((absorption + scattering).max_element(), 0.0),
             density: Field::new(density, size, blocks)?,
@@ -334,8 +332,8 @@ impl Medium for Grid<'_> {
     #[inline]
     fn stretch(&self, ray: &Ray, from: f32) -> Stretch {
         let line = LocalLine::new(&self.cells_from_world, ray);
-        let start = self.reach.0 * ray.origin.abs().max_element() + self.reach.1;
-        let mut walk = match Walk::new(&line, self.size, from, (self.reach.0, start)) {
+        let origin = ray.origin.abs().max_element();
+        let mut walk = match Walk::new(&line, self.size, from, origin, &self.reach) {
             Entry::Miss => return Stretch::vacuum(f32::INFINITY),
             Entry::Coarse(near, _) if near > from => return Stretch::vacuum(near),
             Entry::Coarse(_, far) => return self.stretch_of(&self.bounds(None), far),

@@ -1,9 +1,9 @@
 //! A coarse grid of bounds, and the walk of a ray through it.
 
 use bytemuck::{Pod, Zeroable};
-use glam::Vec3;
+use glam::{Affine3, Vec3};
 
-use super::region::{LocalLine, Slabs};
+use super::region::{LocalLine, lesser};
 use super::{Density, Grid, MediumError};
 
 /// Cells along the edge of a block.
@@ -132,99 +132,126 @@ pub(super) struct Walk {
     z: Axis,
     block: usize,
     t: f32,
-    far: f32,
+    is_over: bool,
 }
 
 #[derive(Debug)]
 struct Axis {
     stride: usize,
     step: f32,
+    /// Where the grid ends.
+    end: f32,
     /// The plane where the block ends, and the distance (m) to it.
     plane: f32,
     exit: f32,
     /// Blocks left beyond it.
-    left: u32,
+    left: i32,
     origin: f32,
     inverse: f32,
 }
 
 impl Axis {
-    #[inline]
-    fn new(origin: f32, direction: f32, inverse: f32, start: f32, stride: usize, blocks: u32) -> (Self, usize) {
+    #[inline(always)]
+    fn new(line: (f32, f32, f32), start: f32, stride: usize, size: u32) -> (Self, usize) {
         const EDGE: f32 = BLOCK as f32;
+        let (origin, direction, inverse) = line;
+        let blocks = size.div_ceil(BLOCK);
         let index = ((start * (1.0 / EDGE)) as u32).min(blocks - 1);
         let forward = direction > 0.0;
-        let plane = (index + u32::from(forward)) as f32 * EDGE;
+        let end = size as f32;
+        let plane = lesser((index + u32::from(forward)) as f32 * EDGE, end);
         let axis = Self {
             stride: if forward { stride } else { stride.wrapping_neg() },
             step: if forward { EDGE } else { -EDGE },
+            end,
             plane,
             exit: (plane - origin) * inverse,
-            left: if forward { blocks - 1 - index } else { index },
+            left: (if forward { blocks - 1 - index } else { index }) as i32,
             origin,
             inverse,
         };
         (axis, index as usize * stride)
     }
 
-    /// Goes on to the next block; `None` if that lies outside.
+    /// Goes on to the next block if this axis ends the current one at `end` (m). Returns whether it
+    /// did, by how much the index changes, and whether that lies in the grid.
+    ///
+    /// Free of branches: which axis comes next is a guess, and a wrong guess costs more than all
+    /// three axes together.
     #[inline(always)]
-    fn advance(&mut self, block: usize) -> Option<usize> {
-        self.left = self.left.checked_sub(1)?;
-        self.plane += self.step;
+    fn pass(&mut self, end: f32) -> (bool, usize, bool) {
+        let is_next = self.exit == end;
+        self.left -= i32::from(is_next);
+        // The last block may be cut short, and is then left through the grid's end; on the way
+        // back, planes are counted from the start.
+        self.plane = lesser(self.plane + if is_next { self.step } else { 0.0 }, self.end);
         self.exit = (self.plane - self.origin) * self.inverse;
-        Some(block.wrapping_add(self.stride))
+        (is_next, if is_next { self.stride } else { 0 }, self.left >= 0)
+    }
+}
+
+/// The distance of a line's origin from the world's (m, largest component) plus the distance along
+/// it up to which rounding of positions is small beside cells.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Reach(f32);
+
+impl Reach {
+    /// Of a map to cells, for a grid no wider than `diameter` (m).
+    pub(super) fn new(cells_from_world: &Affine3, diameter: f32) -> Self {
+        let row = |i: usize| cells_from_world.matrix3.row(i).abs().element_sum();
+        let per_metre = row(0).max(row(1)).max(row(2));
+        let offset = cells_from_world.translation.abs().max_element();
+        // Cells that a metre may span in the worst direction; positions inside lie a diameter
+        // farther than where the line is asked.
+        Self((FAR - offset) / per_metre - diameter)
     }
 }
 
 impl Walk {
-    /// From distance `from` (m) along a line in cell coordinates `[0, size]`.
-    ///
-    /// `reach` is how many cells a metre may span (largest row sum of the map) and the largest
-    /// coordinate, in cells, that the line's origin is computed from.
+    /// From distance `from` (m) along a line in cell coordinates `[0, size]`, whose origin has the
+    /// largest component `origin` (m) in the world.
     #[inline]
-    pub(super) fn new(line: &LocalLine, size: [u32; 3], from: f32, reach: (f32, f32)) -> Entry {
-        let slabs: Slabs = line.slabs(Vec3::new(size[0] as f32, size[1] as f32, size[2] as f32));
-        let Some((near, far)) = slabs.interval() else { return Entry::Miss };
-        if far <= from {
-            return Entry::Miss;
-        }
-        let t = near.max(from);
-        let is_precise = reach.0 * far + reach.1 <= FAR;
-        if !is_precise {
-            return Entry::Coarse(t, far);
-        }
-        let n = blocks_along(size);
+    pub(super) fn new(line: &LocalLine, size: [u32; 3], from: f32, origin: f32, reach: &Reach) -> Entry {
+        let end = Vec3::new(size[0] as f32, size[1] as f32, size[2] as f32);
         let (o, d, inverse) = (line.origin, line.direction, line.inverse);
-        let start = o + d * t;
-        let (x, i) = Axis::new(o.x, d.x, inverse.x, start.x, 1, n[0]);
-        let (y, j) = Axis::new(o.y, d.y, inverse.y, start.y, n[0] as usize, n[1]);
-        let (z, k) = Axis::new(o.z, d.z, inverse.z, start.z, n[0] as usize * n[1] as usize, n[2]);
-        Entry::Blocks(Self { x, y, z, block: i + j + k, t, far })
+        let mut t = from;
+        let mut start = o + d * t;
+        let is_inside = start.cmpge(Vec3::ZERO).all() && start.cmple(end).all();
+        let is_precise = origin + t <= reach.0;
+        if !(is_inside && is_precise) {
+            let Some((near, far)) = line.slabs(end).interval() else { return Entry::Miss };
+            if far <= from {
+                return Entry::Miss;
+            }
+            t = near.max(from);
+            let is_precise = origin + t <= reach.0;
+            if !is_precise {
+                return Entry::Coarse(t, far);
+            }
+            start = o + d * t;
+        }
+        let (nx, ny) = (size[0].div_ceil(BLOCK) as usize, size[1].div_ceil(BLOCK) as usize);
+        let (x, i) = Axis::new((o.x, d.x, inverse.x), start.x, 1, size[0]);
+        let (y, j) = Axis::new((o.y, d.y, inverse.y), start.y, nx, size[1]);
+        let (z, k) = Axis::new((o.z, d.z, inverse.z), start.z, nx * ny, size[2]);
+        Entry::Blocks(Self { x, y, z, block: i + j + k, t, is_over: false })
     }
 
     /// The next block in which the line has a length; `None` beyond the last.
     #[inline(always)]
     pub(super) fn next(&mut self) -> Option<Segment> {
-        while self.t < self.far {
-            let end = self.x.exit.min(self.y.exit).min(self.z.exit);
+        while !self.is_over {
+            let end = lesser(lesser(self.x.exit, self.y.exit), self.z.exit);
             let block = self.block;
-            let next = if self.x.exit <= self.y.exit && self.x.exit <= self.z.exit {
-                self.x.advance(block)
-            } else if self.y.exit <= self.z.exit {
-                self.y.advance(block)
-            } else {
-                self.z.advance(block)
-            };
-            let (begin, far) = (self.t, self.far);
-            match next {
-                Some(next) => self.block = next,
-                None => self.far = begin,
-            }
+            let (x, y, z) = (self.x.pass(end), self.y.pass(end), self.z.pass(end));
+            self.block = block.wrapping_add(x.1).wrapping_add(y.1).wrapping_add(z.1);
+            // On an edge two axes pass at once; none does only if distances are no numbers.
+            self.is_over = !((x.0 | y.0 | z.0) & x.2 & y.2 & z.2);
+            let begin = self.t;
             // Where rounding makes a block shorter than nothing, there is no distance to speak of.
             if end > begin {
-                self.t = end.min(far);
-                return Some(Segment { block, begin, end: self.t });
+                self.t = end;
+                return Some(Segment { block, begin, end });
             }
         }
         None

@@ -60,25 +60,28 @@ pub(super) fn value(p: Vec3, seed: u32) -> f32 {
     lerp(lerp(row(0, 0), row(1, 0), v), lerp(row(0, 1), row(1, 1), v), w)
 }
 
-/// One of the twelve directions towards the edges of a cube.
+/// The twelve directions towards the edges of a cube.
+const EDGES: [Vec3; 12] = [
+    Vec3::new(1.0, 1.0, 0.0),
+    Vec3::new(-1.0, 1.0, 0.0),
+    Vec3::new(1.0, -1.0, 0.0),
+    Vec3::new(-1.0, -1.0, 0.0),
+    Vec3::new(1.0, 0.0, 1.0),
+    Vec3::new(-1.0, 0.0, 1.0),
+    Vec3::new(1.0, 0.0, -1.0),
+    Vec3::new(-1.0, 0.0, -1.0),
+    Vec3::new(0.0, 1.0, 1.0),
+    Vec3::new(0.0, -1.0, 1.0),
+    Vec3::new(0.0, 1.0, -1.0),
+    Vec3::new(0.0, -1.0, -1.0),
+];
+
+/// One of [`EDGES`]. A table, because a branch would be mispredicted two times in three.
 #[inline]
 fn edge(hash: u32) -> Vec3 {
     // The upper bits times twelve: an even choice without a division.
-    let choice = ((u64::from(hash) * 12) >> 32) as u32;
-    let (a, b) = (if choice & 1 == 0 { 1.0 } else { -1.0 }, if choice & 2 == 0 { 1.0 } else { -1.0 });
-    // A table of branches would be mispredicted two times in three.
-    let axis = choice >> 2;
-    Vec3::new(
-        if axis == 2 { 0.0 } else { a },
-        if axis == 1 {
-            0.0
-        } else if axis == 2 {
-            a
-        } else {
-            b
-        },
-        if axis == 0 { 0.0 } else { b },
-    )
+    let choice = (u64::from(hash) * 12) >> 32;
+    EDGES.get(choice as usize).copied().unwrap_or(Vec3::ZERO)
 }
 
 /// A hash of a lattice point in which every bit counts.

@@ -244,21 +244,36 @@ impl LocalLine {
     #[inline]
     pub(super) fn slabs(&self, size: Vec3) -> Slabs {
         let (a, b) = (-self.origin * self.inverse, (size - self.origin) * self.inverse);
-        Slabs { near: a.min(b), far: a.max(b) }
+        let near = Vec3::new(lesser(a.x, b.x), lesser(a.y, b.y), lesser(a.z, b.z));
+        let far = Vec3::new(greater(a.x, b.x), greater(a.y, b.y), greater(a.z, b.z));
+        Slabs { near, far }
     }
+}
+
+/// The lesser number; one instruction, unlike `f32::min`, which promises an answer beside NaN.
+#[inline(always)]
+pub(super) fn lesser(a: f32, b: f32) -> f32 {
+    if a < b { a } else { b }
+}
+
+/// The greater number.
+#[inline(always)]
+fn greater(a: f32, b: f32) -> f32 {
+    if a > b { a } else { b }
 }
 
 /// Distances at which a line crosses three pairs of parallel planes.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Slabs {
-    pub(super) near: Vec3,
-    pub(super) far: Vec3,
+    near: Vec3,
+    far: Vec3,
 }
 
 impl Slabs {
     #[inline]
     pub(super) fn interval(&self) -> Option<(f32, f32)> {
-        let (near, far) = (self.near.max_element(), self.far.min_element());
+        let near = greater(greater(self.near.x, self.near.y), self.near.z);
+        let far = lesser(lesser(self.far.x, self.far.y), self.far.z);
         (near < far).then_some((near, far))
     }
 }
