@@ -790,7 +790,9 @@ proptest! {
     }
 }
 
-/// `cargo test --release -p fogbow-tests --test media -- --ignored --nocapture speed`
+/// Prints times: `cargo test -p fogbow-tests --test media -- --ignored --nocapture speed`. A file
+/// that ends in 64³ floats, such as a Mitsuba volume, takes the place of the cloud if the variable
+/// `FOGBOW_VOLUME` names it.
 #[test]
 #[ignore = "prints times"]
 fn speed() {
@@ -802,11 +804,10 @@ fn speed() {
     let placement = Affine3 { matrix3: Mat3::from_diagonal(Vec3::splat(2.0)), translation: Vec3::splat(-1.0) };
     let mut voxels = Voxels::new(size, placement, |i| 3.5 * cloud(local(i)));
     if let Some(path) = std::env::var_os("FOGBOW_VOLUME") {
-        // 64³ floats at the end of a file.
         let bytes = std::fs::read(path).unwrap();
         let floats = bytes[bytes.len() - voxels.values.len() * 4..].chunks_exact(4);
         let float = |b: &[u8]| f32::from_le_bytes([b[0], b[1], b[2], b[3]]);
-        voxels.values = floats.map(|b| 35.0 * float(b)).collect();
+        voxels.values = floats.map(|b| 3.5 * float(b)).collect();
     }
     let started = Instant::now();
     let grid = voxels.grid();

@@ -3,49 +3,13 @@
 use glam::{Affine3, Mat3, Vec3};
 
 use super::density::{Cell, Density, cell_count};
-use super::majorant::{Entry, Field, MinMax, Reach, Walk, blocks_along};
-use super::region::{BoxRegion, LocalLine};
+use super::majorant::{Field, MinMax, Reach, blocks_along};
+use super::region::BoxRegion;
 use super::{MediumError, ball};
 use crate::host::{Face, Gradients, Medium, Properties, Stretch};
 use crate::math::Ray;
 use crate::phase::Phase;
 use crate::spectrum::{Gradient, Hessian, Spectrum};
-
-/// Expected null collisions a joined stretch may add over its blocks by themselves. A collision
-/// costs about as much as asking for another stretch; see `tests/tests/media.rs`, `speed`.
-const WASTE: f32 = 0.5;
-
-/// Majorant thickness of a stretch at which no more is joined: a walk has most likely ended by then.
-const ENOUGH: f32 = 2.0;
-
-/// Bounds of the densities of a grid; those without a field repeat the first.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct FieldBounds {
-    density: MinMax,
-    absorption: MinMax,
-    emission: MinMax,
-}
-
-impl FieldBounds {
-    #[inline]
-    fn union(&self, other: &Self) -> Self {
-        Self {
-            density: self.density.union(other.density),
-            absorption: self.absorption.union(other.absorption),
-            emission: self.emission.union(other.emission),
-        }
-    }
-
-    #[inline]
-    fn is_constant(&self) -> bool {
-        [self.density, self.absorption, self.emission].iter().all(|b| b.min == b.max)
-    }
-
-    #[inline]
-    fn is_empty(&self) -> bool {
-        self.density.max == 0.0 && self.absorption.max == 0.0 && self.emission.max == 0.0
-    }
-}
 
 /// A voxel grid: densities in lent memory, trilinear between cell centres, placed anywhere.
 ///
@@ -83,23 +47,23 @@ impl FieldBounds {
 /// ```
 #[derive(Debug, Clone, Copy)]
 pub struct Grid<'a> {
-    size: [u32; 3],
+    pub(super) size: [u32; 3],
     /// From the world to `p·n + 1/2`.
-    shifted_from_world: Affine3,
+    pub(super) shifted_from_world: Affine3,
     /// From the world to `p·n`.
-    cells_from_world: Affine3,
-    reach: Reach,
-    resolution: f32,
+    pub(super) cells_from_world: Affine3,
+    pub(super) reach: Reach,
+    pub(super) resolution: f32,
     /// Largest channel of extinction (m⁻¹) per unit of density, and of absorption density.
-    thickest: (f32, f32),
-    density: Field<'a>,
-    absorption_density: Option<Field<'a>>,
-    emission_density: Option<Field<'a>>,
-    scattering: Spectrum,
-    absorption: Spectrum,
-    emission: Spectrum,
-    phase: Phase,
-    region: BoxRegion,
+    pub(super) thickest: (f32, f32),
+    pub(super) density: Field<'a>,
+    pub(super) absorption_density: Option<Field<'a>>,
+    pub(super) emission_density: Option<Field<'a>>,
+    pub(super) scattering: Spectrum,
+    pub(super) absorption: Spectrum,
+    pub(super) emission: Spectrum,
+    pub(super) phase: Phase,
+    pub(super) region: BoxRegion,
 }
 
 impl<'a> Grid<'a> {
@@ -148,7 +112,7 @@ impl<'a> Grid<'a> {
         let cells_from_world = Affine3 { matrix3: scale * local.matrix3, translation: scale * local.translation };
         let shifted_from_world =
             Affine3 { translation: cells_from_world.translation + Vec3::splat(0.5), ..cells_from_world };
-        if !(cells_from_world.is_finite()) {
+        if !cells_from_world.is_finite() {
             return Err(MediumError::Placement);
         }
         let edges = [local_to_world.matrix3.x_axis, local_to_world.matrix3.y_axis, local_to_world.matrix3.z_axis];
@@ -260,51 +224,6 @@ impl<'a> Grid<'a> {
         }
     }
 
-    /// Bounds of every density in a block, or in the whole grid.
-    #[inline]
-    fn bounds(&self, block: Option<usize>) -> FieldBounds {
-        let density = self.density.bounds(block);
-        let of = |field: &Option<Field<'_>>| field.as_ref().map_or(density, |f| f.bounds(block));
-        FieldBounds { density, absorption: of(&self.absorption_density), emission: of(&self.emission_density) }
-    }
-
-    /// Upper bound of extinction (m⁻¹) in any channel.
-    #[inline]
-    fn thickest(&self, bounds: &FieldBounds) -> f32 {
-        self.thickest.0 * bounds.density.max + self.thickest.1 * bounds.absorption.max
-    }
-
-    #[inline]
-    fn stretch_of(&self, bounds: &FieldBounds, until: f32) -> Stretch {
-        let sum = |s: f32, a: f32| match self.absorption_density {
-            // Rounded as in a lookup.
-            None => (self.absorption + self.scattering) * s,
-            Some(_) => self.scattering * s + self.absorption * a,
-        };
-        let minorant = sum(bounds.density.min, bounds.absorption.min);
-        let majorant = sum(bounds.density.max, bounds.absorption.max);
-        let mut stretch = Stretch { until, minorant, majorant };
-        if stretch.is_constant() {
-            self.keep_promises(bounds, &mut stretch);
-        }
-        stretch
-    }
-
-    /// Equal bounds promise that everything is constant: not so where only emission, or the two
-    /// parts of extinction in a sum that rounding makes constant, vary.
-    #[cold]
-    fn keep_promises(&self, bounds: &FieldBounds, stretch: &mut Stretch) {
-        let is_constant = |bounds: MinMax, coefficient: Spectrum| coefficient.is_black() || bounds.min == bounds.max;
-        let emits = !self.emission.is_black() && bounds.emission.max > 0.0;
-        let holds = is_constant(bounds.density, self.scattering)
-            && is_constant(bounds.absorption, self.absorption)
-            && is_constant(bounds.emission, self.emission)
-            && !(emits && stretch.majorant.is_black());
-        if !holds {
-            stretch.majorant = stretch.majorant.map(|c| c.max(f32::MIN_POSITIVE) * (1.0 + 2.0 * f32::EPSILON));
-        }
-    }
-
     /// From a gradient in cell coordinates to one in the world.
     #[inline]
     fn gradient_to_world(&self, gradient: Vec3) -> Vec3 {
@@ -331,49 +250,7 @@ impl Medium for Grid<'_> {
     /// for all costs less than asking again.
     #[inline]
     fn stretch(&self, ray: &Ray, from: f32) -> Stretch {
-        let line = LocalLine::new(&self.cells_from_world, ray);
-        let origin = ray.origin.abs().max_element();
-        let mut walk = match Walk::new(&line, self.size, from, origin, &self.reach) {
-            Entry::Miss => return Stretch::vacuum(f32::INFINITY),
-            Entry::Coarse(near, _) if near > from => return Stretch::vacuum(near),
-            Entry::Coarse(_, far) => return self.stretch_of(&self.bounds(None), far),
-            Entry::Blocks(walk) => walk,
-        };
-        let (mut run, mut until) = loop {
-            let Some(segment) = walk.next() else { return Stretch::vacuum(f32::INFINITY) };
-            let bounds = self.bounds(Some(segment.block));
-            if !bounds.is_empty() {
-                if segment.begin > from {
-                    return Stretch::vacuum(segment.begin);
-                }
-                break (bounds, segment.end);
-            }
-            if segment.end > ray.length {
-                return Stretch::vacuum(segment.end);
-            }
-        };
-        let is_constant = run.is_constant();
-        let mut thickness = self.thickest(&run) * (until - from);
-        while until < ray.length && (is_constant || thickness < ENOUGH) {
-            let Some(segment) = walk.next() else { break };
-            let bounds = self.bounds(Some(segment.block));
-            let joined = run.union(&bounds);
-            if is_constant {
-                if joined != run {
-                    break;
-                }
-            } else {
-                let higher = self.thickest(&joined);
-                thickness += self.thickest(&bounds) * (segment.end - until);
-                let is_wasteful = higher * (segment.end - from) - thickness > WASTE;
-                if is_wasteful || bounds.is_constant() && !bounds.is_empty() {
-                    break;
-                }
-                run = joined;
-            }
-            until = segment.end;
-        }
-        self.stretch_of(&run, until)
+        self.joined_stretch(ray, from)
     }
 
     #[inline]

@@ -7,6 +7,10 @@ use super::region::{LocalLine, lesser};
 use super::{Density, Grid, MediumError};
 
 /// Cells along the edge of a block.
+///
+/// Measured on a plume of 64³ cells with joined stretches: against 8, blocks of 4 cost some 5 %
+/// more in thin smoke (a ray's majorant thickness around 8) and save 30 % of a free flight where
+/// it is ten times as thick, for fewer null collisions.
 pub const BLOCK: u32 = 4;
 
 /// Bounds of density in a block of [`BLOCK`]³ cells.
@@ -175,18 +179,17 @@ impl Axis {
 
     /// Goes on to the next block if this axis ends the current one at `end` (m). Returns whether it
     /// did, by how much the index changes, and whether that lies in the grid.
-    ///
-    /// Free of branches: which axis comes next is a guess, and a wrong guess costs more than all
-    /// three axes together.
     #[inline(always)]
     fn pass(&mut self, end: f32) -> (bool, usize, bool) {
-        let is_next = self.exit == end;
-        self.left -= i32::from(is_next);
+        if self.exit != end {
+            return (false, 0, true);
+        }
+        self.left -= 1;
         // The last block may be cut short, and is then left through the grid's end; on the way
         // back, planes are counted from the start.
-        self.plane = lesser(self.plane + if is_next { self.step } else { 0.0 }, self.end);
+        self.plane = lesser(self.plane + self.step, self.end);
         self.exit = (self.plane - self.origin) * self.inverse;
-        (is_next, if is_next { self.stride } else { 0 }, self.left >= 0)
+        (true, self.stride, self.left >= 0)
     }
 }
 
@@ -211,7 +214,7 @@ impl Walk {
     /// From distance `from` (m) along a line in cell coordinates `[0, size]`, whose origin has the
     /// largest component `origin` (m) in the world.
     #[inline]
-    pub(super) fn new(line: &LocalLine, size: [u32; 3], from: f32, origin: f32, reach: &Reach) -> Entry {
+    pub(super) fn enter(line: &LocalLine, size: [u32; 3], from: f32, origin: f32, reach: &Reach) -> Entry {
         let end = Vec3::new(size[0] as f32, size[1] as f32, size[2] as f32);
         let (o, d, inverse) = (line.origin, line.direction, line.inverse);
         let mut t = from;
