@@ -6,25 +6,32 @@ use fogbow::spectrum::{Gradient, Spectrum};
 use crate::tolerance;
 
 /// Gradient of `f` at `x` by central differences over `h`, `h/2` and `h/4`, extrapolated (Richardson)
-/// to an error of order `h⁴`. `None` where the extrapolations from the first and the last two
-/// disagree by more than half of [`tolerance::GRADIENT`], in units of `‖∇f‖ + |f|/size`: within reach
-/// of an edge, where there is no gradient.
+/// to an error of order `h⁴`.
+///
+/// `None` within reach of an edge, where there is no gradient. An edge shows in two ways, measured
+/// in units of `‖∇f‖ + |f|/size` against half of [`tolerance::GRADIENT`]: the extrapolations from the
+/// first and the last two steps disagree; or the second differences over `h` do not shrink with `h`.
 pub fn differences(f: impl Fn(Vec3) -> Spectrum, x: Vec3, size: f32) -> Option<Gradient> {
+    let centre = f(x);
     let central = |h: f32| {
         let along = |axis: Vec3| {
             // The steps that rounding leaves of ±h.
             let (a, b) = (x + axis * h, x - axis * h);
-            (f(a) - f(b)) / (a - b).dot(axis)
+            let (above, below) = (f(a), f(b));
+            ((above - below) / (a - b).dot(axis), (above + below - centre * 2.0) / h)
         };
-        Gradient { x: along(Vec3::X), y: along(Vec3::Y), z: along(Vec3::Z) }
+        let [x, y, z] = [Vec3::X, Vec3::Y, Vec3::Z].map(along);
+        (Gradient { x: x.0, y: y.0, z: z.0 }, Gradient { x: x.1, y: y.1, z: z.1 })
     };
     let h = 0.02 * size;
     let [coarse, middle, fine] = [h, 0.5 * h, 0.25 * h].map(central);
     let extrapolated = |a: Gradient, b: Gradient| (b * 4.0 - a) * (1.0 / 3.0);
-    let (far, near) = (extrapolated(coarse, middle), extrapolated(middle, fine));
-    let scale = f(x).map(f32::abs) / size + far.norm();
+    let (far, near) = (extrapolated(coarse.0, middle.0), extrapolated(middle.0, fine.0));
+    let scale = centre.map(f32::abs) / size + far.norm();
     let apart = (far - near).norm();
-    (0..3).all(|c| apart[c] <= 0.5 * tolerance::GRADIENT * scale[c]).then_some(far)
+    let bend = (middle.1 * 2.0 - coarse.1).norm().max((fine.1 * 2.0 - middle.1).norm());
+    let smooth = |c: usize| apart[c].max(bend[c]) <= 0.5 * tolerance::GRADIENT * scale[c];
+    (0..3).all(smooth).then_some(far)
 }
 
 /// What is wrong with an analytic gradient, measured against [`differences`] in units of

@@ -129,7 +129,7 @@ pub fn sphere(
     const RINGS: usize = 24;
     const SECTORS: usize = 12;
     // Sub-cells per bin and direction: a discontinuity across a bin then costs little.
-    const FINE: usize = 24;
+    const FINE: usize = 48;
     let frame = fogbow::math::Frame::around(axis);
     let border = |t: f64| 2.0 * (1.0 - t).powf(power);
     let mut rng = Generator::new(0x5eed ^ name.len() as u64);
