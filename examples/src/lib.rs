@@ -1,1 +1,23 @@
-//! The program's parts.
+//! The parts of the `fogbow` program: scene files in, pictures out.
+//!
+//! | module | holds |
+//! |---|---|
+//! | [`scene_file`] | reads Mitsuba 3 scenes into a checked description |
+//! | [`mesh`], [`volume`], [`picture`] | the files scenes name |
+//! | [`world`] | the host: surfaces, lights and media, ready for rays |
+//! | [`camera`] | the pinhole camera |
+//! | [`compare`] | how far two images are apart |
+//! | [`cli`] | the command line |
+
+extern crate alloc;
+
+pub mod camera;
+pub mod cli;
+pub mod compare;
+pub mod error;
+pub mod mesh;
+pub mod picture;
+pub mod scene_file;
+pub mod transform;
+pub mod volume;
+pub mod world;

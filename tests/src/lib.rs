@@ -13,3 +13,9 @@ pub mod chi_square;
 pub mod golden;
 pub mod hosts;
 pub mod tolerance;
+
+/// The README's examples, run as tests.
+#[cfg(doctest)]
+#[doc = include_str!("../../README.md")]
+#[derive(Debug)]
+pub struct Readme;

@@ -1,0 +1,61 @@
+//! The command line.
+//!
+//! Exit codes: 0 done, 1 stopped early, 2 bad input.
+
+mod compare;
+mod output;
+mod render;
+mod report;
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+pub use compare::CompareArguments;
+pub use render::{Method, RenderArguments};
+
+/// Light in fog, smoke and clouds.
+#[derive(Debug, Parser)]
+#[command(name = "fogbow", version, about, arg_required_else_help = true)]
+pub struct Arguments {
+    /// What to do.
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+/// What to do.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Renders a Mitsuba 3 scene.
+    Render(RenderArguments),
+    /// Says how far an image is from a reference.
+    Compare(CompareArguments),
+}
+
+/// How a command ended well enough to leave a result.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Ending {
+    /// Everything asked for was done.
+    Done,
+    /// Stopped early; the result so far is there.
+    Stopped,
+}
+
+/// Runs a command; what is wrong goes to standard error.
+pub fn run(arguments: Arguments) -> ExitCode {
+    let result = match arguments.command {
+        Command::Render(arguments) => render::run(&arguments),
+        Command::Compare(arguments) => compare::run(&arguments),
+    };
+    match result {
+        Ok(Ending::Done) => ExitCode::SUCCESS,
+        Ok(Ending::Stopped) => ExitCode::from(1),
+        Err(error) => {
+            eprintln!("fogbow: {error}");
+            ExitCode::from(2)
+        }
+    }
+}
+
+/// Any error, to be shown.
+type Failure = Box<dyn core::error::Error>;

@@ -1,0 +1,50 @@
+//! Checks made before a long render, so that its result is not lost.
+
+use std::fs::OpenOptions;
+use std::path::Path;
+
+use fogbow_std::image::is_writable;
+
+/// # Errors
+/// A file whose kind is not known, or that cannot be written.
+pub(super) fn check(file: &Path) -> Result<(), String> {
+    if !is_writable(file) {
+        return Err(format!("{}: the extension is none of png, pfm, exr", file.display()));
+    }
+    check_place(file)
+}
+
+/// # Errors
+/// A file that cannot be written. Nothing is left behind, and nothing overwritten.
+pub(super) fn check_place(file: &Path) -> Result<(), String> {
+    let is_new = !file.exists();
+    OpenOptions::new()
+        .append(true)
+        .create(true)
+        .open(file)
+        .map_err(|e| format!("{}: cannot be written: {e}", file.display()))?;
+    if is_new {
+        std::fs::remove_file(file).map_err(|e| format!("{}: {e}", file.display()))?;
+    }
+    Ok(())
+}
+
+/// A number above 0.
+pub(super) fn positive(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if value > 0.0 && value.is_finite() => Ok(value),
+        _ => Err("must be a number greater than 0".to_owned()),
+    }
+}
+
+/// `WIDTHxHEIGHT`.
+pub(super) fn size(text: &str) -> Result<(u32, u32), String> {
+    let parsed = text.split_once('x').and_then(|(w, h)| Some((w.parse::<u32>().ok()?, h.parse::<u32>().ok()?)));
+    match parsed {
+        Some((w @ 1..=65_536, h @ 1..=65_536)) if u64::from(w) * u64::from(h) <= crate::scene_file::MAX_PIXELS => {
+            Ok((w, h))
+        }
+        Some(_) => Err(format!("sides must lie in [1, 65536], with at most {} pixels", crate::scene_file::MAX_PIXELS)),
+        None => Err("must look like 640x480".to_owned()),
+    }
+}

@@ -1,0 +1,222 @@
+//! `fogbow render`.
+
+use core::sync::atomic::{AtomicBool, Ordering};
+use core::time::Duration;
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+use fogbow::host::Medium;
+use fogbow::light::Light;
+use fogbow::math::Vec2;
+use fogbow::path::{self, World as PathWorld};
+use fogbow::sampling::uniform2;
+use fogbow_std::film::Film;
+use fogbow_std::image::write_film;
+use fogbow_std::progress::{Control, Progress};
+use fogbow_std::stats::{CountingMedium, CountingScene, Statistics};
+use fogbow_std::tiles::{self, Outcome, Reason, RenderError};
+
+use super::report::{Bar, Report};
+use super::{Ending, Failure, output};
+use crate::camera::Camera;
+use crate::scene_file::SceneFile;
+use crate::world::{Storage, WithMedium, World};
+
+/// Renders a Mitsuba 3 scene.
+#[derive(Debug, Args)]
+pub struct RenderArguments {
+    /// The scene file.
+    pub scene: PathBuf,
+    /// How light is computed.
+    #[arg(long, value_enum, default_value_t = Method::Path)]
+    pub method: Method,
+    /// Samples per pixel [default: what the scene says; with --time, as many as fit].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    pub spp: Option<u32>,
+    /// Seconds to render for, on the wall clock.
+    #[arg(long, value_name = "SECONDS", value_parser = output::positive)]
+    pub time: Option<f64>,
+    /// Longest path, as Mitsuba counts: 1 is lights only, 2 adds one scattering [default: what the scene says].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    pub max_depth: Option<u32>,
+    /// Threads; 0 is one per processor.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub threads: usize,
+    /// Chooses other random numbers.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub seed: u64,
+    /// Size of the image [default: what the scene says].
+    #[arg(long, value_name = "WxH", value_parser = output::size)]
+    pub size: Option<(u32, u32)>,
+    /// Image to write: .png, .exr or .pfm; may be repeated [default: SCENE.png and SCENE.exr in this folder].
+    #[arg(short, long, value_name = "FILE")]
+    pub output: Vec<PathBuf>,
+    /// Stops by which PNG images are brightened.
+    #[arg(long, value_name = "STOPS", default_value_t = 0.0, allow_negative_numbers = true)]
+    pub exposure: f32,
+    /// Also writes the components of light, as layers of .exr files.
+    #[arg(long)]
+    pub aov: bool,
+    /// Writes times and counts.
+    #[arg(long, value_name = "FILE.json")]
+    pub stats: Option<PathBuf>,
+    /// No progress bar and no summary.
+    #[arg(short, long)]
+    pub quiet: bool,
+}
+
+/// How light is computed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Method {
+    /// Volumetric path tracing: unbiased.
+    Path,
+}
+
+/// Names of the layers; the first is the image.
+const LAYERS: [&str; 6] =
+    ["total", "emitted", "surface_direct", "surface_indirect", "medium_single", "medium_multiple"];
+
+/// Set by Ctrl-C.
+static STOP: AtomicBool = AtomicBool::new(false);
+
+pub(super) fn run(arguments: &RenderArguments) -> Result<Ending, Failure> {
+    let outputs = outputs(arguments)?;
+    let mut statistics = Statistics::default();
+    let scene = statistics.time("read", || SceneFile::read(&arguments.scene))?;
+    let mut storage = Storage::new(&scene);
+    let world = statistics.time("build", || World::new(&scene, &mut storage))?;
+    let (width, height) = arguments.size.unwrap_or((scene.sensor.width, scene.sensor.height));
+    let layers: &[&str] = if arguments.aov { &LAYERS } else { &["total"] };
+    let mut film = Film::new(width, height, layers)?;
+    statistics.bytes.push(("film".to_owned(), film.bytes() as u64));
+    statistics.bytes.push(("volumes".to_owned(), scene.media.iter().map(|m| m.bytes() as u64).sum()));
+    statistics.bytes.push(("world".to_owned(), world.bytes() as u64));
+
+    // A handler can be set once per process; without one, Ctrl-C still ends the program.
+    drop(ctrlc::set_handler(|| {
+        if STOP.swap(true, Ordering::Relaxed) {
+            std::process::exit(130);
+        }
+    }));
+    let bar = Bar::new(arguments.quiet);
+    let progress = |progress: &Progress| bar.show(progress, u64::from(width) * u64::from(height));
+    let control = Control { cancel: Some(&STOP), progress: Some(&progress) };
+    let samples = match (arguments.spp, arguments.time) {
+        (Some(spp), _) => spp,
+        (None, Some(_)) => u32::MAX,
+        (None, None) => scene.sensor.samples,
+    };
+    let settings = tiles::Settings {
+        samples,
+        time: arguments.time.map(Duration::try_from_secs_f64).transpose()?,
+        threads: arguments.threads,
+        seed: arguments.seed,
+        ..tiles::Settings::default()
+    };
+    let lights = world.lights();
+    let job = Job {
+        world: &world,
+        lights: &lights,
+        camera: world.camera_for(width, height),
+        paths: path_settings(&scene, arguments.max_depth),
+        film: &mut film,
+        settings: &settings,
+        control: &control,
+    };
+    let outcome = world.media().with(job);
+    bar.finish();
+    let outcome = outcome?;
+    statistics.add("render", outcome.seconds);
+    statistics.counters = outcome.counters;
+    statistics.time("write", || outputs.iter().try_for_each(|file| write_film(file, &film, arguments.exposure)))?;
+
+    let report =
+        Report { arguments, outputs: &outputs, outcome: &outcome, statistics: &statistics, size: (width, height) };
+    if let Some(file) = &arguments.stats {
+        std::fs::write(file, report.json()).map_err(|e| format!("{}: cannot be written: {e}", file.display()))?;
+    }
+    if !arguments.quiet {
+        report.print();
+    }
+    Ok(if outcome.reason == Reason::Cancelled { Ending::Stopped } else { Ending::Done })
+}
+
+/// The files to write, all of them checked.
+fn outputs(arguments: &RenderArguments) -> Result<Vec<PathBuf>, Failure> {
+    let mut outputs = arguments.output.clone();
+    if outputs.is_empty() {
+        let stem = arguments.scene.file_stem().ok_or("the scene has no name")?;
+        outputs = ["png", "exr"]
+            .map(|extension| {
+                let mut name = stem.to_owned();
+                name.push(".");
+                name.push(extension);
+                PathBuf::from(name)
+            })
+            .into();
+    }
+    outputs.iter().try_for_each(|file| output::check(file))?;
+    if arguments.aov && !outputs.iter().any(|f| f.extension().is_some_and(|e| e.eq_ignore_ascii_case("exr"))) {
+        return Err("--aov needs an .exr file to write to (-o FILE.exr)".into());
+    }
+    if let Some(file) = &arguments.stats {
+        output::check_place(file)?;
+    }
+    if !arguments.exposure.is_finite() {
+        return Err("--exposure must be a finite number".into());
+    }
+    Ok(outputs)
+}
+
+/// Mitsuba counts the segments of a path, the path tracer its scatterings.
+fn path_settings(scene: &SceneFile, max_depth: Option<u32>) -> path::Settings {
+    let depth = max_depth.or(scene.integrator.max_depth);
+    path::Settings {
+        max_scatterings: depth.map_or(u32::MAX, |d| d.saturating_sub(1)),
+        roulette_after: scene.integrator.rr_depth,
+        lights_visible: !scene.integrator.hide_emitters,
+    }
+}
+
+/// A render, to be done with a medium of any type.
+struct Job<'a> {
+    world: &'a World<'a>,
+    lights: &'a [Light<'a>],
+    camera: Camera,
+    paths: path::Settings,
+    film: &'a mut Film,
+    settings: &'a tiles::Settings,
+    control: &'a Control<'a>,
+}
+
+impl WithMedium for Job<'_> {
+    type Output = Result<Outcome, RenderError>;
+
+    fn with<M: Medium + Sync>(self, medium: &M) -> Self::Output {
+        let (width, height) = (self.film.width() as f32, self.film.height() as f32);
+        let has_layers = self.film.layers().len() > 1;
+        tiles::render(self.film, self.settings, self.control, |sample, rng, layers| {
+            let world = PathWorld {
+                medium: &CountingMedium { medium, tally: sample.tally },
+                scene: &CountingScene { scene: self.world, tally: sample.tally },
+                lights: self.lights,
+            };
+            let jitter = uniform2(rng);
+            let film = Vec2::new((sample.x as f32 + jitter.x) / width, (sample.y as f32 + jitter.y) / height);
+            let seen = path::radiance(&self.camera.ray(film), &world, &self.paths, rng);
+            if has_layers {
+                let parts = [
+                    seen.total(),
+                    seen.emitted,
+                    seen.surface_direct,
+                    seen.surface_indirect,
+                    seen.medium_single,
+                    seen.medium_multiple,
+                ];
+                layers.copy_from_slice(&parts);
+            } else if let Some(total) = layers.first_mut() {
+                *total = seen.total();
+            }
+        })
+    }
+}

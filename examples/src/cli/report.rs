@@ -1,0 +1,165 @@
+//! What the user sees of a render: the bar, the summary, the file of statistics.
+
+use core::fmt::Write;
+use std::path::PathBuf;
+
+use fogbow_std::progress::Progress;
+use fogbow_std::stats::{Seconds, Statistics};
+use fogbow_std::tiles::{Outcome, Reason};
+use indicatif::{ProgressBar, ProgressStyle};
+
+use super::RenderArguments;
+
+/// Steps of the progress bar.
+const STEPS: u64 = 1000;
+
+/// The progress bar.
+pub(super) struct Bar(Option<ProgressBar>);
+
+impl Bar {
+    pub(super) fn new(is_quiet: bool) -> Self {
+        if is_quiet {
+            return Self(None);
+        }
+        let bar = ProgressBar::new(STEPS);
+        if let Ok(style) = ProgressStyle::with_template("{bar:40} {percent:>3} %  {msg}") {
+            bar.set_style(style.progress_chars("=> "));
+        }
+        Self(Some(bar))
+    }
+
+    pub(super) fn show(&self, progress: &Progress, pixels: u64) {
+        let Some(bar) = &self.0 else { return };
+        bar.set_position((progress.fraction() * STEPS as f64) as u64);
+        let spp = progress.done as f64 / pixels.max(1) as f64;
+        let left = progress.remaining().map_or_else(String::new, |t| format!(", {} left", clock(t.as_secs_f64())));
+        bar.set_message(format!("{spp:.1} samples per pixel{left}"));
+    }
+
+    pub(super) fn finish(&self) {
+        if let Some(bar) = &self.0 {
+            bar.finish_and_clear();
+        }
+    }
+}
+
+/// Seconds as people read them.
+fn clock(seconds: f64) -> String {
+    if seconds < 100.0 {
+        return format!("{seconds:.1} s");
+    }
+    let whole = seconds.round() as u64;
+    if whole < 3600 {
+        format!("{}:{:02} min", whole / 60, whole % 60)
+    } else {
+        format!("{}:{:02} h", whole / 3600, whole / 60 % 60)
+    }
+}
+
+/// What a render did.
+pub(super) struct Report<'a> {
+    pub(super) arguments: &'a RenderArguments,
+    pub(super) outputs: &'a [PathBuf],
+    pub(super) outcome: &'a Outcome,
+    pub(super) statistics: &'a Statistics,
+    pub(super) size: (u32, u32),
+}
+
+impl Report<'_> {
+    /// The summary, on standard error: standard output stays free for scripts.
+    pub(super) fn print(&self) {
+        let Seconds { wall, cpu } = self.outcome.seconds;
+        let (width, height) = self.size;
+        let counters = &self.outcome.counters;
+        let ending = match self.outcome.reason {
+            Reason::Done => "",
+            Reason::TimeUp => " (time is up)",
+            Reason::Cancelled => " (stopped early; the image so far is kept)",
+        };
+        eprintln!("{width} x {height} pixels, {} samples per pixel{ending}", self.outcome.samples);
+        let cpu = cpu.map_or_else(String::new, |c| format!(", {} of processor time", clock(c)));
+        eprintln!("{}{cpu}, {:.2} million rays per second", clock(wall), self.rays_per_second() * 1e-6);
+        if counters.non_finite > 0 {
+            eprintln!("warning: {} samples were no finite numbers and count as black", counters.non_finite);
+        }
+        for file in self.outputs {
+            eprintln!("wrote {}", file.display());
+        }
+    }
+
+    fn rays_per_second(&self) -> f64 {
+        let counters = &self.outcome.counters;
+        (counters.rays + counters.shadow_rays) as f64 / self.outcome.seconds.wall.max(1e-9)
+    }
+
+    /// The file of statistics.
+    pub(super) fn json(&self) -> String {
+        let counters = &self.outcome.counters;
+        let reason = match self.outcome.reason {
+            Reason::Done => "done",
+            Reason::TimeUp => "time",
+            Reason::Cancelled => "cancelled",
+        };
+        let mut phases = String::new();
+        for (index, (name, seconds)) in self.statistics.phases.iter().enumerate() {
+            let cpu = seconds.cpu.map_or_else(|| "null".to_owned(), |c| format!("{c:.6}"));
+            let comma = if index == 0 { "" } else { "," };
+            // Writing to a string cannot fail.
+            let _ = write!(phases, "{comma}\n    {}: {{\"wall\": {:.6}, \"cpu\": {cpu}}}", quoted(name), seconds.wall);
+        }
+        let mut bytes = String::new();
+        for (index, (name, count)) in self.statistics.bytes.iter().enumerate() {
+            let comma = if index == 0 { "" } else { ", " };
+            let _ = write!(bytes, "{comma}{}: {count}", quoted(name));
+        }
+        format!(
+            "{{\n  \"scene\": {},\n  \"method\": \"path\",\n  \"width\": {},\n  \"height\": {},\n  \
+             \"samples_per_pixel\": {},\n  \"seed\": {},\n  \"ended\": \"{reason}\",\n  \
+             \"seconds\": {{{phases}\n  }},\n  \"counts\": {{\"samples\": {}, \"rays\": {}, \"shadow_rays\": {}, \
+             \"medium_lookups\": {}, \"medium_stretches\": {}, \"non_finite\": {}}},\n  \"bytes\": {{{bytes}}}\n}}\n",
+            quoted(&self.arguments.scene.display().to_string()),
+            self.size.0,
+            self.size.1,
+            self.outcome.samples,
+            self.arguments.seed,
+            counters.samples,
+            counters.rays,
+            counters.shadow_rays,
+            counters.lookups,
+            counters.stretches,
+            counters.non_finite,
+        )
+    }
+}
+
+/// A string of JSON.
+fn quoted(text: &str) -> String {
+    let mut quoted = String::from("\"");
+    for c in text.chars() {
+        match c {
+            '"' => quoted.push_str("\\\""),
+            '\\' => quoted.push_str("\\\\"),
+            c if c < ' ' => quoted.push_str(&format!("\\u{:04x}", c as u32)),
+            c => quoted.push(c),
+        }
+    }
+    quoted.push('"');
+    quoted
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn strings_are_escaped() {
+        assert_eq!(quoted("a\"b\\\n"), "\"a\\\"b\\\\\\u000a\"");
+    }
+
+    #[test]
+    fn times_read_well() {
+        assert_eq!(clock(3.14), "3.1 s");
+        assert_eq!(clock(125.0), "2:05 min");
+        assert_eq!(clock(7260.0), "2:01 h");
+    }
+}

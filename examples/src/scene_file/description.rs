@@ -1,0 +1,262 @@
+//! What a scene file says, before anything is built from it.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use fogbow::phase::Phase;
+use fogbow::spectrum::Spectrum;
+use fogbow::surface::Surface;
+
+use crate::mesh::Mesh;
+use crate::picture::Picture;
+use crate::transform::Transform;
+use crate::volume::Volume;
+
+/// A scene as its file describes it: checked, with all files it names loaded.
+#[derive(Debug, Clone)]
+pub struct SceneFile {
+    /// The file itself.
+    pub file: PathBuf,
+    /// How paths end.
+    pub integrator: Integrator,
+    /// The camera and its film.
+    pub sensor: Sensor,
+    /// Media, each in its containers.
+    pub media: Vec<MediumDescription>,
+    /// Surfaces. Shapes that only hold a medium are not among them.
+    pub shapes: Vec<Shape>,
+    /// Lights without a surface.
+    pub emitters: Vec<Emitter>,
+}
+
+/// `<integrator>`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Integrator {
+    /// Scattering events plus one, as Mitsuba counts; `None` is without limit.
+    pub max_depth: Option<u32>,
+    /// Depth from which Russian roulette may end a path.
+    pub rr_depth: u32,
+    /// Whether camera rays pass through area lights and do not see the background.
+    pub hide_emitters: bool,
+}
+
+/// Which way across the film the field of view is measured.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum FovAxis {
+    /// The width.
+    X,
+    /// The height.
+    Y,
+    /// The shorter side.
+    Smaller,
+    /// The longer side.
+    Larger,
+    /// Corner to corner.
+    Diagonal,
+}
+
+/// `<sensor type="perspective">`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sensor {
+    /// Full angle of view (degrees), in (0, 180).
+    pub fov: f64,
+    /// Across which the angle is measured.
+    pub fov_axis: FovAxis,
+    /// Distance (m) along the axis where rays start.
+    pub near: f64,
+    /// Distance (m) along the axis where rays would end; never within the scene.
+    pub far: f64,
+    /// Rigid; local +z looks forward, +y up, +x left.
+    pub to_world: Transform,
+    /// Pixels across.
+    pub width: u32,
+    /// Pixels down.
+    pub height: u32,
+    /// Samples per pixel.
+    pub samples: u32,
+}
+
+/// A medium and where it fills space.
+#[derive(Debug, Clone)]
+pub struct MediumDescription {
+    /// Its id in the file.
+    pub id: String,
+    /// What it is made of.
+    pub matter: Matter,
+    /// Where it is.
+    pub places: Vec<Place>,
+}
+
+/// What a medium is made of.
+#[derive(Debug, Clone)]
+pub enum Matter {
+    /// The same everywhere.
+    Homogeneous {
+        /// σₐ (m⁻¹).
+        absorption: Spectrum,
+        /// σₛ (m⁻¹).
+        scattering: Spectrum,
+        /// Angular law.
+        phase: Phase,
+    },
+    /// Density on a voxel grid.
+    Grid {
+        /// The densities.
+        volume: Arc<Volume>,
+        /// From the unit cube `[0, 1]³` of the grid to the world.
+        to_world: Transform,
+        /// σₐ (m⁻¹) at density 1.
+        absorption: Spectrum,
+        /// σₛ (m⁻¹) at density 1.
+        scattering: Spectrum,
+        /// Angular law.
+        phase: Phase,
+    },
+}
+
+/// A container without its holes.
+#[derive(Debug, Clone)]
+pub struct Place {
+    /// Where the medium is.
+    pub container: Container,
+    /// Where, within, it is not.
+    pub holes: Vec<Container>,
+}
+
+/// A closed shape that holds a medium.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Container {
+    /// The image of the cube `[−1, 1]³`.
+    Cube(Transform),
+    /// A ball.
+    Sphere {
+        /// Centre (m).
+        centre: [f64; 3],
+        /// Radius (m).
+        radius: f64,
+    },
+}
+
+impl Container {
+    /// Whether a point lies inside.
+    #[must_use]
+    pub fn contains(&self, point: [f64; 3]) -> bool {
+        match self {
+            Self::Cube(to_world) => {
+                to_world.inverse().is_some_and(|to_local| to_local.point(point).iter().all(|c| c.abs() <= 1.0))
+            }
+            Self::Sphere { centre, radius } => {
+                let square: f64 = (0..3).map(|i| (point[i] - centre[i]).powi(2)).sum();
+                square <= radius * radius
+            }
+        }
+    }
+
+    /// Its middle (m).
+    #[must_use]
+    pub fn centre(&self) -> [f64; 3] {
+        match self {
+            Self::Cube(to_world) => to_world.column(3),
+            Self::Sphere { centre, .. } => *centre,
+        }
+    }
+
+    /// The smallest box around it: both corners (m).
+    #[must_use]
+    pub fn bounds(&self) -> [[f64; 3]; 2] {
+        let reach = match self {
+            Self::Cube(to_world) => to_world.rows.map(|r| r[0].abs() + r[1].abs() + r[2].abs()),
+            Self::Sphere { radius, .. } => [*radius; 3],
+        };
+        let centre = self.centre();
+        [[0, 1, 2].map(|i| centre[i] - reach[i]), [0, 1, 2].map(|i| centre[i] + reach[i])]
+    }
+}
+
+/// A surface of the scene.
+#[derive(Debug, Clone)]
+pub struct Shape {
+    /// Its form.
+    pub geometry: Geometry,
+    /// Whether normals point inwards.
+    pub is_flipped: bool,
+    /// What it does to light.
+    pub material: Material,
+    /// Radiance (W·m⁻²·sr⁻¹) it sends out on the side of its normals.
+    pub radiance: Option<Spectrum>,
+    /// Line in the file.
+    pub line: u32,
+}
+
+/// The form of a surface.
+#[derive(Debug, Clone)]
+pub enum Geometry {
+    /// The image of `[−1, 1]²` at z = 0, normal +z.
+    Rectangle(Transform),
+    /// The image of the unit disc at z = 0, normal +z.
+    Disk(Transform),
+    /// The surface of the image of `[−1, 1]³`, normals outwards.
+    Cube(Transform),
+    /// A sphere, normals outwards.
+    Sphere {
+        /// Centre (m).
+        centre: [f64; 3],
+        /// Radius (m).
+        radius: f64,
+    },
+    /// Triangles, already in world space.
+    Mesh(Mesh),
+}
+
+/// What a surface does to light, and on which sides.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Material {
+    /// On the side of the normal.
+    pub surface: Surface,
+    /// Whether both sides do the same.
+    pub is_two_sided: bool,
+}
+
+/// A light without a surface.
+#[derive(Debug, Clone)]
+pub enum Emitter {
+    /// Uniform in all directions.
+    Point {
+        /// Where (m).
+        position: [f64; 3],
+        /// W/sr.
+        intensity: Spectrum,
+    },
+    /// A cone.
+    Spot {
+        /// Where (m).
+        position: [f64; 3],
+        /// Where it looks.
+        axis: [f64; 3],
+        /// Half angle of full light (degrees).
+        beam: f64,
+        /// Half angle where light ends (degrees).
+        cutoff: f64,
+        /// W/sr on the axis.
+        intensity: Spectrum,
+    },
+    /// Parallel light.
+    Directional {
+        /// The way the light travels.
+        direction: [f64; 3],
+        /// W/m² on a plane across it.
+        irradiance: Spectrum,
+    },
+    /// The same radiance from everywhere.
+    Constant {
+        /// W·m⁻²·sr⁻¹.
+        radiance: Spectrum,
+    },
+    /// An image around the world.
+    Environment {
+        /// Radiance, already scaled.
+        picture: Picture,
+        /// A rotation.
+        to_world: Transform,
+    },
+}

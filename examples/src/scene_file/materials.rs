@@ -1,0 +1,121 @@
+//! `<bsdf>`.
+
+use fogbow::spectrum::Spectrum;
+use fogbow::surface::Surface;
+
+use super::description::Material;
+use super::element::Element;
+use super::lookup;
+use super::plugin::Plugin;
+use crate::error::SceneError;
+
+const KNOWN: &str = "diffuse, twosided, null, conductor, dielectric, phong";
+
+/// What a shape without a `<bsdf>` reflects; one that shines reflects nothing.
+pub(super) fn default_material(is_emitter: bool) -> Material {
+    let reflectance = Spectrum::splat(if is_emitter { 0.0 } else { 0.5 });
+    Material { surface: Surface::Lambert { reflectance }, is_two_sided: false }
+}
+
+/// The material of a `<bsdf>`.
+pub(super) fn read(element: &Element<'_>) -> Result<Material, SceneError> {
+    let plugin = Plugin::new(*element)?;
+    let material = if plugin.kind == "twosided" {
+        let inner = match plugin.nested("bsdf") {
+            Some(inner) => inner,
+            None => match plugin.nested("ref") {
+                Some(reference) => lookup(&reference, "bsdf")?,
+                None => return Err(element.error("a <bsdf> is missing inside")),
+            },
+        };
+        let inner_plugin = Plugin::new(inner)?;
+        let surface = read_one(&inner_plugin)?;
+        inner_plugin.finish()?;
+        if matches!(surface, Surface::Dielectric { .. } | Surface::Null) {
+            return Err(inner.error("light passes through it, so it cannot be made two-sided"));
+        }
+        Material { surface, is_two_sided: true }
+    } else {
+        Material { surface: read_one(&plugin)?, is_two_sided: false }
+    };
+    plugin.finish()?;
+    Ok(material)
+}
+
+fn read_one(plugin: &Plugin<'_>) -> Result<Surface, SceneError> {
+    match plugin.kind.as_str() {
+        "diffuse" => Ok(Surface::Lambert { reflectance: plugin.share("reflectance", Spectrum::splat(0.5))? }),
+        "null" => Ok(Surface::Null),
+        "conductor" => {
+            match plugin.string("material")? {
+                Some((name, _)) if name == "none" => {}
+                Some((name, element)) => {
+                    return Err(element.attribute_error(
+                        "value",
+                        format!("\"{name}\" is not known; only the perfect mirror \"none\" is"),
+                    ));
+                }
+                None => {
+                    return Err(plugin.element.error(
+                        "only the perfect mirror is known: <string name=\"material\" value=\"none\"/> is missing",
+                    ));
+                }
+            }
+            Ok(Surface::Mirror { reflectance: plugin.share("specular_reflectance", Spectrum::ONE)? })
+        }
+        "dielectric" => {
+            let inside = index_of_refraction(plugin, "int_ior", 1.5046)?;
+            let outside = index_of_refraction(plugin, "ext_ior", 1.000_277)?;
+            Ok(Surface::Dielectric {
+                eta: (inside / outside) as f32,
+                reflectance: plugin.share("specular_reflectance", Spectrum::ONE)?,
+                transmittance: plugin.share("specular_transmittance", Spectrum::ONE)?,
+            })
+        }
+        "phong" => {
+            let diffuse = plugin.share("diffuse_reflectance", Spectrum::splat(0.5))?;
+            let specular = plugin.share("specular_reflectance", Spectrum::splat(0.2))?;
+            let exponent = plugin.number_in("exponent", 30.0, 0.0..=1e6)? as f32;
+            if (diffuse + specular).max_element() > 1.0 + 1e-6 {
+                return Err(plugin.element.error("diffuse_reflectance + specular_reflectance is above 1"));
+            }
+            Ok(Surface::Phong { diffuse, specular, exponent })
+        }
+        "twosided" => Err(plugin.element.attribute_error("type", "a two-sided bsdf cannot stand inside another")),
+        _ => Err(plugin.unknown_type(KNOWN)),
+    }
+}
+
+/// An index of refraction as a number or the name of a substance.
+fn index_of_refraction(plugin: &Plugin<'_>, name: &str, default: f64) -> Result<f64, SceneError> {
+    // Names and values of Mitsuba 3's table.
+    const SUBSTANCES: [(&str, f64); 18] = [
+        ("vacuum", 1.0),
+        ("helium", 1.000_036),
+        ("hydrogen", 1.000_132),
+        ("air", 1.000_277),
+        ("carbon dioxide", 1.000_45),
+        ("water", 1.3330),
+        ("acetone", 1.36),
+        ("ethanol", 1.361),
+        ("carbon tetrachloride", 1.461),
+        ("glycerol", 1.4729),
+        ("benzene", 1.501),
+        ("silicone oil", 1.520_45),
+        ("bromine", 1.661),
+        ("water ice", 1.31),
+        ("fused quartz", 1.458),
+        ("acrylic glass", 1.49),
+        ("bk7", 1.5046),
+        ("diamond", 2.419),
+    ];
+    let is_named = plugin.get(name).is_some_and(|e| e.tag() == "string");
+    if !is_named {
+        return plugin.number_in(name, default, 0.1..=10.0);
+    }
+    let Some((substance, element)) = plugin.string(name)? else { return Ok(default) };
+    SUBSTANCES.iter().find(|(known, _)| *known == substance).map(|(_, value)| *value).ok_or_else(|| {
+        let names: Vec<_> = SUBSTANCES.iter().map(|(known, _)| *known).collect();
+        element.attribute_error("value", format!("\"{substance}\" is none of: {}", names.join(", ")))
+    })
+}

@@ -1,0 +1,212 @@
+//! Which medium is where: containers and holes.
+//!
+//! Mitsuba tells media apart by the surfaces a path crosses, this renderer by where a point lies.
+//! Both agree as long as every boundary names what is on both sides; what would not agree is an
+//! error here.
+
+use std::collections::HashMap;
+
+use super::description::{Container, Matter, MediumDescription, Place, SceneFile, Sensor};
+use super::element::Element;
+use super::media;
+use super::shapes::ShapeElement;
+use crate::error::SceneError;
+use crate::transform::to_array;
+use crate::world::bounds_of;
+
+/// A container with the media at its sides.
+struct Boundary<'a, 's> {
+    source: &'s ShapeElement<'a>,
+    container: Container,
+    /// Index of the medium inside.
+    interior: Option<usize>,
+    /// Index of the medium around.
+    exterior: Option<usize>,
+}
+
+/// All media with their places.
+pub(super) fn read<'a>(
+    declared: &[Element<'a>],
+    shapes: &[ShapeElement<'a>],
+    sensor: &Sensor,
+    sensor_element: &Element<'a>,
+    sensor_medium: Option<Element<'a>>,
+) -> Result<Vec<MediumDescription>, SceneError> {
+    let mut found = Found { media: Vec::new(), index: HashMap::new() };
+    for element in declared {
+        found.index_of(element)?;
+    }
+    let mut boundaries = Vec::new();
+    for source in shapes {
+        let mut side = |element: &Option<Element<'a>>| element.map(|e| found.index_of(&e)).transpose();
+        let (interior, exterior) = (side(&source.interior)?, side(&source.exterior)?);
+        let is_clear = source
+            .shape
+            .as_ref()
+            .is_none_or(|s| matches!(s.material.surface, fogbow::surface::Surface::Dielectric { .. }));
+        if !is_clear {
+            if interior.is_some() {
+                return Err(source.element.error("light never reaches the medium inside an opaque shape"));
+            }
+            continue;
+        }
+        if interior.is_none() && exterior.is_none() {
+            continue;
+        }
+        let container =
+            source.container.ok_or_else(|| source.element.error("only a cube or a sphere can hold a medium"))?;
+        boundaries.push(Boundary { source, container, interior, exterior });
+    }
+    let mut holders: Vec<(usize, usize)> = Vec::new();
+    for (number, boundary) in boundaries.iter().enumerate() {
+        if let Some(medium) = boundary.interior {
+            holders.push((number, medium));
+            found.media[medium].places.push(Place { container: boundary.container, holes: Vec::new() });
+        }
+    }
+    for (number, boundary) in boundaries.iter().enumerate() {
+        // The smallest other container around this one's middle is what it lies in.
+        let around = surrounding(&boundaries, boundary.container.centre(), Some(number));
+        check_exterior(&found, &boundaries, boundary, around)?;
+        if let (Some(outer), Some(medium)) = (around, boundary.exterior) {
+            let container = boundaries[outer].container;
+            let places = &mut found.media[medium].places;
+            for place in places.iter_mut().filter(|p| p.container == container) {
+                place.holes.push(boundary.container);
+            }
+        }
+    }
+    for (medium, element) in found.media.iter().zip(&found.elements()) {
+        if medium.places.is_empty() {
+            return Err(element.error("no cube or sphere has this medium as its interior"));
+        }
+    }
+    check_camera(&mut found, &boundaries, sensor, sensor_element, sensor_medium)?;
+    Ok(found.media.into_iter().map(|m| m.description).collect())
+}
+
+struct Medium<'a> {
+    description: MediumDescription,
+    element: Element<'a>,
+}
+
+impl core::ops::Deref for Medium<'_> {
+    type Target = MediumDescription;
+    fn deref(&self) -> &MediumDescription {
+        &self.description
+    }
+}
+
+impl core::ops::DerefMut for Medium<'_> {
+    fn deref_mut(&mut self) -> &mut MediumDescription {
+        &mut self.description
+    }
+}
+
+struct Found<'a> {
+    media: Vec<Medium<'a>>,
+    index: HashMap<roxmltree::NodeId, usize>,
+}
+
+impl<'a> Found<'a> {
+    fn index_of(&mut self, element: &Element<'a>) -> Result<usize, SceneError> {
+        if let Some(index) = self.index.get(&element.node.id()) {
+            return Ok(*index);
+        }
+        let matter = media::read(element)?;
+        let id = element.optional("id")?.unwrap_or_else(|| format!("medium at line {}", element.line()));
+        let index = self.media.len();
+        let description = MediumDescription { id, matter, places: Vec::new() };
+        self.media.push(Medium { description, element: *element });
+        self.index.insert(element.node.id(), index);
+        Ok(index)
+    }
+
+    fn elements(&self) -> Vec<Element<'a>> {
+        self.media.iter().map(|m| m.element).collect()
+    }
+
+    fn name(&self, index: Option<usize>) -> String {
+        index.map_or_else(|| "no medium".to_owned(), |i| format!("medium \"{}\"", self.media[i].id))
+    }
+}
+
+/// The smallest container, other than `except`, around `point`.
+fn surrounding(boundaries: &[Boundary<'_, '_>], point: [f64; 3], except: Option<usize>) -> Option<usize> {
+    let volume = |b: &Boundary<'_, '_>| {
+        let [low, high] = b.container.bounds();
+        (0..3).map(|i| high[i] - low[i]).product::<f64>()
+    };
+    let limit = except.map_or(f64::INFINITY, |e| volume(&boundaries[e]));
+    boundaries
+        .iter()
+        .enumerate()
+        .filter(|(i, b)| Some(*i) != except && volume(b) > 0.0 && volume(b) < f64::INFINITY)
+        // Of two containers around one middle the larger is the outer one.
+        .filter(|(_, b)| except.is_none() || volume(b) > limit)
+        .filter(|(_, b)| b.container.contains(point))
+        .min_by(|a, b| volume(a.1).total_cmp(&volume(b.1)))
+        .map(|(i, _)| i)
+}
+
+fn check_exterior(
+    found: &Found<'_>,
+    boundaries: &[Boundary<'_, '_>],
+    boundary: &Boundary<'_, '_>,
+    around: Option<usize>,
+) -> Result<(), SceneError> {
+    let surrounded_by = around.and_then(|i| boundaries[i].interior);
+    if boundary.exterior == surrounded_by {
+        return Ok(());
+    }
+    let (said, is) = (found.name(boundary.exterior), found.name(surrounded_by));
+    Err(boundary.source.element.error(format!("its \"exterior\" is {said}, but around it is {is}")))
+}
+
+fn check_camera<'a>(
+    found: &mut Found<'a>,
+    boundaries: &[Boundary<'_, '_>],
+    sensor: &Sensor,
+    element: &Element<'a>,
+    medium: Option<Element<'a>>,
+) -> Result<(), SceneError> {
+    let said = medium.map(|m| found.index_of(&m)).transpose()?;
+    let is = surrounding(boundaries, sensor.to_world.column(3), None).and_then(|i| boundaries[i].interior);
+    if said == is {
+        return Ok(());
+    }
+    let (said, is) = (found.name(said), found.name(is));
+    Err(element.error(format!("its \"medium\" is {said}, but the camera stands in {is}")))
+}
+
+/// # Errors
+/// A far plane that would cut something off.
+pub(super) fn check_far_plane(scene: &SceneFile, sensor: &Element<'_>) -> Result<(), SceneError> {
+    let eye = scene.sensor.to_world.column(3);
+    let mut corners: Vec<[f64; 3]> = Vec::new();
+    for shape in &scene.shapes {
+        let bounds = bounds_of(&shape.geometry);
+        corners.extend([to_array(bounds.min), to_array(bounds.max)]);
+    }
+    for medium in &scene.media {
+        corners.extend(medium.places.iter().flat_map(|p| p.container.bounds()));
+    }
+    let reach = |axis: usize| corners.iter().map(|c| (c[axis] - eye[axis]).abs()).fold(0.0, f64::max);
+    let farthest = (reach(0).powi(2) + reach(1).powi(2) + reach(2).powi(2)).sqrt();
+    if scene.sensor.far < farthest {
+        let far = scene.sensor.far;
+        return Err(sensor.error(format!("far_clip {far} would cut the scene, which reaches {farthest:.3} away")));
+    }
+    Ok(())
+}
+
+impl MediumDescription {
+    /// Bytes of its densities.
+    #[must_use]
+    pub fn bytes(&self) -> usize {
+        match &self.matter {
+            Matter::Homogeneous { .. } => 0,
+            Matter::Grid { volume, .. } => volume.bytes(),
+        }
+    }
+}

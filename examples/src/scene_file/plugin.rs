@@ -1,0 +1,225 @@
+//! Elements with a type and properties: `<shape type="sphere">`. Every property is asked for by
+//! name; what nobody asked for is an error.
+
+use core::cell::Cell;
+use std::path::PathBuf;
+
+use fogbow::spectrum::Spectrum;
+
+use super::element::Element;
+use super::transforms;
+use crate::error::SceneError;
+use crate::transform::Transform;
+
+/// Tags that hold one value.
+const VALUES: [&str; 9] = ["float", "integer", "boolean", "string", "rgb", "spectrum", "point", "vector", "transform"];
+/// Tags of nested objects.
+const OBJECTS: [&str; 10] =
+    ["bsdf", "emitter", "medium", "phase", "volume", "film", "rfilter", "sampler", "ref", "shape"];
+
+#[derive(Debug)]
+struct Child<'a> {
+    element: Element<'a>,
+    name: Option<String>,
+    is_used: Cell<bool>,
+}
+
+/// An element with a type and children.
+#[derive(Debug)]
+pub(super) struct Plugin<'a> {
+    pub(super) element: Element<'a>,
+    pub(super) kind: String,
+    children: Vec<Child<'a>>,
+}
+
+impl<'a> Plugin<'a> {
+    pub(super) fn new(element: Element<'a>) -> Result<Self, SceneError> {
+        element.allow(&["type", "id", "name"])?;
+        let kind = element.required("type")?;
+        let mut children: Vec<Child<'a>> = Vec::new();
+        for child in element.children()? {
+            let is_value = VALUES.contains(&child.tag());
+            if !is_value && !OBJECTS.contains(&child.tag()) {
+                return Err(child.error(format!("unknown element inside <{}>", element.tag())));
+            }
+            let name = if is_value { Some(child.required("name")?) } else { child.optional("name")? };
+            if name.is_some() && children.iter().any(|c| c.name == name) {
+                return Err(child.attribute_error("name", "is given twice"));
+            }
+            children.push(Child { element: child, name, is_used: Cell::new(false) });
+        }
+        Ok(Self { element, kind, children })
+    }
+
+    pub(super) fn unknown_type(&self, known: &str) -> SceneError {
+        self.element.attribute_error("type", format!("unknown type \"{}\"; known here: {known}", self.kind))
+    }
+
+    /// # Errors
+    /// A child nobody asked for.
+    pub(super) fn finish(&self) -> Result<(), SceneError> {
+        let Some(child) = self.children.iter().find(|c| !c.is_used.get()) else { return Ok(()) };
+        let owner = format!("<{} type=\"{}\">", self.element.tag(), self.kind);
+        Err(match &child.name {
+            Some(name) => child.element.attribute_error("name", format!("{owner} has no property \"{name}\"")),
+            None => child.element.error(format!("is not expected, or not once more, inside {owner}")),
+        })
+    }
+
+    /// The named child.
+    pub(super) fn get(&self, name: &str) -> Option<Element<'a>> {
+        let child = self.children.iter().find(|c| c.name.as_deref() == Some(name))?;
+        child.is_used.set(true);
+        Some(child.element)
+    }
+
+    fn value(&self, name: &str, tags: &[&str], attributes: &[&str]) -> Result<Option<Element<'a>>, SceneError> {
+        let Some(element) = self.get(name) else { return Ok(None) };
+        if !tags.contains(&element.tag()) {
+            return Err(element.error(format!("\"{name}\" must be a <{}>", tags.join("> or <"))));
+        }
+        element.allow(attributes)?;
+        element.no_children()?;
+        Ok(Some(element))
+    }
+
+    /// A number, and the element that holds it.
+    pub(super) fn number(&self, name: &str) -> Result<Option<(f64, Element<'a>)>, SceneError> {
+        self.value(name, &["float", "integer"], &["name", "value"])?.map(|e| Ok((e.number("value")?, e))).transpose()
+    }
+
+    /// A number that must lie in a range.
+    pub(super) fn number_in(
+        &self,
+        name: &str,
+        default: f64,
+        range: core::ops::RangeInclusive<f64>,
+    ) -> Result<f64, SceneError> {
+        let Some((value, element)) = self.number(name)? else { return Ok(default) };
+        if !range.contains(&value) {
+            let (low, high) = (range.start(), range.end());
+            return Err(element.attribute_error("value", format!("{value} is outside [{low}, {high}]")));
+        }
+        Ok(value)
+    }
+
+    /// A number above 0.
+    pub(super) fn positive(&self, name: &str, default: f64) -> Result<f64, SceneError> {
+        match self.number(name)? {
+            None => Ok(default),
+            Some((value, _)) if value > 0.0 => Ok(value),
+            Some((value, element)) => Err(element.attribute_error("value", format!("{value} must be greater than 0"))),
+        }
+    }
+
+    /// A whole number in a range.
+    pub(super) fn integer(
+        &self,
+        name: &str,
+        default: i64,
+        range: core::ops::RangeInclusive<i64>,
+    ) -> Result<i64, SceneError> {
+        let Some(element) = self.value(name, &["integer"], &["name", "value"])? else { return Ok(default) };
+        let text = element.required("value")?;
+        let value: i64 = text
+            .trim()
+            .parse()
+            .map_err(|_| element.attribute_error("value", format!("\"{text}\" is not a whole number")))?;
+        if !range.contains(&value) {
+            let (low, high) = (range.start(), range.end());
+            return Err(element.attribute_error("value", format!("{value} is outside [{low}, {high}]")));
+        }
+        Ok(value)
+    }
+
+    pub(super) fn boolean(&self, name: &str, default: bool) -> Result<bool, SceneError> {
+        let Some(element) = self.value(name, &["boolean"], &["name", "value"])? else { return Ok(default) };
+        match element.required("value")?.trim() {
+            "true" => Ok(true),
+            "false" => Ok(false),
+            other => Err(element.attribute_error("value", format!("\"{other}\" is neither true nor false"))),
+        }
+    }
+
+    pub(super) fn string(&self, name: &str) -> Result<Option<(String, Element<'a>)>, SceneError> {
+        self.value(name, &["string"], &["name", "value"])?.map(|e| Ok((e.required("value")?, e))).transpose()
+    }
+
+    /// One of several words; the first is the default.
+    pub(super) fn word(&self, name: &str, known: &[&'static str]) -> Result<&'static str, SceneError> {
+        let first = known.first().copied().unwrap_or_default();
+        let Some((value, element)) = self.string(name)? else { return Ok(first) };
+        known
+            .iter()
+            .copied()
+            .find(|w| *w == value)
+            .ok_or_else(|| element.attribute_error("value", format!("\"{value}\" is none of: {}", known.join(", "))))
+    }
+
+    /// The path in a string, relative to the scene file, and the element that holds it.
+    pub(super) fn path(&self, name: &str) -> Result<(PathBuf, Element<'a>), SceneError> {
+        let (value, element) =
+            self.string(name)?.ok_or_else(|| self.element.error(format!("<string name=\"{name}\"> is missing")))?;
+        Ok((element.context.resolve(&value), element))
+    }
+
+    /// A colour or number that is not negative, and the element that holds it.
+    pub(super) fn colour(&self, name: &str) -> Result<Option<(Spectrum, Element<'a>)>, SceneError> {
+        let tags = ["rgb", "float", "integer", "spectrum"];
+        let Some(element) = self.value(name, &tags, &["name", "value"])? else { return Ok(None) };
+        let colour = element.colour()?;
+        if element.tag() != "rgb" && element.numbers("value")?.len() != 1 {
+            return Err(element.attribute_error("value", "must be one number"));
+        }
+        if let Some(negative) = colour.0.iter().find(|c| **c < 0.0) {
+            return Err(element.attribute_error("value", format!("{negative} is negative")));
+        }
+        Ok(Some((colour, element)))
+    }
+
+    /// A colour within [0, 1].
+    pub(super) fn share(&self, name: &str, default: Spectrum) -> Result<Spectrum, SceneError> {
+        match self.colour(name)? {
+            None => Ok(default),
+            Some((colour, element)) => is_share(colour, &element),
+        }
+    }
+
+    fn triple(&self, name: &str) -> Result<Option<[f64; 3]>, SceneError> {
+        let Some(element) = self.value(name, &["point", "vector"], &["name", "value", "x", "y", "z"])? else {
+            return Ok(None);
+        };
+        element.xyz(0.0, false).map(Some)
+    }
+
+    /// A point or vector, if given.
+    pub(super) fn point(&self, name: &str) -> Result<Option<[f64; 3]>, SceneError> {
+        self.triple(name)
+    }
+
+    /// The transform `to_world`, if given, and the element that holds it.
+    pub(super) fn to_world(&self) -> Result<Option<(Transform, Element<'a>)>, SceneError> {
+        let Some(element) = self.get("to_world") else { return Ok(None) };
+        if element.tag() != "transform" {
+            return Err(element.error("\"to_world\" must be a <transform>"));
+        }
+        Ok(Some((transforms::read(&element)?, element)))
+    }
+
+    /// Nested objects with one of the tags, or references, that have no name. They are taken
+    /// from the list.
+    pub(super) fn nested(&self, tag: &str) -> Option<Element<'a>> {
+        let child = self.children.iter().find(|c| c.name.is_none() && !c.is_used.get() && c.element.tag() == tag)?;
+        child.is_used.set(true);
+        Some(child.element)
+    }
+}
+
+/// # Errors
+/// A colour above 1.
+pub(super) fn is_share(colour: Spectrum, element: &Element<'_>) -> Result<Spectrum, SceneError> {
+    match colour.0.iter().find(|c| !(0.0..=1.0).contains(*c)) {
+        Some(outside) => Err(element.attribute_error("value", format!("{outside} is outside [0, 1]"))),
+        None => Ok(colour),
+    }
+}

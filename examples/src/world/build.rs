@@ -1,0 +1,114 @@
+//! From the description to primitives.
+
+use fogbow::math::{Bounds, Vec3};
+
+use super::Part;
+use super::analytic::{Primitive, bounds};
+use crate::mesh::has_area;
+use crate::scene_file::{Geometry, Material, SceneFile, Shape};
+use crate::transform::{Transform, cross, dot, normalized, to_vec3};
+
+/// What rays are tested against.
+#[derive(Debug, Default)]
+pub(super) struct Pieces {
+    pub(super) materials: Vec<Material>,
+    pub(super) primitives: Vec<Primitive>,
+    pub(super) parts: Vec<Part>,
+    pub(super) corners: Vec<[Vec3; 3]>,
+    pub(super) triangle_parts: Vec<Part>,
+}
+
+impl Pieces {
+    pub(super) fn new(scene: &SceneFile) -> Self {
+        let mut pieces = Self::default();
+        let mut lights = 0_u32..;
+        for (index, shape) in (0_u32..).zip(&scene.shapes) {
+            pieces.materials.push(shape.material);
+            let light = shape.radiance.and_then(|_| lights.next());
+            let part = Part { material: index, side: if shape.is_flipped { -1.0 } else { 1.0 }, light };
+            pieces.push(shape, part);
+        }
+        pieces
+    }
+
+    fn push(&mut self, shape: &Shape, part: Part) {
+        match &shape.geometry {
+            Geometry::Mesh(mesh) => {
+                for triangle in &mesh.triangles {
+                    let corners = mesh.corners(*triangle);
+                    // Without an area there is nothing to hit, and no normal.
+                    if has_area(corners) {
+                        self.corners.push(corners);
+                        self.triangle_parts.push(part);
+                    }
+                }
+            }
+            analytic => {
+                if let Some(primitive) = primitive(analytic) {
+                    self.primitives.push(primitive);
+                    self.parts.push(part);
+                }
+            }
+        }
+    }
+}
+
+fn primitive(geometry: &Geometry) -> Option<Primitive> {
+    match geometry {
+        Geometry::Rectangle(to_world) => flat(to_world, false),
+        Geometry::Disk(to_world) => flat(to_world, true),
+        Geometry::Sphere { centre, radius } => {
+            Some(Primitive::Sphere { centre: to_vec3(*centre), radius: *radius as f32 })
+        }
+        Geometry::Cube(to_world) => {
+            let rows = to_world.inverse()?.rows.map(|r| (to_vec3([r[0], r[1], r[2]]), r[3] as f32));
+            Some(Primitive::Box { rows })
+        }
+        Geometry::Mesh(_) => None,
+    }
+}
+
+/// The image of the square or disc in the xy plane; the normal is the image of +z, also of a
+/// mirror image.
+fn flat(to_world: &Transform, is_disc: bool) -> Option<Primitive> {
+    let (x, y, centre) = (to_world.column(0), to_world.column(1), to_world.column(3));
+    let normal = flat_normal(to_world)?;
+    // In the plane, across the other edge.
+    let gradient = |edge: [f64; 3], other: [f64; 3]| {
+        let across = cross(other, normal);
+        let gradient = across.map(|c| c / dot(edge, across));
+        (to_vec3(gradient), -dot(gradient, centre) as f32)
+    };
+    Some(Primitive::Flat {
+        normal: to_vec3(normal),
+        offset: dot(normal, centre) as f32,
+        u: gradient(x, y),
+        v: gradient(y, x),
+        is_disc,
+    })
+}
+
+/// The normal of a rectangle or disk.
+pub(super) fn flat_normal(to_world: &Transform) -> Option<[f64; 3]> {
+    let sign = to_world.determinant().signum();
+    normalized(cross(to_world.column(0), to_world.column(1)).map(|c| c * sign))
+}
+
+/// The smallest box around a form (m).
+#[must_use]
+pub fn bounds_of(geometry: &Geometry) -> Bounds {
+    match geometry {
+        Geometry::Mesh(mesh) => mesh.bounds(),
+        other => primitive(other).map_or(Bounds::EMPTY, |p| bounds(&p)),
+    }
+}
+
+/// The smallest box around all surfaces and containers.
+pub(super) fn scene_bounds(scene: &SceneFile) -> Bounds {
+    let surfaces = scene.shapes.iter().map(|s| bounds_of(&s.geometry));
+    let containers = scene.media.iter().flat_map(|m| &m.places).map(|p| {
+        let [min, max] = p.container.bounds();
+        Bounds { min: to_vec3(min), max: to_vec3(max) }
+    });
+    surfaces.chain(containers).fold(Bounds::EMPTY, Bounds::union)
+}

@@ -1,0 +1,195 @@
+//! Media and where they are.
+
+use fogbow::host::{Empty, Medium};
+use fogbow::math::Affine3;
+use fogbow::medium::{AnyMedium, Density, Grid, Homogeneous, MediumError, MinMax, Overlap, Placed, Region};
+
+use crate::error::SceneError;
+use crate::scene_file::{Container, Matter, MediumDescription, Place, SceneFile};
+use crate::transform::{Transform, to_vec3};
+use crate::volume::{Values, Volume};
+
+/// Tables a medium borrows.
+#[derive(Debug, Default)]
+pub(super) struct MediumTable {
+    /// Bounds of density per block of the grid.
+    blocks: Vec<MinMax>,
+    /// For each place of the medium, its holes.
+    holes: Vec<Vec<Region>>,
+}
+
+impl MediumTable {
+    pub(super) fn bytes(&self) -> usize {
+        size_of_val(&*self.blocks)
+    }
+}
+
+pub(super) fn tables(scene: &SceneFile) -> Vec<MediumTable> {
+    let table = |medium: &MediumDescription| match &medium.matter {
+        Matter::Homogeneous { .. } => MediumTable::default(),
+        Matter::Grid { volume, .. } => {
+            MediumTable { blocks: vec![MinMax::default(); Grid::block_count(volume.size)], holes: Vec::new() }
+        }
+    };
+    scene.media.iter().map(table).collect()
+}
+
+/// The media of a scene, in the simplest form that holds them all: tracking is compiled for each.
+#[derive(Debug)]
+#[expect(clippy::large_enum_variant, reason = "there is one per scene")]
+pub enum Media<'a> {
+    /// No medium.
+    None,
+    /// One that is the same everywhere inside its container.
+    Homogeneous(Placed<'a, Homogeneous>),
+    /// One grid.
+    Grid(Placed<'a, Grid<'a>>),
+    /// Several.
+    Several(Vec<Placed<'a, AnyMedium<'a>>>),
+}
+
+/// Work to be done with the medium of a scene, whatever its type: see [`Media::with`].
+pub trait WithMedium {
+    /// What the work gives.
+    type Output;
+
+    /// Does the work.
+    fn with<M: Medium + Sync>(self, medium: &M) -> Self::Output;
+}
+
+impl<'a> Media<'a> {
+    pub(super) fn new(scene: &'a SceneFile, tables: &'a mut [MediumTable]) -> Result<Self, SceneError> {
+        let (mut placed, mut all_holes) = (Vec::new(), Vec::new());
+        for (medium, table) in scene.media.iter().zip(tables) {
+            let fail = |reason: String| SceneError {
+                file: scene.file.clone(),
+                line: None,
+                element: format!("<medium id=\"{}\">", medium.id),
+                attribute: None,
+                reason,
+            };
+            for (one, holes) in place(medium, table).map_err(|e| fail(e.to_string()))? {
+                placed.push(one);
+                all_holes.push(holes);
+            }
+        }
+        // A mixture holds few different phase functions.
+        Overlap::new(&placed, |p| p.medium().phase()).map_err(|e| SceneError {
+            file: scene.file.clone(),
+            line: None,
+            element: "<medium>".to_owned(),
+            attribute: None,
+            reason: e.to_string(),
+        })?;
+        Ok(match (&placed[..], &all_holes[..]) {
+            ([], _) => Self::None,
+            ([one], [holes]) => match *one.medium() {
+                AnyMedium::Homogeneous(fog) => Self::Homogeneous(moved(one, holes, fog)),
+                AnyMedium::Grid(grid) => Self::Grid(moved(one, holes, grid)),
+                AnyMedium::Noise(_) => Self::Several(placed),
+            },
+            _ => Self::Several(placed),
+        })
+    }
+
+    /// Does `work` with the medium.
+    pub fn with<W: WithMedium>(&self, work: W) -> W::Output {
+        match self {
+            Self::None => work.with(&Empty),
+            Self::Homogeneous(fog) => work.with(fog),
+            Self::Grid(grid) => work.with(grid),
+            // The number of lobes was checked when the list was made.
+            Self::Several(media) => match Overlap::new(media, |p| p.medium().phase()) {
+                Ok(overlap) => work.with(&overlap),
+                Err(_) => work.with(&Empty),
+            },
+        }
+    }
+}
+
+/// `medium` in the place of another.
+fn moved<'a, N>(place: &Placed<'_, AnyMedium<'_>>, holes: &'a [Region], medium: N) -> Placed<'a, N> {
+    Placed::new(medium, *place.region()).with_holes(holes)
+}
+
+/// A placed medium and, once more, its holes.
+type PlacedHoles<'a> = (Placed<'a, AnyMedium<'a>>, &'a [Region]);
+
+fn place<'a>(medium: &'a MediumDescription, table: &'a mut MediumTable) -> Result<Vec<PlacedHoles<'a>>, Refusal> {
+    let MediumTable { blocks, holes } = table;
+    let any = match &medium.matter {
+        Matter::Homogeneous { absorption, scattering, phase } => {
+            AnyMedium::from(Homogeneous::new(*absorption, *scattering, *phase)?)
+        }
+        Matter::Grid { volume, to_world, absorption, scattering, phase } => {
+            check_border(volume, to_world)?;
+            let density = match &volume.values {
+                Values::F32(values) => Density::F32(values),
+                Values::U8(values) => Density::U8(values),
+            };
+            let placement = to_world.to_affine();
+            AnyMedium::from(Grid::new(volume.size, density, *absorption, *scattering, *phase, placement, blocks)?)
+        }
+    };
+    for place in &medium.places {
+        holes.push(place.holes.iter().map(region).collect::<Result<_, _>>()?);
+    }
+    let mut placed = Vec::new();
+    for (place, holes) in medium.places.iter().zip(&*holes) {
+        placed.push((Placed::new(any, region_of(medium, place)?).with_holes(holes), holes.as_slice()));
+    }
+    Ok(placed)
+}
+
+/// Why a medium cannot be built.
+enum Refusal {
+    Medium(MediumError),
+    Border,
+}
+
+impl From<MediumError> for Refusal {
+    fn from(error: MediumError) -> Self {
+        Self::Medium(error)
+    }
+}
+
+impl core::fmt::Display for Refusal {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Self::Medium(error) => error.fmt(f),
+            Self::Border => f.write_str("a rotated grid must have empty cells along its border"),
+        }
+    }
+}
+
+/// Mitsuba evaluates a grid inside the axis-aligned box around its rotated cube, with the values of
+/// the border between the two; here nothing lies outside the cube. Both agree for empty borders.
+fn check_border(volume: &Volume, to_world: &Transform) -> Result<(), Refusal> {
+    let is_straight = to_world.rows.iter().all(|row| {
+        let largest = row.iter().take(3).fold(0.0_f64, |m, v| m.max(v.abs()));
+        row.iter().take(3).filter(|v| v.abs() > 1e-6 * largest).count() == 1
+    });
+    if is_straight || volume.has_empty_border() { Ok(()) } else { Err(Refusal::Border) }
+}
+
+fn region(container: &Container) -> Result<Region, MediumError> {
+    match container {
+        Container::Cube(to_world) => {
+            let centred = Transform::translation([-0.5; 3]).then(&Transform::scaling([2.0; 3]));
+            let placement: Affine3 = centred.then(to_world).to_affine();
+            Region::unit_cube(placement)
+        }
+        Container::Sphere { centre, radius } => Region::sphere(to_vec3(*centre), *radius as f32),
+    }
+}
+
+/// The container; all of space for a grid that lies inside it, because a grid ends by itself.
+fn region_of(medium: &MediumDescription, place: &Place) -> Result<Region, MediumError> {
+    if let Matter::Grid { to_world, .. } = &medium.matter {
+        let corner = |i: u32| [1, 2, 4].map(|bit| if i & bit == 0 { 0.0 } else { 1.0 });
+        if (0..8).all(|i| place.container.contains(to_world.point(corner(i)))) {
+            return Ok(Region::Everywhere);
+        }
+    }
+    region(&place.container)
+}

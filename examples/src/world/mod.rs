@@ -1,0 +1,204 @@
+//! The host's world: surfaces, lights and media of a scene, ready for rays.
+//!
+//! | file | holds |
+//! |---|---|
+//! | `mod` | [`World`]: the [`Scene`] of a scene file |
+//! | `build` | from the description to primitives, materials and lights |
+//! | `analytic` | flat pieces, spheres, boxes: tested four at a time |
+//! | `many` | the same in a tree, where they are many |
+//! | `triangles` | meshes in a tree |
+//! | `lights` | emitters and lent tables |
+//! | `media` | media and where they are |
+
+mod analytic;
+mod build;
+mod lights;
+mod many;
+mod media;
+mod triangles;
+
+use fogbow::host::{Hit, Scene};
+use fogbow::light::Light;
+use fogbow::math::{Bounds, Ray, Vec3};
+
+pub use build::bounds_of;
+pub use lights::Storage;
+pub use media::{Media, WithMedium};
+
+use crate::camera::Camera;
+use crate::error::SceneError;
+use crate::scene_file::{Integrator, Material, SceneFile, Sensor};
+use analytic::Few;
+use many::Many;
+use triangles::Triangles;
+
+/// Analytic primitives up to this number are all tested, four at a time; above, a tree pays.
+const FEW: usize = 64;
+
+/// A primitive's place in the scene.
+#[derive(Debug, Clone, Copy)]
+struct Part {
+    /// Index into the materials.
+    material: u32,
+    /// 1 where normals point outwards, −1 where they are flipped.
+    side: f32,
+    /// Index of the light it belongs to.
+    light: Option<u32>,
+}
+
+/// The surfaces of a scene file, with its lights, media and camera.
+///
+/// It borrows big tables from a [`Storage`]:
+///
+/// ```no_run
+/// use fogbow_examples::{scene_file::SceneFile, world::{Storage, World}};
+/// let scene = SceneFile::read("box.xml".as_ref())?;
+/// let mut storage = Storage::new(&scene);
+/// let world = World::new(&scene, &mut storage)?;
+/// let lights = world.lights();
+/// # Ok::<(), fogbow_examples::error::SceneError>(())
+/// ```
+#[derive(Debug)]
+pub struct World<'a> {
+    scene: &'a SceneFile,
+    materials: Vec<Material>,
+    primitives: Vec<analytic::Primitive>,
+    parts: Vec<Part>,
+    few: Few,
+    many: Option<Many>,
+    corners: Vec<[Vec3; 3]>,
+    triangle_parts: Vec<Part>,
+    triangles: Option<Triangles>,
+    lights: lights::Lights<'a>,
+    media: Media<'a>,
+    bounds: Bounds,
+}
+
+impl<'a> World<'a> {
+    /// Builds the world of a scene.
+    ///
+    /// # Errors
+    /// Lights and media whose values are out of range, or that cannot be built.
+    pub fn new(scene: &'a SceneFile, storage: &'a mut Storage) -> Result<Self, SceneError> {
+        let (light_tables, medium_tables) = storage.split();
+        let media = Media::new(scene, medium_tables)?;
+        let lights = lights::Lights::new(scene, light_tables)?;
+        let pieces = build::Pieces::new(scene);
+        let is_few = pieces.primitives.len() <= FEW;
+        let few = if is_few { Few::new(&pieces.primitives) } else { Few::default() };
+        let many = (!is_few).then(|| Many::new(&pieces.primitives));
+        let triangles = (!pieces.corners.is_empty()).then(|| Triangles::new(&pieces.corners));
+        let bounds = build::scene_bounds(scene);
+        Ok(Self {
+            scene,
+            materials: pieces.materials,
+            primitives: pieces.primitives,
+            parts: pieces.parts,
+            few,
+            many,
+            corners: pieces.corners,
+            triangle_parts: pieces.triangle_parts,
+            triangles,
+            lights,
+            media,
+            bounds,
+        })
+    }
+
+    /// All lights; [`Hit::light`] is an index into them.
+    #[must_use]
+    pub fn lights(&self) -> Vec<Light<'_>> {
+        self.lights.all()
+    }
+
+    /// The camera for a film of the size the scene asks for.
+    #[must_use]
+    pub fn camera(&self) -> Camera {
+        Camera::new(&self.scene.sensor, self.scene.sensor.width, self.scene.sensor.height)
+    }
+
+    /// The camera for a film of another size.
+    #[must_use]
+    pub fn camera_for(&self, width: u32, height: u32) -> Camera {
+        Camera::new(&self.scene.sensor, width, height)
+    }
+
+    /// What the scene says of its camera and film.
+    #[must_use]
+    pub fn sensor(&self) -> &Sensor {
+        &self.scene.sensor
+    }
+
+    /// What the scene says of its paths.
+    #[must_use]
+    pub fn integrator(&self) -> Integrator {
+        self.scene.integrator
+    }
+
+    /// Media, with tables they lend.
+    #[must_use]
+    pub fn media(&self) -> &Media<'a> {
+        &self.media
+    }
+
+    /// The smallest box around surfaces and media (m).
+    #[must_use]
+    pub fn bounds(&self) -> Bounds {
+        self.bounds
+    }
+
+    /// How many flat pieces, spheres and boxes there are, and how many triangles.
+    #[must_use]
+    pub fn counts(&self) -> (usize, usize) {
+        (self.primitives.len(), self.corners.len())
+    }
+
+    /// Bytes held for tracing rays, without tables lent.
+    #[must_use]
+    pub fn bytes(&self) -> usize {
+        let triangles = self.corners.len() * (2 * size_of::<[Vec3; 3]>() + size_of::<Part>());
+        let primitives = self.primitives.len() * (size_of::<analytic::Primitive>() + size_of::<Part>());
+        let trees = self.triangles.as_ref().map_or(0, Triangles::bytes);
+        triangles + primitives + trees
+    }
+
+    fn hit(&self, ray: &Ray, distance: f32, normal: Vec3, part: &Part) -> Option<Hit> {
+        let material = self.materials.get(part.material as usize)?;
+        let normal = normal * part.side;
+        let is_front = normal.dot(ray.direction) < 0.0;
+        // Seen from behind, a light is dark, whatever its bsdf does there.
+        let light = if is_front { part.light } else { None };
+        let normal = if material.is_two_sided && !is_front { -normal } else { normal };
+        Some(Hit { distance, normal, surface: material.surface, light })
+    }
+}
+
+impl Scene for World<'_> {
+    #[inline]
+    fn closest_hit(&self, ray: &Ray) -> Option<Hit> {
+        let analytic = match &self.many {
+            Some(many) => many.closest(ray, ray.length),
+            None => self.few.closest(ray, ray.length),
+        };
+        let length = analytic.map_or(ray.length, |(t, _)| t);
+        if let Some(triangles) = &self.triangles
+            && let Some((t, index)) = triangles.closest(ray, length)
+        {
+            let [a, b, c] = self.corners.get(index as usize)?;
+            let normal = (*b - *a).cross(*c - *a).normalize_or(-ray.direction);
+            return self.hit(ray, t, normal, self.triangle_parts.get(index as usize)?);
+        }
+        let (t, index) = analytic?;
+        let normal = self.primitives.get(index as usize)?.normal(ray.at(t));
+        self.hit(ray, t, normal, self.parts.get(index as usize)?)
+    }
+
+    #[inline]
+    fn is_blocked(&self, ray: &Ray) -> bool {
+        let is_hit = match &self.many {
+            Some(many) => many.is_hit(ray, ray.length),
+            None => self.few.is_hit(ray, ray.length),
+        };
+        is_hit || self.triangles.as_ref().is_some_and(|t| t.is_hit(ray, ray.length))
+    }
+}
