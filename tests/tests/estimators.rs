@@ -77,7 +77,7 @@ fn one_light_at_a_time_has_the_same_mean_as_all_of_them() {
     let lights = [lamp(0.0, 1.0), lamp(2.5, 3.0), sun, lamp(-0.5, 0.2)];
     let x = Vec3::new(-0.4, 0.1, 0.3);
     let phase = medium.medium.phase;
-    let mut estimate = |one_light: bool| {
+    let estimate = |one_light: bool| {
         let settings = Settings { one_light, ..Settings::new(STEPS) };
         let walk = Walk { medium: &medium, scene: &Empty, lights: &lights, settings };
         let one = |i| multiple_scatter::sample(&walk, x, Vec3::X, &phase, NO_SURFACE, 64, &mut Generator::new(i)).value;
