@@ -54,7 +54,6 @@ pub fn eye_ray(
 ) -> EyeRay {
     let to_eye = -ray.direction;
     let mut radiance = Spectrum::ZERO;
-    // Thickness rather than transmittance is summed: its rounding does not compound.
     let mut thickness = Spectrum::ZERO;
     let mut at = 0.0_f32;
     let mut left = MAX_STEPS;
@@ -68,6 +67,7 @@ pub fn eye_ray(
             continue;
         }
         let constant = stretch.is_constant();
+        let (entry, before) = (at, thickness);
         // A host's step of 0 or NaN must still lead on.
         let least = if until.is_finite() { (until - at) * 1e-6 } else { 1e-6 };
         while at < until && left > 0 {
@@ -106,7 +106,8 @@ pub fn eye_ray(
                 }
                 radiance += transmittance * weight * source;
             }
-            thickness += extinction * length;
+            // From the stretch's beginning where it can be: the rounding of many steps adds up.
+            thickness = if constant { before + extinction * (end - entry) } else { thickness + extinction * length };
             at = end;
         }
     }

@@ -63,10 +63,21 @@ pub fn value_with_gradient(coefficients: &[Coefficient], direction: Vec3) -> (Sp
     })
 }
 
+#[inline]
 fn with_basis<R>(count: usize, direction: Vec3, f: impl FnOnce(&[f32]) -> R) -> R {
-    let mut basis = [0.0; MAX_COEFFICIENTS];
-    let Some(degree) = degree_of(count) else { return f(&[]) };
-    let basis = &mut basis[..super::coefficient_count(degree)];
-    evaluate(direction, degree, basis);
-    f(basis)
+    // Clearing room for the highest degree would take longer than evaluating degree 2.
+    match count {
+        0 => f(&[]),
+        1..16 => sized::<9, R>(count, direction, f),
+        16..64 => sized::<49, R>(count, direction, f),
+        _ => sized::<MAX_COEFFICIENTS, R>(count, direction, f),
+    }
+}
+
+#[inline]
+fn sized<const ROOM: usize, R>(count: usize, direction: Vec3, f: impl FnOnce(&[f32]) -> R) -> R {
+    let mut basis = [0.0; ROOM];
+    let degree = degree_of(count.min(ROOM)).unwrap_or(0);
+    evaluate(direction, degree, &mut basis);
+    f(&basis[..super::coefficient_count(degree)])
 }

@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use super::{MAX_COEFFICIENTS, coefficient_count, evaluate, evaluate_with_gradients};
+use super::{MAX_COEFFICIENTS, evaluate, evaluate_with_gradients};
 use crate::spectrum::{Gradient, Spectrum};
 
 /// Coefficients of `p(axis · ω)` as a function of `ω`, given its Legendre moments `f_0 … f_L`.
@@ -33,19 +33,34 @@ pub fn coefficients(moments: &[Spectrum], axis: Vec3, out: &mut [Spectrum]) {
 
 /// [`coefficients`] with their gradients when the axis is the direction of light from a fixed
 /// point `distance` (m) away: `∇c_lm = f_l ∇Y_lm(u(x))`. Calls `visit(k, c_k, ∇c_k)`.
+#[inline]
 pub fn coefficients_with_gradients(
+    moments: &[Spectrum],
+    axis: Vec3,
+    distance: f32,
+    visit: impl FnMut(usize, Spectrum, Gradient),
+) {
+    // Room for what is needed: clearing that of the highest degree would take longer than degree 2.
+    match moments.len() {
+        0 => {}
+        1..=3 => sized::<9>(moments, axis, distance, visit),
+        4..=7 => sized::<49>(moments, axis, distance, visit),
+        _ => sized::<MAX_COEFFICIENTS>(moments, axis, distance, visit),
+    }
+}
+
+#[inline]
+fn sized<const ROOM: usize>(
     moments: &[Spectrum],
     axis: Vec3,
     distance: f32,
     mut visit: impl FnMut(usize, Spectrum, Gradient),
 ) {
-    let (mut basis, mut slopes) = ([0.0; MAX_COEFFICIENTS], [Vec3::ZERO; MAX_COEFFICIENTS]);
-    let Some(degree) = moments.len().checked_sub(1) else { return };
-    let count = coefficient_count(degree.min(super::MAX_DEGREE));
-    evaluate_with_gradients(axis, degree, &mut basis[..count], &mut slopes[..count]);
+    let (mut basis, mut slopes) = ([0.0; ROOM], [Vec3::ZERO; ROOM]);
+    evaluate_with_gradients(axis, moments.len() - 1, &mut basis, &mut slopes);
     // From infinity the direction does not change; 1/∞ = 0 says so.
     let inverse = 1.0 / distance;
-    for_each(moments, count, |l, k| {
+    for_each(moments, ROOM, |l, k| {
         visit(k, moments[l] * basis[k], Gradient::outer(moments[l], slopes[k] * inverse));
     });
 }
