@@ -135,7 +135,7 @@ fn sampling(out: &mut Digest) {
         out.float(mis::balance(u.x, u.y));
         out.float(mis::power(u.x, u.y));
         let weights = colour(&mut rng).0;
-        out.option(discrete::choose(3, |i| weights[i], u.x), |out, choice| {
+        out.option(discrete::choose(weights.map(|w| (w, ())), u.x), |out, ((), choice)| {
             out.int(choice.index as u64);
             out.float(choice.probability);
             out.float(choice.remainder);
