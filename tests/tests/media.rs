@@ -650,7 +650,7 @@ fn overlapping_media_add_and_mix() {
     let ray = Ray::new(Vec3::ZERO, Vec3::X);
     assert_eq!(none.stretch(&ray, 0.0), Empty.stretch(&ray, 0.0));
     let lobe = |i: usize| Lobe::HenyeyGreenstein { g: 0.1 * i as f32 };
-    let five: [_; 5] = std::array::from_fn(|i| Homogeneous::new(ABSORPTION, SCATTERING, lobe(i)).unwrap());
+    let five: [_; 5] = core::array::from_fn(|i| Homogeneous::new(ABSORPTION, SCATTERING, lobe(i)).unwrap());
     assert_eq!(Overlap::new(&five, Homogeneous::phase), Err(MediumError::TooManyLobes));
 }
 
@@ -874,7 +874,11 @@ fn measure(name: &str, medium: &impl Medium, rays: &[Ray], points: &[Vec3]) {
                     let stretch = medium.stretch(ray, t);
                     let bound = stretch.majorant.max_element();
                     let end = stretch.until.min(END);
-                    while bound > 0.0 {
+                    if bound == 0.0 {
+                        t = end;
+                        continue;
+                    }
+                    loop {
                         t -= float::ln(1.0 - uniform(&mut rng)) / bound;
                         if t >= end {
                             break;
