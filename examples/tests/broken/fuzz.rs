@@ -161,8 +161,8 @@ fn fuzz_meshes() {
 
 #[test]
 fn fuzz_images() {
-    let npy = b"\x93NUMPY\x01\x00\x46\x00{'descr': '<f4', 'fortran_order': False, 'shape': (1, 2, 3), }        \n";
-    let npy = [npy.as_slice(), &[0; 24]].concat();
+    let header = b"{'descr': '<f4', 'fortran_order': False, 'shape': (1, 2, 3), }\n";
+    let npy = [b"\x93NUMPY\x01\x00", &(header.len() as u16).to_le_bytes()[..], header, &[0; 24]].concat();
     let hdr = b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 1 +X 2\n\x80\x80\x80\x80\x80\x80\x80\x80".to_vec();
     for (extension, seed) in [("npy", npy), ("hdr", hdr), ("pfm", sky())] {
         assert!(Picture::from_bytes(Path::new("i"), extension, &seed).is_ok(), "{extension}");
