@@ -63,6 +63,10 @@ pub(super) fn choose(
     choice: f32,
     u: Vec2,
 ) -> Option<(LightSample, f32)> {
+    if let [light] = lights {
+        // What cannot be reached, sampling itself finds out.
+        return if in_medium && is_near(light, point) { None } else { Some((light.sample(point, u)?, 1.0)) };
+    }
     let weighted = lights.iter().map(|light| (importance(light, point, in_medium), light));
     let (light, chosen) = discrete::choose(weighted, choice)?;
     Some((light.sample(point, u)?, chosen.probability))

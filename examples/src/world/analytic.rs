@@ -1,9 +1,9 @@
-//! Flat pieces, spheres and boxes, four at a time: loops over lanes that compile to SIMD.
+//! Flat pieces, spheres and boxes, eight at a time: loops over lanes that compile to SIMD.
 
 use fogbow::math::{Bounds, Ray, Vec3};
 
-/// Width of the loops; baseline x86-64 has registers of four.
-const LANES: usize = 4;
+/// Width of the loops: one register of x86-64-v3, two of the baseline's.
+const LANES: usize = 8;
 
 type Lanes = [f32; LANES];
 
@@ -43,28 +43,28 @@ pub(super) enum Primitive {
 }
 
 impl Primitive {
-    /// The outward normal (unit; not normalised for boxes) at a point of the surface.
+    /// The outward normal (unit) at a point of the surface.
     pub(super) fn normal(&self, point: Vec3) -> Vec3 {
         match self {
             Self::Flat { normal, .. } => *normal,
             Self::Sphere { centre, radius } => ((point - centre) / *radius).normalize(),
             Self::Box { rows } => {
-                let mut best = (0.0_f32, Vec3::Z);
+                // Of the three coordinates, the one nearest to ±1 tells the face.
+                let (mut largest, mut outward) = (0.0_f32, Vec3::Z);
                 for (gradient, start) in rows {
                     let coordinate = gradient.dot(point) + start;
-                    // Opposite faces share a direction.
-                    if coordinate.abs() > best.0 {
-                        best = (coordinate.abs(), gradient.normalize() * coordinate.signum());
+                    if coordinate.abs() > largest {
+                        (largest, outward) = (coordinate.abs(), *gradient * coordinate.signum());
                     }
                 }
-                best.1
+                outward.normalize()
             }
         }
     }
 
     /// Distance to the nearest hit within `(0, length)`, or infinity.
     pub(super) fn distance(&self, ray: &Ray, length: f32) -> f32 {
-        // One lane of four carries the primitive: what is measured alone is what is measured in
+        // One lane of eight carries the primitive: what is measured alone is what is measured in
         // company.
         match self {
             Self::Flat { .. } => FlatChunk::of(core::slice::from_ref(self)).distances(ray, &[length; LANES])[0],
@@ -83,9 +83,9 @@ impl Primitive {
     }
 }
 
-/// Up to four flat pieces.
+/// Up to eight flat pieces.
 #[derive(Debug, Clone, Copy, Default)]
-#[repr(align(16))]
+#[repr(align(32))]
 struct FlatChunk {
     normal: [Lanes; 3],
     offset: Lanes,
@@ -144,9 +144,9 @@ impl FlatChunk {
     }
 }
 
-/// Up to four spheres.
+/// Up to eight spheres.
 #[derive(Debug, Clone, Copy)]
-#[repr(align(16))]
+#[repr(align(32))]
 struct SphereChunk {
     centre: [Lanes; 3],
     radius2: Lanes,
@@ -191,9 +191,9 @@ impl SphereChunk {
     }
 }
 
-/// Up to four boxes.
+/// Up to eight boxes.
 #[derive(Debug, Clone, Copy)]
-#[repr(align(16))]
+#[repr(align(32))]
 struct BoxChunk {
     rows: [[Lanes; 4]; 3],
 }
