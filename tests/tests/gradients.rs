@@ -269,6 +269,42 @@ fn frozen(medium: &impl Medium, source: &Source, x: Vec3, to_eye: Vec3, steps: &
     total
 }
 
+/// A number of any size and sign.
+fn wild() -> impl Strategy<Value = f32> {
+    prop_oneof![
+        Just(0.0_f32),
+        (-38.0..38.0_f32, any::<bool>()).prop_map(|(e, s)| {
+            let size = 10.0_f32.powf(e);
+            if s { size } else { -size }
+        })
+    ]
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 4000, failure_persistence: None, rng_seed: RngSeed::Fixed(2), ..ProptestConfig::default() })]
+
+    #[test]
+    fn connections_of_any_size_are_numbers(
+        source in source(), x in (wild(), wild(), wild()), position in (wild(), wild(), wild()), weight in wild(),
+        extinction in wild(), to_eye in direction(), lobe in lobe(), straight in any::<bool>(), beyond in 0.0..1e-4_f32,
+    ) {
+        let (x, position) = (Vec3::new(x.0, x.1, x.2), Vec3::new(position.0, position.1, position.2));
+        let source = Source { position, weight: Spectrum::splat(weight.abs()), ..source };
+        let to_eye = if straight { -Ray::between(x, position).direction } else { to_eye };
+        let lobe = if beyond < 5e-5 { Lobe::HenyeyGreenstein { g: 1.0 - 2.0 * beyond.max(1e-5) } } else { lobe };
+        let medium = Analytic::grey(Field::Homogeneous { a: extinction.abs() }, 0.5);
+        let l = connect(x, to_eye, &lobe.into(), &medium, &source, EXACT);
+        prop_assert!(l.radiance.is_valid() && l.gradient.is_finite(), "{l:?}");
+        let mut expansion = [Coefficient::ZERO; 49];
+        if let Some(arrival) = Arrival::from_source(x, &medium, &source, EXACT, 0.0) {
+            arrival.scatter_directional(&moments(&lobe.into(), 6)[..7], 1.0, &mut expansion);
+        }
+        for c in expansion {
+            prop_assert!(c.value.is_finite() && c.gradient.is_finite(), "{c:?}");
+        }
+    }
+}
+
 #[test]
 fn degenerate_connections_have_defined_answers() {
     let fog = Analytic::grey(Field::Homogeneous { a: 60.0 }, 1.0);
