@@ -162,7 +162,7 @@ fn choices_and_what_they_leave_over() {
         "choose",
         [0.0, 5.0],
         SAMPLES,
-        |u, _| discrete::choose(5, |i| weights[i], u.x).map(|c| c.index as f64 + f64::from(c.remainder)),
+        |u, _| discrete::choose(weights.map(|w| (w, ())), u.x).map(|((), c)| c.index as f64 + f64::from(c.remainder)),
         density,
     );
     let mut table = weights;

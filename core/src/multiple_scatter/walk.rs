@@ -218,8 +218,9 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Walk<'_, M, S> {
     ) -> Contribution {
         let mut sum = Contribution::ZERO;
         if self.settings.one_light {
-            if let Some(choice) = choose(self.lights.len(), |i| importance(&self.lights[i]), uniform(rng)) {
-                sum += connect(&self.lights[choice.index], choice.probability, rng).unwrap_or_default();
+            let weighted = self.lights.iter().map(|light| (importance(light), light));
+            if let Some((light, choice)) = choose(weighted, uniform(rng)) {
+                sum += connect(light, choice.probability, rng).unwrap_or_default();
             }
             return sum;
         }

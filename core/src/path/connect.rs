@@ -63,9 +63,9 @@ pub(super) fn choose(
     choice: f32,
     u: Vec2,
 ) -> Option<(LightSample, f32)> {
-    let chosen = discrete::choose(lights.len(), |i| importance(&lights[i], point, in_medium), choice)?;
-    let sample = lights[chosen.index].sample(point, u)?;
-    Some((sample, chosen.probability))
+    let weighted = lights.iter().map(|light| (importance(light, point, in_medium), light));
+    let (light, chosen) = discrete::choose(weighted, choice)?;
+    Some((light.sample(point, u)?, chosen.probability))
 }
 
 /// Transmittance times visibility between `origin` and a light, 0 or more per channel.
@@ -124,20 +124,13 @@ pub(super) fn along<M: Medium + ?Sized, S: Scene + ?Sized>(
     let lights = world.lights;
     let around =
         |pivot: Vec3, (near, far): (f32, f32)| Equiangular::new(segment.origin, segment.direction, pivot, near, far);
-    let strength = |i: usize| {
-        let light = &lights[i];
-        let Some(interval) = light.near_interval(segment, near, far) else { return 0.0 };
-        if lights.len() == 1 {
-            return 1.0;
-        }
-        let centre = light.near_field().map(|field| field.centre());
-        centre.and_then(|centre| around(centre, interval)).map_or(0.0, |e| e.weight() * light.intensity())
-    };
-    let Some(chosen) = discrete::choose(lights.len(), strength, random.0) else {
-        return Spectrum::ZERO;
-    };
-    let light = &lights[chosen.index];
-    let Some(interval) = light.near_interval(segment, near, far) else {
+    let reached = lights.iter().filter_map(|light| {
+        let interval = light.near_interval(segment, near, far)?;
+        let centre = light.near_field()?.centre();
+        let strength = if lights.len() == 1 { 1.0 } else { around(centre, interval)?.weight() * light.intensity() };
+        Some((strength, (light, interval)))
+    });
+    let Some(((light, interval), chosen)) = discrete::choose(reached, random.0) else {
         return Spectrum::ZERO;
     };
     let Some((pivot, source)) = light.anchor(random.2) else {

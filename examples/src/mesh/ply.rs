@@ -116,6 +116,9 @@ fn read_header<'b>(file: &Path, bytes: &'b [u8]) -> Result<(Header, &'b [u8]), D
             if line.is_empty() { reason.to_owned() } else { format!("\"{line}\": {reason}") },
         )
     };
+    if !bytes.starts_with(b"ply") {
+        return Err(fail("", "the file does not begin with \"ply\""));
+    }
     let mut rest = bytes;
     let mut next = || -> Result<&'b str, DataError> {
         let end = rest.iter().position(|b| *b == b'\n').ok_or_else(|| fail("", "end_header is missing"))?;

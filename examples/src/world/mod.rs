@@ -15,6 +15,8 @@ mod build;
 mod lights;
 mod many;
 mod media;
+#[cfg(test)]
+mod tests;
 mod triangles;
 
 use fogbow::host::{Hit, Scene};

@@ -7,6 +7,7 @@
 #![no_std]
 
 mod digest;
+mod estimates;
 mod media;
 mod sections;
 mod walks;

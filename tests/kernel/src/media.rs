@@ -52,7 +52,9 @@ pub(crate) fn each(mut question: impl FnMut(&dyn Medium)) -> Result<(), MediumEr
     question(&grid(Density::U8(&bytes), second)?.with_absorption_grid(Density::F32(&floats), third)?);
 
     let shape = FractalNoise { frequency: 0.7, offset: 0.1, ..FractalNoise::default() };
-    question(&Noise::new(shape, Spectrum::splat(0.1), Spectrum::splat(0.8), Lobe::Rayleigh)?);
+    let noise = Noise::new(shape, Spectrum::splat(0.1), Spectrum::splat(0.8), Lobe::Rayleigh)?;
+    // Placed: a march to infinity through endless noise takes long.
+    question(&Placed::new(noise, ball));
 
     let both = [Placed::new(grey, ball), Placed::new(grey, Region::unit_cube(turned)?)];
     question(&Overlap::new(&both, |placed| placed.medium().phase())?);

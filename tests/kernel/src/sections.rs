@@ -12,7 +12,7 @@ use fogbow::spectrum::{Gradient, Hessian, Spectrum};
 use fogbow::storage::List;
 use fogbow::surface::Surface;
 
-use crate::{Digest, Section, media, walks};
+use crate::{Digest, Section, estimates, media, walks};
 
 /// Every section, lowest layer first.
 pub const SECTIONS: &[Section] = &[
@@ -20,12 +20,17 @@ pub const SECTIONS: &[Section] = &[
     Section { name: "spectrum", run: spectrum },
     Section { name: "storage", run: storage },
     Section { name: "sampling", run: sampling },
+    Section { name: "sh", run: estimates::spherical_harmonics },
     Section { name: "phase", run: phase },
     Section { name: "surface", run: surface },
     Section { name: "host", run: host },
     Section { name: "medium", run: media::medium },
     Section { name: "light", run: light },
     Section { name: "transmittance", run: media::transmittance },
+    Section { name: "thickness", run: estimates::thickness },
+    Section { name: "single_scatter", run: estimates::single_scatter },
+    Section { name: "march", run: estimates::march },
+    Section { name: "multiple_scatter", run: estimates::multiple_scatter },
     Section { name: "path", run: walks::path },
 ];
 
@@ -130,7 +135,7 @@ fn sampling(out: &mut Digest) {
         out.float(mis::balance(u.x, u.y));
         out.float(mis::power(u.x, u.y));
         let weights = colour(&mut rng).0;
-        out.option(discrete::choose(3, |i| weights[i], u.x), |out, choice| {
+        out.option(discrete::choose(weights.map(|w| (w, ())), u.x), |out, ((), choice)| {
             out.int(choice.index as u64);
             out.float(choice.probability);
             out.float(choice.remainder);

@@ -3,6 +3,7 @@
 use fogbow::host::{Hit, Scene};
 use fogbow::light::{Light, PointLight, QuadLight, SphereLight};
 use fogbow::math::{Ray, Vec3, float};
+use fogbow::medium::MediumError;
 use fogbow::path::{self, Settings, World};
 use fogbow::sampling::Generator;
 use fogbow::spectrum::Spectrum;
@@ -15,7 +16,7 @@ use crate::{Digest, media};
 const PATHS: usize = 64;
 
 /// A shining ball over a floor, beside a mirror ball and a glass ball.
-struct Balls;
+pub(crate) struct Balls;
 
 impl Scene for Balls {
     fn closest_hit(&self, ray: &Ray) -> Option<Hit> {
@@ -70,9 +71,8 @@ pub(crate) fn path(out: &mut Digest) {
     out.int(u64::from(traced));
 }
 
-/// Traces paths through every medium; whether all could be made.
-fn paths(mut each: impl FnMut(path::Radiance)) -> bool {
-    let mut rng = Generator::new(11);
+/// Calls `f` with lights of several kinds, the ball's first; whether they and all media could be made.
+pub(crate) fn with_lights(f: impl FnOnce(&[Light<'_>]) -> Result<(), MediumError>) -> bool {
     let white = Spectrum::new(3.0, 2.0, 1.0);
     let lights = [
         SphereLight::new(SHINING.0, SHINING.1, white).map(Light::Sphere),
@@ -81,17 +81,23 @@ fn paths(mut each: impl FnMut(path::Radiance)) -> bool {
         Ok(Light::Constant(Spectrum::splat(0.1))),
     ];
     let [Ok(a), Ok(b), Ok(c), Ok(d)] = lights else { return false };
-    let lights = [a, b, c, d];
+    f(&[a, b, c, d]).is_ok()
+}
+
+/// Traces paths through every medium; whether all could be made.
+fn paths(mut each: impl FnMut(path::Radiance)) -> bool {
+    let mut rng = Generator::new(11);
     let settings = Settings { max_scatterings: 12, ..Settings::default() };
-    let asked = media::each(|medium| {
-        let world = World { medium, scene: &Balls, lights: &lights };
-        for _ in 0..PATHS {
-            let eye = Vec3::new(0.0, 0.5, -5.0);
-            let ray = Ray::new(eye, (point(&mut rng) * 0.5 - eye).normalize());
-            each(path::radiance(&ray, &world, &settings, &mut rng));
-        }
-    });
-    asked.is_ok()
+    with_lights(|lights| {
+        media::each(|medium| {
+            let world = World { medium, scene: &Balls, lights };
+            for _ in 0..PATHS {
+                let eye = Vec3::new(0.0, 0.5, -5.0);
+                let ray = Ray::new(eye, (point(&mut rng) * 0.5 - eye).normalize());
+                each(path::radiance(&ray, &world, &settings, &mut rng));
+            }
+        })
+    })
 }
 
 #[cfg(test)]

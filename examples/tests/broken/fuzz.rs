@@ -1,0 +1,171 @@
+//! Mutations of good files, from a fixed seed: whatever comes out, nothing may panic.
+//!
+//! A second per reader; `FOGBOW_FUZZ_SECONDS=300 cargo test -p fogbow-examples fuzz` for more.
+
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+use fogbow::host::Scene;
+use fogbow::math::{Ray, Vec2, Vec3};
+use fogbow_examples::mesh::Mesh;
+use fogbow_examples::picture::Picture;
+use fogbow_examples::scene_file::SceneFile;
+use fogbow_examples::volume::Volume;
+use fogbow_examples::world::{Storage, World};
+
+use crate::common::{Folder, OBJ, PLY, SCENE, densities, sky, volume};
+
+/// xorshift64.
+struct Random(u64);
+
+impl Random {
+    fn next(&mut self) -> u64 {
+        self.0 ^= self.0 << 13;
+        self.0 ^= self.0 >> 7;
+        self.0 ^= self.0 << 17;
+        self.0
+    }
+    fn below(&mut self, n: usize) -> usize {
+        (self.next() % n.max(1) as u64) as usize
+    }
+}
+
+/// Words that readers may stumble over.
+const WORDS: &[&str] = &[
+    "nan",
+    "inf",
+    "-1",
+    "0",
+    "1e39",
+    "1e-45",
+    "4294967295",
+    "-2147483648",
+    "99999999999999999999",
+    "$spp",
+    "<",
+    ">",
+    "\"",
+    "/>",
+    "&amp;",
+    "&#0;",
+    "<!--",
+    "]]>",
+    "\u{feff}",
+    "id=\"smoke\"",
+    "type=\"cube\"",
+    "0 0 0",
+    "",
+    "180",
+    "1e18",
+    "x=\"1e9\"",
+];
+
+fn mutate(good: &[u8], random: &mut Random) -> Vec<u8> {
+    let mut bytes = good.to_vec();
+    for _ in 0..=random.below(4) {
+        let at = random.below(bytes.len());
+        let length = random.below(24).min(bytes.len() - at);
+        match random.below(8) {
+            0 => bytes.truncate(at),
+            1 => drop(bytes.drain(at..at + length)),
+            2 => {
+                let copy = bytes[at..at + length].to_vec();
+                let to = random.below(bytes.len());
+                bytes.splice(to..to, copy);
+            }
+            3 if at < bytes.len() => bytes[at] ^= 1 << random.below(8),
+            4 if at < bytes.len() => bytes[at] = [0, 1, 0x7F, 0x80, 0xFF, b'0', b'9', b'-'][random.below(8)],
+            // A number becomes another word.
+            5 | 6 => {
+                let is_number = |b: &u8| b.is_ascii_digit() || *b == b'.' || *b == b'-';
+                if let Some(start) = bytes.iter().skip(at).position(is_number).map(|i| i + at) {
+                    let end = bytes.iter().skip(start).position(|b| !is_number(b)).map_or(bytes.len(), |i| i + start);
+                    let word = WORDS[random.below(WORDS.len())];
+                    bytes.splice(start..end, word.bytes());
+                }
+            }
+            _ => {
+                let word = WORDS[random.below(WORDS.len())];
+                bytes.splice(at..at, word.bytes());
+            }
+        }
+    }
+    bytes
+}
+
+/// Feeds mutations of the seeds to a reader.
+fn fuzz(seeds: &[Vec<u8>], mut read: impl FnMut(&[u8])) {
+    let seconds = std::env::var("FOGBOW_FUZZ_SECONDS").ok().and_then(|s| s.parse().ok()).unwrap_or(1);
+    let (start, limit) = (Instant::now(), Duration::from_secs(seconds));
+    let mut random = Random(0x2545_F491_4F6C_DD1D);
+    let mut rounds = 0_u64;
+    while start.elapsed() < limit {
+        for seed in seeds {
+            read(&mutate(seed, &mut random));
+            rounds += 1;
+        }
+    }
+    println!("{rounds} rounds");
+}
+
+#[test]
+fn fuzz_scenes() {
+    let folder = Folder::new("fuzz");
+    let file = folder.path("scene.xml");
+    let mut built = 0;
+    fuzz(&[SCENE.as_bytes().to_vec()], |bytes| {
+        let text = String::from_utf8_lossy(bytes);
+        let Ok(scene) = SceneFile::parse(&file, &text) else { return };
+        let mut storage = Storage::new(&scene);
+        let Ok(world) = World::new(&scene, &mut storage) else { return };
+        built += 1;
+        let camera = world.camera();
+        for i in 0..16 {
+            let ray = camera.ray(Vec2::new(i as f32 / 15.0, 0.4));
+            if let Some(hit) = world.closest_hit(&ray) {
+                assert!(hit.distance > 0.0 && (hit.normal.length() - 1.0).abs() < 1e-3, "{hit:?} in\n{text}");
+            }
+            world.is_blocked(&Ray::between(ray.origin, Vec3::ZERO));
+        }
+    });
+    println!("{built} scenes were sound");
+    assert!(built > 0);
+}
+
+#[test]
+fn fuzz_volumes() {
+    let seeds = [
+        volume([2, 2, 2], 1, 1, &densities([0.5; 8])),
+        volume([2, 2, 2], 3, 1, &[9; 8]),
+        volume([1, 1, 8], 3, 1, &[9; 8]),
+    ];
+    fuzz(&seeds, |bytes| drop(Volume::from_bytes(Path::new("g.vol"), bytes)));
+}
+
+#[test]
+fn fuzz_meshes() {
+    let mut binary = b"ply\nformat binary_little_endian 1.0\nelement vertex 3\nproperty float x\nproperty double y\n\
+        property float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n"
+        .to_vec();
+    for vertex in [[0.0_f32, 0.0], [1.0, 0.0], [0.0, 2.0]] {
+        binary.extend(vertex[0].to_le_bytes());
+        binary.extend(f64::from(vertex[1]).to_le_bytes());
+        binary.extend(0.5_f32.to_le_bytes());
+    }
+    binary.push(3);
+    binary.extend([0_i32, 1, 2].iter().flat_map(|i| i.to_le_bytes()));
+    assert!(Mesh::from_ply(Path::new("m.ply"), &binary).is_ok());
+    fuzz(&[PLY.as_bytes().to_vec(), binary], |bytes| drop(Mesh::from_ply(Path::new("m.ply"), bytes)));
+    fuzz(&[OBJ.as_bytes().to_vec()], |bytes| drop(Mesh::from_obj(Path::new("m.obj"), bytes)));
+}
+
+#[test]
+fn fuzz_images() {
+    let header = b"{'descr': '<f4', 'fortran_order': False, 'shape': (1, 2, 3), }\n";
+    let npy = [b"\x93NUMPY\x01\x00", &(header.len() as u16).to_le_bytes()[..], header, &[0; 24]].concat();
+    let hdr = b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 1 +X 2\n\x80\x80\x80\x80\x80\x80\x80\x80".to_vec();
+    for (extension, seed) in [("npy", npy), ("hdr", hdr), ("pfm", sky())] {
+        assert!(Picture::from_bytes(Path::new("i"), extension, &seed).is_ok(), "{extension}");
+        fuzz(&[seed], |bytes| drop(Picture::from_bytes(Path::new("i"), extension, bytes)));
+    }
+}
