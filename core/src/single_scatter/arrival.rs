@@ -172,7 +172,7 @@ impl Arrival {
         if scattered.radiance.is_finite() && scattered.gradient.is_finite() { scattered } else { Contribution::ZERO }
     }
 
-    /// Scattered once in all directions: adds `visible` times the coefficients and their gradients
+    /// Scattered once in all directions: adds `weight` times the coefficients and their gradients
     /// to `expansion`, and returns the mean over directions, `E/(4π)`.
     ///
     /// ```text
@@ -180,6 +180,7 @@ impl Arrival {
     /// ```
     ///
     /// Source: Jarosz et al. 2008, Eq. 23–26; sheet § 1.6. The expansion is evaluated at `to_eye`.
+    /// As many whole degrees take part as have a moment and fit into `expansion`.
     pub fn scatter_directional(
         &self,
         moments: &[Spectrum],
