@@ -34,11 +34,16 @@ pub const NOT_YET: &[&str] = &[
     "vpl",
 ];
 
-/// The folder named by `FOGBOW_GOLDEN_DIR`, else the repository's own.
+/// The folder named by `FOGBOW_GOLDEN_DIR`, else the repository's own. A relative name counts from
+/// where the command was typed if that is this package or the repository's top.
 #[must_use]
 pub fn folder() -> PathBuf {
-    std::env::var_os("FOGBOW_GOLDEN_DIR")
-        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("golden"), PathBuf::from)
+    let package = Path::new(env!("CARGO_MANIFEST_DIR"));
+    match std::env::var_os("FOGBOW_GOLDEN_DIR").map(PathBuf::from) {
+        None => package.join("golden"),
+        Some(named) if named.is_dir() => named,
+        Some(named) => package.join("..").join(named),
+    }
 }
 
 /// A golden file.

@@ -57,6 +57,12 @@ impl Weight {
     }
 
     /// Light at the last vertex, carried to the first: `(W L, L ∇W + W ∇L)`.
+    ///
+    /// ```
+    /// # use fogbow::{multiple_scatter::Weight, single_scatter::Contribution, spectrum::{Gradient, Spectrum}};
+    /// let light = Contribution { radiance: Spectrum::ONE, gradient: Gradient::ZERO };
+    /// assert_eq!(Weight::ONE.scaled(0.5).carry(&light).radiance, Spectrum::splat(0.5));
+    /// ```
     #[inline]
     #[must_use]
     pub fn carry(&self, light: &Contribution) -> Contribution {

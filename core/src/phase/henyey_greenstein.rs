@@ -61,14 +61,19 @@ pub fn derivative(deflection: Deflection, g: f32) -> f32 {
 #[inline]
 #[must_use]
 pub fn sample(u: f32, g: f32) -> CosineSample {
-    let e = if g >= 0.0 { (1.0 - g) + 2.0 * g * u } else { (1.0 + g) - 2.0 * g * (1.0 - u) };
-    let (below, above) = (1.0 - g, 1.0 + g);
-    let (below_e, above_e) = (below / e, above / e);
     let v = 1.0 - u;
+    let (below, above) = (1.0 - g, 1.0 + g);
+    // e, 1 − g(1−u) and 1 + g u, none of which may cancel: next to ±1 a rounded 1 − u would show.
+    let (e, near, far) = if g >= 0.0 {
+        (below + 2.0 * g * u, below + g * u, 1.0 + g * u)
+    } else {
+        (above - 2.0 * g * v, 1.0 - g * v, above - g * v)
+    };
+    let (below_e, above_e) = (below / e, above / e);
     let inverse = 1.0 / (below * above);
     CosineSample::from_poles(
-        2.0 * below_e * below_e * v * (1.0 + g * u),
-        2.0 * above_e * above_e * u * (1.0 - g * v),
+        2.0 * below_e * below_e * v * far,
+        2.0 * above_e * above_e * u * near,
         e * inverse * e * inverse * e / (4.0 * PI),
     )
 }

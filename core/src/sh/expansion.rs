@@ -40,6 +40,14 @@ pub fn dot(coefficients: &[Spectrum], basis: &[f32]) -> Spectrum {
 }
 
 /// Value of an expansion in `direction` (unit); its degree follows from the number of coefficients.
+///
+/// ```
+/// # use fogbow::{math::Vec3, sh::expansion, spectrum::Spectrum};
+/// let mut coefficients = [Spectrum::ZERO; 4];
+/// coefficients[2] = Spectrum::ONE;   // Y₁₀ = √(3/4π) z
+/// assert_eq!(expansion::value(&coefficients, Vec3::X), Spectrum::ZERO);
+/// assert!((expansion::value(&coefficients, Vec3::Z)[0] - 0.48860251).abs() < 1e-7);
+/// ```
 #[must_use]
 pub fn value(coefficients: &[Spectrum], direction: Vec3) -> Spectrum {
     with_basis(coefficients.len(), direction, |basis| dot(coefficients, basis))

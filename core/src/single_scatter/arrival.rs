@@ -97,9 +97,7 @@ impl Arrival {
         if irradiance.is_black() && slope == Gradient::ZERO {
             return None;
         }
-        let arrival = Self::through(&ray, medium, irradiance, slope, marching);
-        // Within about 10⁻¹² m of a strong source 1/r³ leaves the range of f32: as at the source itself.
-        (arrival.irradiance.is_finite() && arrival.gradient.is_finite()).then_some(arrival)
+        Self::through(&ray, medium, irradiance, slope, marching)
     }
 
     /// Light from a surface that a ray from its origin has hit, the ray's direction being drawn with
@@ -131,27 +129,35 @@ impl Arrival {
         let irradiance = outgoing / pdf;
         let slope = (normal - u * (3.0 * cosine)) / cosine.max(MIN_HIT_COSINE) / hit.distance;
         let slope = Gradient::outer(irradiance, slope);
-        let arrival = Self::through(&ray.with_length(hit.distance), medium, irradiance, slope, marching);
-        (arrival.irradiance.is_finite() && arrival.gradient.is_finite()).then_some(arrival)
+        Self::through(&ray.with_length(hit.distance), medium, irradiance, slope, marching)
     }
 
+    /// `None` where the light or its slope leaves the range of `f32`, within about 10⁻¹² m of a strong
+    /// source: as at the source itself.
     fn through(
         ray: &Ray,
         medium: &(impl Medium + ?Sized),
         irradiance: Spectrum,
         slope: Gradient,
         marching: Marching,
-    ) -> Self {
+    ) -> Option<Self> {
+        // Room for the slopes of the basis functions, which come on top.
+        const MOST: f32 = 1e-6 * f32::MAX;
         let t = thickness::transmittance_with_gradients(ray, medium, marching);
-        Self {
+        let irradiance_here = irradiance * t.value;
+        let gradient = slope * t.value + t.gradient_fixed * irradiance;
+        let steepest = gradient.norm().max_element().max(irradiance_here.max_element() / ray.length);
+        // NaN, too, is not below.
+        (steepest < MOST && gradient.is_finite() && irradiance_here.max_element() < MOST).then_some(Self {
             to_light: ray.direction,
             distance: ray.length,
-            irradiance: irradiance * t.value,
-            gradient: slope * t.value + t.gradient_fixed * irradiance,
-        }
+            irradiance: irradiance_here,
+            gradient,
+        })
     }
 
-    /// Scattered once towards `to_eye` (unit): `L = p E`, `∇L = E ∇p + p ∇E`.
+    /// Scattered once towards `to_eye` (unit): `L = p E`, `∇L = E ∇p + p ∇E`. Nothing where that leaves
+    /// the range of `f32`.
     #[inline]
     #[must_use]
     pub fn scatter(&self, to_eye: Vec3, phase: &Phase) -> Contribution {
@@ -159,10 +165,14 @@ impl Arrival {
         let value = phase.value(deflection);
         let turn = deflection_gradient(self.to_light, to_eye, self.distance);
         let slope = Gradient::outer(phase.derivative(deflection), turn);
-        Contribution { radiance: value * self.irradiance, gradient: slope * self.irradiance + self.gradient * value }
+        let scattered = Contribution {
+            radiance: value * self.irradiance,
+            gradient: slope * self.irradiance + self.gradient * value,
+        };
+        if scattered.radiance.is_finite() && scattered.gradient.is_finite() { scattered } else { Contribution::ZERO }
     }
 
-    /// Scattered once in all directions: adds `visible` times the coefficients and their gradients
+    /// Scattered once in all directions: adds `weight` times the coefficients and their gradients
     /// to `expansion`, and returns the mean over directions, `E/(4π)`.
     ///
     /// ```text
@@ -170,6 +180,7 @@ impl Arrival {
     /// ```
     ///
     /// Source: Jarosz et al. 2008, Eq. 23–26; sheet § 1.6. The expansion is evaluated at `to_eye`.
+    /// As many whole degrees take part as have a moment and fit into `expansion`.
     pub fn scatter_directional(
         &self,
         moments: &[Spectrum],

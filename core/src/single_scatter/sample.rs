@@ -31,6 +31,13 @@ pub struct Directional<'a> {
 }
 
 /// The ray that asks whether `source` is hidden from `point`.
+///
+/// ```
+/// # use fogbow::{light::PointLight, math::Vec3, single_scatter::shadow_ray, spectrum::Spectrum};
+/// let lamp = PointLight::new(Vec3::X * 2.0, Spectrum::ONE).unwrap().source();
+/// let ray = shadow_ray(Vec3::ZERO, &lamp);
+/// assert!(ray.length < 2.0 && ray.length > 1.999);   // not into the lamp's own housing
+/// ```
 #[inline]
 #[must_use]
 pub fn shadow_ray(point: Vec3, source: &Source) -> Ray {
@@ -164,6 +171,20 @@ pub fn sample(
 
 /// [`sample`] for all directions at once: adds to the expansion's coefficients; the sums returned
 /// are of the mean over directions, `L₀₀ Y₀₀`.
+///
+/// ```
+/// # use fogbow::{host::Empty, light::{Light, Sun}, math::Vec3, phase::{Lobe, Phase}, sampling::Generator};
+/// # use fogbow::single_scatter::{Directional, moments, sample_directional};
+/// # use fogbow::{sh::{Coefficient, expansion}, spectrum::Spectrum, transmittance::thickness::Steps};
+/// let lights = [Light::Sun(Sun::new(Vec3::Z, Spectrum::ONE).unwrap())];
+/// let f = moments(&Phase::from(Lobe::HenyeyGreenstein { g: 0.4 }), 2);
+/// let mut coefficients = [Coefficient::ZERO; 9];
+/// let mut into = Directional { moments: &f[..3], coefficients: &mut coefficients };
+/// let steps = Steps::Length(0.1);
+/// sample_directional(Vec3::ZERO, &Empty, &Empty, &lights, 1, steps, &mut Generator::new(1), &mut into);
+/// let seen = |to_eye| expansion::value_with_gradient(&coefficients, to_eye).0[0];
+/// assert!(seen(Vec3::NEG_Z) > seen(Vec3::Z));   // brighter against the light
+/// ```
 pub fn sample_directional(
     point: Vec3,
     medium: &(impl Medium + ?Sized),
@@ -183,6 +204,15 @@ pub fn sample_directional(
 }
 
 /// Light from surfaces, scattered once at `point` towards `to_eye`: see [`visit_surfaces`].
+///
+/// ```
+/// # use fogbow::{host::Empty, math::Vec3, phase::Phase, sampling::Generator, spectrum::Spectrum};
+/// # use fogbow::{single_scatter::sample_surfaces, transmittance::thickness::Steps};
+/// let (phase, steps, mut rng) = (Phase::ISOTROPIC, Steps::Length(0.1), Generator::new(1));
+/// let glow = |_: &_, _: &_| Spectrum::ONE;
+/// let sums = sample_surfaces(Vec3::ZERO, Vec3::X, &phase, &Empty, &Empty, glow, 16, steps, &mut rng);
+/// assert_eq!(sums.value, Spectrum::ZERO);   // a world without surfaces
+/// ```
 #[must_use]
 pub fn sample_surfaces(
     point: Vec3,

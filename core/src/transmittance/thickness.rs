@@ -279,12 +279,28 @@ fn face_term(direction: Vec3, normal: Vec3, jump: Spectrum) -> Gradient {
 ///
 /// By Jensen's inequality slightly too high in the mean where extinction changes within a step;
 /// ratio tracking is unbiased.
+///
+/// ```
+/// # use fogbow::{host::Empty, math::{Ray, Vec3}, spectrum::Spectrum};
+/// # use fogbow::transmittance::thickness::{Marching, transmittance};
+/// let ray = Ray::new(Vec3::ZERO, Vec3::X);
+/// assert_eq!(transmittance(&ray, &Empty, Marching::midpoints(8)), Spectrum::ONE);
+/// ```
 #[must_use]
 pub fn transmittance(ray: &Ray, medium: &(impl Medium + ?Sized), marching: Marching) -> Spectrum {
     optical_thickness(ray, medium, marching).transmitted()
 }
 
 /// [`transmittance`] with both gradients: `∇T = −T ∇τ`.
+///
+/// ```
+/// # use fogbow::{math::{Ray, Vec3}, medium::Homogeneous, phase::Lobe, spectrum::Spectrum};
+/// # use fogbow::transmittance::thickness::{Marching, transmittance_with_gradients};
+/// let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::ONE, Lobe::Isotropic).unwrap();
+/// let ray = Ray::between(Vec3::ZERO, Vec3::X);
+/// let t = transmittance_with_gradients(&ray, &fog, Marching::midpoints(8));
+/// assert_eq!(t.gradient_fixed.x, t.value);   // d/dx e^{−(1 − x)}
+/// ```
 #[must_use]
 pub fn transmittance_with_gradients(ray: &Ray, medium: &(impl Medium + ?Sized), marching: Marching) -> Transmittance {
     optical_thickness_with_gradients(ray, medium, marching).transmittance()
