@@ -1,11 +1,37 @@
-//! Flat pieces, spheres and boxes, eight at a time: loops over lanes that compile to SIMD.
+//! Flat pieces, spheres and boxes, eight at a time.
 
 use fogbow::math::{Bounds, Ray, Vec3};
+use wide::{CmpGe, CmpGt, CmpLe, CmpLt, f32x8};
 
-/// Width of the loops: one register of x86-64-v3, two of the baseline's.
+/// One register of x86-64-v3, two of the baseline's.
+type Lanes = f32x8;
 const LANES: usize = 8;
 
-type Lanes = [f32; LANES];
+/// One vector per axis: the same in every lane, or one primitive a lane.
+type Lanes3 = [Lanes; 3];
+
+#[inline(always)]
+fn broadcast(v: Vec3) -> Lanes3 {
+    [Lanes::splat(v.x), Lanes::splat(v.y), Lanes::splat(v.z)]
+}
+
+#[inline(always)]
+fn dot(a: &Lanes3, b: &Lanes3) -> Lanes {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+/// Distances where `is_hit`, infinity elsewhere.
+#[inline(always)]
+fn where_hit(is_hit: Lanes, distances: Lanes) -> Lanes {
+    is_hit.blend(distances, Lanes::splat(f32::INFINITY))
+}
+
+/// Lane by lane from a table of one array a primitive.
+fn gather<const N: usize>(rows: &[[f32; N]], unused: [f32; N]) -> [Lanes; N] {
+    core::array::from_fn(|column| {
+        Lanes::from(core::array::from_fn(|lane| rows.get(lane).map_or(unused[column], |row| row[column])))
+    })
+}
 
 /// By how much the unit square of a flat piece is enlarged, so that no ray slips between two that
 /// share an edge: rounding moves a hit point by a few 10⁻⁷ of the piece. Invisible at 4 × 10⁻⁶.
@@ -67,9 +93,15 @@ impl Primitive {
         // One lane of eight carries the primitive: what is measured alone is what is measured in
         // company.
         match self {
-            Self::Flat { .. } => FlatChunk::of(core::slice::from_ref(self)).distances(ray, &[length; LANES])[0],
-            Self::Sphere { .. } => SphereChunk::of(core::slice::from_ref(self)).distances(ray, &[length; LANES])[0],
-            Self::Box { .. } => BoxChunk::of(core::slice::from_ref(self)).distances(ray, &[length; LANES])[0],
+            Self::Flat { .. } => {
+                FlatChunk::of(core::slice::from_ref(self)).distances(ray, Lanes::splat(length)).to_array()[0]
+            }
+            Self::Sphere { .. } => {
+                SphereChunk::of(core::slice::from_ref(self)).distances(ray, Lanes::splat(length)).to_array()[0]
+            }
+            Self::Box { .. } => {
+                BoxChunk::of(core::slice::from_ref(self)).distances(ray, Lanes::splat(length)).to_array()[0]
+            }
         }
     }
 
@@ -84,157 +116,130 @@ impl Primitive {
 }
 
 /// Up to eight flat pieces.
-#[derive(Debug, Clone, Copy, Default)]
-#[repr(align(32))]
+#[derive(Debug, Clone, Copy)]
 struct FlatChunk {
-    normal: [Lanes; 3],
-    offset: Lanes,
+    /// Normal and offset.
+    plane: [Lanes; 4],
     u: [Lanes; 4],
     v: [Lanes; 4],
-    /// 1 for a disc, 0 for a square.
     is_disc: bool,
 }
 
 impl FlatChunk {
     fn of(primitives: &[Primitive]) -> Self {
-        // Unused lanes stay 0, which makes the distance 0/0: no comparison holds.
-        let mut chunk = Self::default();
-        for (lane, primitive) in primitives.iter().enumerate() {
+        let mut rows = Vec::new();
+        let mut is_any_disc = false;
+        for primitive in primitives {
             let Primitive::Flat { normal, offset, u, v, is_disc } = primitive else { continue };
-            for axis in 0..3 {
-                chunk.normal[axis][lane] = normal[axis];
-                chunk.u[axis][lane] = u.0[axis];
-                chunk.v[axis][lane] = v.0[axis];
-            }
-            chunk.offset[lane] = *offset;
-            chunk.u[3][lane] = u.1;
-            chunk.v[3][lane] = v.1;
-            chunk.is_disc = *is_disc;
+            let row = |a: Vec3, b: f32| [a.x, a.y, a.z, b];
+            rows.push((row(*normal, *offset), row(u.0, u.1), row(v.0, v.1)));
+            is_any_disc |= *is_disc;
         }
-        chunk
+        // Unused lanes stay 0, which makes the distance 0/0: no comparison holds.
+        let column = |row: fn(&([f32; 4], [f32; 4], [f32; 4])) -> [f32; 4]| {
+            gather(&rows.iter().map(row).collect::<Vec<_>>(), [0.0; 4])
+        };
+        Self { plane: column(|r| r.0), u: column(|r| r.1), v: column(|r| r.2), is_disc: is_any_disc }
     }
 
     #[inline(always)]
-    fn distances(&self, ray: &Ray, limit: &Lanes) -> Lanes {
-        let (o, d) = (ray.origin, ray.direction);
-        let [nx, ny, nz] = &self.normal;
-        let mut found = [f32::INFINITY; LANES];
-        let (mut t, mut u, mut v) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
-        for i in 0..LANES {
-            let along = nx[i] * d.x + ny[i] * d.y + nz[i] * d.z;
-            let height = self.offset[i] - (nx[i] * o.x + ny[i] * o.y + nz[i] * o.z);
-            t[i] = height / along;
-            let (x, y, z) = (o.x + t[i] * d.x, o.y + t[i] * d.y, o.z + t[i] * d.z);
-            u[i] = self.u[0][i] * x + self.u[1][i] * y + self.u[2][i] * z + self.u[3][i];
-            v[i] = self.v[0][i] * x + self.v[1][i] * y + self.v[2][i] * z + self.v[3][i];
-        }
-        if self.is_disc {
-            for i in 0..LANES {
-                let is_hit = (u[i] * u[i] + v[i] * v[i] <= 1.0) & (t[i] > 0.0) & (t[i] < limit[i]);
-                found[i] = if is_hit { t[i] } else { f32::INFINITY };
-            }
+    fn distances(&self, ray: &Ray, limit: Lanes) -> Lanes {
+        let (o, d) = (broadcast(ray.origin), broadcast(ray.direction));
+        let [nx, ny, nz, offset] = self.plane;
+        let normal = [nx, ny, nz];
+        let t = (offset - dot(&normal, &o)) / dot(&normal, &d);
+        let p = [o[0] + t * d[0], o[1] + t * d[1], o[2] + t * d[2]];
+        let along = |[x, y, z, start]: [Lanes; 4]| dot(&[x, y, z], &p) + start;
+        let (u, v) = (along(self.u), along(self.v));
+        let is_inside = if self.is_disc {
+            (u * u + v * v).cmp_le(Lanes::ONE)
         } else {
-            for i in 0..LANES {
-                let is_inside = (u[i].abs() <= EDGE) & (v[i].abs() <= EDGE);
-                let is_hit = is_inside & (t[i] > 0.0) & (t[i] < limit[i]);
-                found[i] = if is_hit { t[i] } else { f32::INFINITY };
-            }
-        }
-        found
+            let edge = Lanes::splat(EDGE);
+            u.abs().cmp_le(edge) & v.abs().cmp_le(edge)
+        };
+        where_hit(is_inside & t.cmp_gt(Lanes::ZERO) & t.cmp_lt(limit), t)
     }
 }
 
 /// Up to eight spheres.
 #[derive(Debug, Clone, Copy)]
-#[repr(align(32))]
 struct SphereChunk {
-    centre: [Lanes; 3],
-    radius2: Lanes,
+    /// Centre and squared radius.
+    ball: [Lanes; 4],
 }
 
 impl SphereChunk {
     fn of(primitives: &[Primitive]) -> Self {
+        let rows: Vec<[f32; 4]> = primitives
+            .iter()
+            .filter_map(|primitive| match primitive {
+                Primitive::Sphere { centre, radius } => Some([centre.x, centre.y, centre.z, radius * radius]),
+                _ => None,
+            })
+            .collect();
         // A negative squared radius cannot be hit.
-        let mut chunk = Self { centre: [[0.0; LANES]; 3], radius2: [-1.0; LANES] };
-        for (lane, primitive) in primitives.iter().enumerate() {
-            let Primitive::Sphere { centre, radius } = primitive else { continue };
-            for axis in 0..3 {
-                chunk.centre[axis][lane] = centre[axis];
-            }
-            chunk.radius2[lane] = radius * radius;
-        }
-        chunk
+        Self { ball: gather(&rows, [0.0, 0.0, 0.0, -1.0]) }
     }
 
     /// The stable form: the discriminant from the perpendicular offset, the smaller root from the
     /// product of both (Haines et al. 2019, "Precision Improvements for Ray/Sphere Intersection").
     #[inline(always)]
-    fn distances(&self, ray: &Ray, limit: &Lanes) -> Lanes {
-        let (o, d) = (ray.origin, ray.direction);
-        let mut found = [f32::INFINITY; LANES];
-        for i in 0..LANES {
-            let (fx, fy, fz) = (o.x - self.centre[0][i], o.y - self.centre[1][i], o.z - self.centre[2][i]);
-            let b = -(fx * d.x + fy * d.y + fz * d.z);
-            let (px, py, pz) = (fx + b * d.x, fy + b * d.y, fz + b * d.z);
-            let discriminant = self.radius2[i] - (px * px + py * py + pz * pz);
-            let root = if discriminant > 0.0 { discriminant } else { 0.0 }.sqrt();
-            let q = b + if b < 0.0 { -root } else { root };
-            let c = fx * fx + fy * fy + fz * fz - self.radius2[i];
-            let other = c / q;
-            let near = if other < q { other } else { q };
-            let far = if other < q { q } else { other };
-            let t = if near > 0.0 { near } else { far };
-            let is_hit = (discriminant >= 0.0) & (t > 0.0) & (t < limit[i]);
-            found[i] = if is_hit { t } else { f32::INFINITY };
-        }
-        found
+    fn distances(&self, ray: &Ray, limit: Lanes) -> Lanes {
+        let (o, d) = (broadcast(ray.origin), broadcast(ray.direction));
+        let [cx, cy, cz, radius2] = self.ball;
+        let f = [o[0] - cx, o[1] - cy, o[2] - cz];
+        let b = -dot(&f, &d);
+        let p = [f[0] + b * d[0], f[1] + b * d[1], f[2] + b * d[2]];
+        let discriminant = radius2 - dot(&p, &p);
+        let root = discriminant.fast_max(Lanes::ZERO).sqrt();
+        let q = b + b.cmp_lt(Lanes::ZERO).blend(-root, root);
+        let other = (dot(&f, &f) - radius2) / q;
+        let (near, far) = (other.fast_min(q), other.fast_max(q));
+        let t = near.cmp_gt(Lanes::ZERO).blend(near, far);
+        where_hit(discriminant.cmp_ge(Lanes::ZERO) & t.cmp_gt(Lanes::ZERO) & t.cmp_lt(limit), t)
     }
 }
 
 /// Up to eight boxes.
 #[derive(Debug, Clone, Copy)]
-#[repr(align(32))]
 struct BoxChunk {
     rows: [[Lanes; 4]; 3],
 }
 
 impl BoxChunk {
     fn of(primitives: &[Primitive]) -> Self {
-        // Unused lanes: every point has the coordinates (2, 2, 2).
-        let mut chunk = Self { rows: [[[0.0; LANES], [0.0; LANES], [0.0; LANES], [2.0; LANES]]; 3] };
-        for (lane, primitive) in primitives.iter().enumerate() {
-            let Primitive::Box { rows } = primitive else { continue };
-            for (slot, (gradient, start)) in chunk.rows.iter_mut().zip(rows) {
-                for axis in 0..3 {
-                    slot[axis][lane] = gradient[axis];
-                }
-                slot[3][lane] = *start;
-            }
-        }
-        chunk
+        let column = |axis: usize| {
+            let rows: Vec<[f32; 4]> = primitives
+                .iter()
+                .filter_map(|primitive| match primitive {
+                    Primitive::Box { rows } => {
+                        let (gradient, start) = rows[axis];
+                        Some([gradient.x, gradient.y, gradient.z, start])
+                    }
+                    _ => None,
+                })
+                .collect();
+            // Unused lanes: every point has the coordinates (2, 2, 2).
+            gather(&rows, [0.0, 0.0, 0.0, 2.0])
+        };
+        Self { rows: [column(0), column(1), column(2)] }
     }
 
     #[inline(always)]
-    fn distances(&self, ray: &Ray, limit: &Lanes) -> Lanes {
-        let (o, d) = (ray.origin, ray.direction);
-        let (mut near, mut far) = ([f32::NEG_INFINITY; LANES], [f32::INFINITY; LANES]);
-        for [gx, gy, gz, start] in &self.rows {
-            for i in 0..LANES {
-                let origin = gx[i] * o.x + gy[i] * o.y + gz[i] * o.z + start[i];
-                let inverse = 1.0 / (gx[i] * d.x + gy[i] * d.y + gz[i] * d.z);
-                let (a, b) = ((-1.0 - origin) * inverse, (1.0 - origin) * inverse);
-                let (low, high) = if a < b { (a, b) } else { (b, a) };
-                near[i] = if low > near[i] { low } else { near[i] };
-                far[i] = if high < far[i] { high } else { far[i] };
-            }
+    fn distances(&self, ray: &Ray, limit: Lanes) -> Lanes {
+        let (o, d) = (broadcast(ray.origin), broadcast(ray.direction));
+        let (mut near, mut far) = (Lanes::splat(f32::NEG_INFINITY), Lanes::splat(f32::INFINITY));
+        for [x, y, z, start] in self.rows {
+            let row = [x, y, z];
+            let origin = dot(&row, &o) + start;
+            let inverse = Lanes::ONE / dot(&row, &d);
+            let (a, b) = ((-Lanes::ONE - origin) * inverse, (Lanes::ONE - origin) * inverse);
+            // The second operand wins where the first is NaN, so a ray in a face's plane keeps the bounds.
+            near = a.fast_min(b).fast_max(near);
+            far = a.fast_max(b).fast_min(far);
         }
-        let mut found = [f32::INFINITY; LANES];
-        for i in 0..LANES {
-            let t = if near[i] > 0.0 { near[i] } else { far[i] };
-            let is_hit = (near[i] <= far[i]) & (t > 0.0) & (t < limit[i]);
-            found[i] = if is_hit { t } else { f32::INFINITY };
-        }
-        found
+        let t = near.cmp_gt(Lanes::ZERO).blend(near, far);
+        where_hit(near.cmp_le(far) & t.cmp_gt(Lanes::ZERO) & t.cmp_lt(limit), t)
     }
 }
 
@@ -272,45 +277,45 @@ impl Few {
     /// The nearest hit within `(0, length)`: distance and number of the primitive.
     #[inline]
     pub(super) fn closest(&self, ray: &Ray, length: f32) -> Option<(f32, u32)> {
-        let mut best = [length; LANES];
-        let mut chunk_of = [u32::MAX; LANES];
-        let mut number = 0_u32;
-        let mut take = |distances: Lanes, best: &mut Lanes| {
-            for i in 0..LANES {
-                let is_nearer = distances[i] < best[i];
-                best[i] = if is_nearer { distances[i] } else { best[i] };
-                chunk_of[i] = if is_nearer { number } else { chunk_of[i] };
-            }
-            number += 1;
+        let mut best = Lanes::splat(length);
+        // Numbers of chunks, as floats: lanes of one kind blend in one instruction.
+        let mut chunk_of = Lanes::splat(-1.0);
+        let mut number = Lanes::ZERO;
+        let mut take = |distances: Lanes| {
+            let is_nearer = distances.cmp_lt(best);
+            best = is_nearer.blend(distances, best);
+            chunk_of = is_nearer.blend(number, chunk_of);
+            number += Lanes::ONE;
+            best
         };
+        let mut limit = Lanes::splat(length);
         for chunk in &self.flats {
-            take(chunk.distances(ray, &best), &mut best);
+            limit = take(chunk.distances(ray, limit));
         }
         for chunk in &self.spheres {
-            take(chunk.distances(ray, &best), &mut best);
+            limit = take(chunk.distances(ray, limit));
         }
         for chunk in &self.boxes {
-            take(chunk.distances(ray, &best), &mut best);
+            limit = take(chunk.distances(ray, limit));
         }
-        let mut nearest = 0;
-        for i in 1..LANES {
-            if best[i] < best[nearest] {
-                nearest = i;
-            }
+        let best = best.to_array();
+        let nearest = (1..LANES).fold(0, |nearest, i| if best[i] < best[nearest] { i } else { nearest });
+        let chunk = chunk_of.to_array()[nearest];
+        if chunk < 0.0 {
+            return None;
         }
-        let chunk = chunk_of[nearest];
-        let index = self.order.get((chunk as usize).checked_mul(LANES)? + nearest)?;
+        let index = self.order.get(chunk as usize * LANES + nearest)?;
         Some((best[nearest], *index))
     }
 
     /// Whether anything is hit within `(0, length)`.
     #[inline]
     pub(super) fn is_hit(&self, ray: &Ray, length: f32) -> bool {
-        let limit = [length; LANES];
-        let is_any = |distances: Lanes| distances.iter().fold(false, |any, t| any | (*t < f32::INFINITY));
-        self.boxes.iter().any(|c| is_any(c.distances(ray, &limit)))
-            || self.flats.iter().any(|c| is_any(c.distances(ray, &limit)))
-            || self.spheres.iter().any(|c| is_any(c.distances(ray, &limit)))
+        let limit = Lanes::splat(length);
+        let is_any = |distances: Lanes| distances.cmp_lt(Lanes::splat(f32::INFINITY)).any();
+        self.boxes.iter().any(|c| is_any(c.distances(ray, limit)))
+            || self.flats.iter().any(|c| is_any(c.distances(ray, limit)))
+            || self.spheres.iter().any(|c| is_any(c.distances(ray, limit)))
     }
 }
 
