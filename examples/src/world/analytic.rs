@@ -1,11 +1,10 @@
-//! Flat pieces, spheres and boxes, four at a time: loops over lanes that compile to SIMD.
+//! Flat pieces, spheres and boxes, four at a time.
 
+use fogbow::glam::Vec4;
 use fogbow::math::{Bounds, Ray, Vec3};
 
-/// Width of the loops; baseline x86-64 has registers of four.
+/// How many primitives are tested at once: baseline x86-64 has registers of four.
 const LANES: usize = 4;
-
-type Lanes = [f32; LANES];
 
 /// By how much the unit square of a flat piece is enlarged, so that no ray slips between two that
 /// share an edge: rounding moves a hit point by a few 10⁻⁷ of the piece. Invisible at 4 × 10⁻⁶.
@@ -67,9 +66,9 @@ impl Primitive {
         // One lane of four carries the primitive: what is measured alone is what is measured in
         // company.
         match self {
-            Self::Flat { .. } => FlatChunk::of(core::slice::from_ref(self)).distances(ray, &[length; LANES])[0],
-            Self::Sphere { .. } => SphereChunk::of(core::slice::from_ref(self)).distances(ray, &[length; LANES])[0],
-            Self::Box { .. } => BoxChunk::of(core::slice::from_ref(self)).distances(ray, &[length; LANES])[0],
+            Self::Flat { .. } => FlatChunk::of(core::slice::from_ref(self)).distances(ray, Vec4::splat(length))[0],
+            Self::Sphere { .. } => SphereChunk::of(core::slice::from_ref(self)).distances(ray, Vec4::splat(length))[0],
+            Self::Box { .. } => BoxChunk::of(core::slice::from_ref(self)).distances(ray, Vec4::splat(length))[0],
         }
     }
 
@@ -83,15 +82,26 @@ impl Primitive {
     }
 }
 
+/// `distances` where `is_hit`, infinity elsewhere.
+macro_rules! only_where {
+    ($is_hit:expr, $distances:expr) => {
+        Vec4::select($is_hit, $distances, Vec4::INFINITY)
+    };
+}
+
+/// `x·a + y·b + z·c` in four lanes, for a vector that is the same in all.
+#[inline(always)]
+fn dot([a, b, c]: &[Vec4; 3], v: Vec3) -> Vec4 {
+    *a * v.x + *b * v.y + *c * v.z
+}
+
 /// Up to four flat pieces.
 #[derive(Debug, Clone, Copy, Default)]
-#[repr(align(16))]
 struct FlatChunk {
-    normal: [Lanes; 3],
-    offset: Lanes,
-    u: [Lanes; 4],
-    v: [Lanes; 4],
-    /// 1 for a disc, 0 for a square.
+    normal: [Vec4; 3],
+    offset: Vec4,
+    u: ([Vec4; 3], Vec4),
+    v: ([Vec4; 3], Vec4),
     is_disc: bool,
 }
 
@@ -99,64 +109,47 @@ impl FlatChunk {
     fn of(primitives: &[Primitive]) -> Self {
         // Unused lanes stay 0, which makes the distance 0/0: no comparison holds.
         let mut chunk = Self::default();
-        for (lane, primitive) in primitives.iter().enumerate() {
+        for (lane, primitive) in primitives.iter().take(LANES).enumerate() {
             let Primitive::Flat { normal, offset, u, v, is_disc } = primitive else { continue };
             for axis in 0..3 {
                 chunk.normal[axis][lane] = normal[axis];
-                chunk.u[axis][lane] = u.0[axis];
-                chunk.v[axis][lane] = v.0[axis];
+                chunk.u.0[axis][lane] = u.0[axis];
+                chunk.v.0[axis][lane] = v.0[axis];
             }
             chunk.offset[lane] = *offset;
-            chunk.u[3][lane] = u.1;
-            chunk.v[3][lane] = v.1;
+            chunk.u.1[lane] = u.1;
+            chunk.v.1[lane] = v.1;
             chunk.is_disc = *is_disc;
         }
         chunk
     }
 
     #[inline(always)]
-    fn distances(&self, ray: &Ray, limit: &Lanes) -> Lanes {
+    fn distances(&self, ray: &Ray, limit: Vec4) -> Vec4 {
         let (o, d) = (ray.origin, ray.direction);
-        let [nx, ny, nz] = &self.normal;
-        let mut found = [f32::INFINITY; LANES];
-        let (mut t, mut u, mut v) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
-        for i in 0..LANES {
-            let along = nx[i] * d.x + ny[i] * d.y + nz[i] * d.z;
-            let height = self.offset[i] - (nx[i] * o.x + ny[i] * o.y + nz[i] * o.z);
-            t[i] = height / along;
-            let (x, y, z) = (o.x + t[i] * d.x, o.y + t[i] * d.y, o.z + t[i] * d.z);
-            u[i] = self.u[0][i] * x + self.u[1][i] * y + self.u[2][i] * z + self.u[3][i];
-            v[i] = self.v[0][i] * x + self.v[1][i] * y + self.v[2][i] * z + self.v[3][i];
-        }
-        if self.is_disc {
-            for i in 0..LANES {
-                let is_hit = (u[i] * u[i] + v[i] * v[i] <= 1.0) & (t[i] > 0.0) & (t[i] < limit[i]);
-                found[i] = if is_hit { t[i] } else { f32::INFINITY };
-            }
-        } else {
-            for i in 0..LANES {
-                let is_inside = (u[i].abs() <= EDGE) & (v[i].abs() <= EDGE);
-                let is_hit = is_inside & (t[i] > 0.0) & (t[i] < limit[i]);
-                found[i] = if is_hit { t[i] } else { f32::INFINITY };
-            }
-        }
-        found
+        let t = (self.offset - dot(&self.normal, o)) / dot(&self.normal, d);
+        let point = [t * d.x + o.x, t * d.y + o.y, t * d.z + o.z];
+        let coordinate = |(gradient, start): &([Vec4; 3], Vec4)| {
+            gradient[0] * point[0] + gradient[1] * point[1] + gradient[2] * point[2] + *start
+        };
+        let (u, v) = (coordinate(&self.u), coordinate(&self.v));
+        let reach = if self.is_disc { u * u + v * v } else { u.abs().max(v.abs()) };
+        only_where!(reach.cmple(Vec4::splat(EDGE)) & t.cmpgt(Vec4::ZERO) & t.cmplt(limit), t)
     }
 }
 
 /// Up to four spheres.
 #[derive(Debug, Clone, Copy)]
-#[repr(align(16))]
 struct SphereChunk {
-    centre: [Lanes; 3],
-    radius2: Lanes,
+    centre: [Vec4; 3],
+    radius2: Vec4,
 }
 
 impl SphereChunk {
     fn of(primitives: &[Primitive]) -> Self {
         // A negative squared radius cannot be hit.
-        let mut chunk = Self { centre: [[0.0; LANES]; 3], radius2: [-1.0; LANES] };
-        for (lane, primitive) in primitives.iter().enumerate() {
+        let mut chunk = Self { centre: [Vec4::ZERO; 3], radius2: Vec4::NEG_ONE };
+        for (lane, primitive) in primitives.iter().take(LANES).enumerate() {
             let Primitive::Sphere { centre, radius } = primitive else { continue };
             for axis in 0..3 {
                 chunk.centre[axis][lane] = centre[axis];
@@ -169,72 +162,60 @@ impl SphereChunk {
     /// The stable form: the discriminant from the perpendicular offset, the smaller root from the
     /// product of both (Haines et al. 2019, "Precision Improvements for Ray/Sphere Intersection").
     #[inline(always)]
-    fn distances(&self, ray: &Ray, limit: &Lanes) -> Lanes {
+    fn distances(&self, ray: &Ray, limit: Vec4) -> Vec4 {
         let (o, d) = (ray.origin, ray.direction);
-        let mut found = [f32::INFINITY; LANES];
-        for i in 0..LANES {
-            let (fx, fy, fz) = (o.x - self.centre[0][i], o.y - self.centre[1][i], o.z - self.centre[2][i]);
-            let b = -(fx * d.x + fy * d.y + fz * d.z);
-            let (px, py, pz) = (fx + b * d.x, fy + b * d.y, fz + b * d.z);
-            let discriminant = self.radius2[i] - (px * px + py * py + pz * pz);
-            let root = if discriminant > 0.0 { discriminant } else { 0.0 }.sqrt();
-            let q = b + if b < 0.0 { -root } else { root };
-            let c = fx * fx + fy * fy + fz * fz - self.radius2[i];
-            let other = c / q;
-            let near = if other < q { other } else { q };
-            let far = if other < q { q } else { other };
-            let t = if near > 0.0 { near } else { far };
-            let is_hit = (discriminant >= 0.0) & (t > 0.0) & (t < limit[i]);
-            found[i] = if is_hit { t } else { f32::INFINITY };
+        let f = [o.x - self.centre[0], o.y - self.centre[1], o.z - self.centre[2]];
+        let b = -dot(&f, d);
+        let p = [f[0] + b * d.x, f[1] + b * d.y, f[2] + b * d.z];
+        let discriminant = self.radius2 - (p[0] * p[0] + p[1] * p[1] + p[2] * p[2]);
+        let is_met = discriminant.cmpge(Vec4::ZERO);
+        if !is_met.any() {
+            return Vec4::INFINITY;
         }
-        found
+        let clamped = discriminant.max(Vec4::ZERO).to_array();
+        let root = Vec4::from_array(clamped.map(f32::sqrt));
+        let q = b + root.copysign(b);
+        let other = (f[0] * f[0] + f[1] * f[1] + f[2] * f[2] - self.radius2) / q;
+        let (near, far) = (other.min(q), other.max(q));
+        let t = Vec4::select(near.cmpgt(Vec4::ZERO), near, far);
+        only_where!(is_met & t.cmpgt(Vec4::ZERO) & t.cmplt(limit), t)
     }
 }
 
 /// Up to four boxes.
 #[derive(Debug, Clone, Copy)]
-#[repr(align(16))]
 struct BoxChunk {
-    rows: [[Lanes; 4]; 3],
+    rows: [([Vec4; 3], Vec4); 3],
 }
 
 impl BoxChunk {
     fn of(primitives: &[Primitive]) -> Self {
         // Unused lanes: every point has the coordinates (2, 2, 2).
-        let mut chunk = Self { rows: [[[0.0; LANES], [0.0; LANES], [0.0; LANES], [2.0; LANES]]; 3] };
-        for (lane, primitive) in primitives.iter().enumerate() {
+        let mut chunk = Self { rows: [([Vec4::ZERO; 3], Vec4::splat(2.0)); 3] };
+        for (lane, primitive) in primitives.iter().take(LANES).enumerate() {
             let Primitive::Box { rows } = primitive else { continue };
-            for (slot, (gradient, start)) in chunk.rows.iter_mut().zip(rows) {
+            for ((slot, offset), (gradient, start)) in chunk.rows.iter_mut().zip(rows) {
                 for axis in 0..3 {
                     slot[axis][lane] = gradient[axis];
                 }
-                slot[3][lane] = *start;
+                offset[lane] = *start;
             }
         }
         chunk
     }
 
     #[inline(always)]
-    fn distances(&self, ray: &Ray, limit: &Lanes) -> Lanes {
-        let (o, d) = (ray.origin, ray.direction);
-        let (mut near, mut far) = ([f32::NEG_INFINITY; LANES], [f32::INFINITY; LANES]);
-        for [gx, gy, gz, start] in &self.rows {
-            for i in 0..LANES {
-                let origin = gx[i] * o.x + gy[i] * o.y + gz[i] * o.z + start[i];
-                let inverse = 1.0 / (gx[i] * d.x + gy[i] * d.y + gz[i] * d.z);
-                let (a, b) = ((-1.0 - origin) * inverse, (1.0 - origin) * inverse);
-                let (low, high) = if a < b { (a, b) } else { (b, a) };
-                near[i] = if low > near[i] { low } else { near[i] };
-                far[i] = if high < far[i] { high } else { far[i] };
-            }
+    fn distances(&self, ray: &Ray, limit: Vec4) -> Vec4 {
+        let (mut near, mut far) = (Vec4::NEG_INFINITY, Vec4::INFINITY);
+        for (gradient, start) in &self.rows {
+            let origin = dot(gradient, ray.origin) + *start;
+            let inverse = 1.0 / dot(gradient, ray.direction);
+            let (a, b) = ((-1.0 - origin) * inverse, (1.0 - origin) * inverse);
+            near = near.max(a.min(b));
+            far = far.min(a.max(b));
         }
-        let mut found = [f32::INFINITY; LANES];
-        for i in 0..LANES {
-            let t = if near[i] > 0.0 { near[i] } else { far[i] };
-            let is_hit = (near[i] <= far[i]) & (t > 0.0) & (t < limit[i]);
-            found[i] = if is_hit { t } else { f32::INFINITY };
-        }
-        found
+        let t = Vec4::select(near.cmpgt(Vec4::ZERO), near, far);
+        only_where!(near.cmple(far) & t.cmpgt(Vec4::ZERO) & t.cmplt(limit), t)
     }
 }
 
@@ -272,45 +253,41 @@ impl Few {
     /// The nearest hit within `(0, length)`: distance and number of the primitive.
     #[inline]
     pub(super) fn closest(&self, ray: &Ray, length: f32) -> Option<(f32, u32)> {
-        let mut best = [length; LANES];
-        let mut chunk_of = [u32::MAX; LANES];
-        let mut number = 0_u32;
-        let mut take = |distances: Lanes, best: &mut Lanes| {
-            for i in 0..LANES {
-                let is_nearer = distances[i] < best[i];
-                best[i] = if is_nearer { distances[i] } else { best[i] };
-                chunk_of[i] = if is_nearer { number } else { chunk_of[i] };
-            }
-            number += 1;
+        let mut best = Vec4::splat(length);
+        // Numbers of chunks as floats, so that they can be selected like distances.
+        let (mut chunk_of, mut number) = (Vec4::NEG_ONE, Vec4::ZERO);
+        let mut take = |distances: Vec4, best: &mut Vec4| {
+            let is_nearer = distances.cmplt(*best);
+            *best = best.min(distances);
+            chunk_of = Vec4::select(is_nearer, number, chunk_of);
+            number += 1.0;
         };
         for chunk in &self.flats {
-            take(chunk.distances(ray, &best), &mut best);
+            take(chunk.distances(ray, best), &mut best);
         }
         for chunk in &self.spheres {
-            take(chunk.distances(ray, &best), &mut best);
+            take(chunk.distances(ray, best), &mut best);
         }
         for chunk in &self.boxes {
-            take(chunk.distances(ray, &best), &mut best);
+            take(chunk.distances(ray, best), &mut best);
         }
-        let mut nearest = 0;
-        for i in 1..LANES {
-            if best[i] < best[nearest] {
-                nearest = i;
-            }
+        let nearest = best.min_element();
+        if nearest >= length {
+            return None;
         }
-        let chunk = chunk_of[nearest];
-        let index = self.order.get((chunk as usize).checked_mul(LANES)? + nearest)?;
-        Some((best[nearest], *index))
+        let lane = best.cmpeq(Vec4::splat(nearest)).bitmask().trailing_zeros() as usize;
+        let index = self.order.get(chunk_of[lane.min(LANES - 1)] as usize * LANES + lane)?;
+        Some((nearest, *index))
     }
 
     /// Whether anything is hit within `(0, length)`.
     #[inline]
     pub(super) fn is_hit(&self, ray: &Ray, length: f32) -> bool {
-        let limit = [length; LANES];
-        let is_any = |distances: Lanes| distances.iter().fold(false, |any, t| any | (*t < f32::INFINITY));
-        self.boxes.iter().any(|c| is_any(c.distances(ray, &limit)))
-            || self.flats.iter().any(|c| is_any(c.distances(ray, &limit)))
-            || self.spheres.iter().any(|c| is_any(c.distances(ray, &limit)))
+        let limit = Vec4::splat(length);
+        let is_any = |distances: Vec4| distances.cmplt(Vec4::INFINITY).any();
+        self.boxes.iter().any(|c| is_any(c.distances(ray, limit)))
+            || self.flats.iter().any(|c| is_any(c.distances(ray, limit)))
+            || self.spheres.iter().any(|c| is_any(c.distances(ray, limit)))
     }
 }
 
