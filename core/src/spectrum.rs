@@ -54,14 +54,14 @@ impl Spectrum {
     #[inline]
     #[must_use]
     pub fn max_element(self) -> f32 {
-        self[0].max(self[1]).max(self[2])
+        float::max(float::max(self[0], self[1]), self[2])
     }
 
     /// The smallest channel.
     #[inline]
     #[must_use]
     pub fn min_element(self) -> f32 {
-        self[0].min(self[1]).min(self[2])
+        float::min(float::min(self[0], self[1]), self[2])
     }
 
     /// The mean of the channels.
@@ -75,14 +75,14 @@ impl Spectrum {
     #[inline]
     #[must_use]
     pub fn min(self, other: Self) -> Self {
-        self.zip(other, f32::min)
+        self.zip(other, float::min)
     }
 
     /// Channel by channel maximum.
     #[inline]
     #[must_use]
     pub fn max(self, other: Self) -> Self {
-        self.zip(other, f32::max)
+        self.zip(other, float::max)
     }
 
     /// `e^{−x}` per channel: transmittance of an optical thickness. Beyond [`float::OPAQUE`]: 0.

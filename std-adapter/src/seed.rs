@@ -102,6 +102,9 @@ impl TryRng for SampleRng {
     }
 }
 
+/// TEMP
+const SETS: u32 = 6;
+
 /// A point of an Owen-scrambled Sobol sequence, number by number (Burley 2020, Practical
 /// Hash-based Owen Scrambling; tables and hash of the crate `sobol_burley`).
 ///
@@ -146,7 +149,7 @@ impl LowDiscrepancy {
 
     #[inline]
     fn refill(&mut self) {
-        self.ready = if self.set < NUM_DIMENSION_SETS_4D {
+        self.ready = if self.set < SETS {
             // As `sobol_burley::sample_4d`, but the index is shuffled once per sample and all bits are kept.
             let points = sobol_int4_rev(self.index, self.set);
             let scramble = Int4::from([self.seed.wrapping_mul(0x9c8f_2d3b); 4])

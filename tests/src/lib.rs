@@ -1,4 +1,18 @@
-//! Evidence.
+//! Evidence for fogbow: what the tests share.
+//!
+//! | file | holds |
+//! |---|---|
+//! | [`golden`] | golden vectors: reading, comparing, one function per topic |
+//! | [`hosts`] | media with exact gradients, bodies with faces, wrappers that complain |
+//! | [`analytic`] | scenes whose answers are known, finite differences |
+//! | [`chi_square`] | χ² of samplers against their densities |
+//! | [`tolerance`] | every tolerance, with its reason |
+
+pub mod analytic;
+pub mod chi_square;
+pub mod golden;
+pub mod hosts;
+pub mod tolerance;
 
 /// The README's examples, run as tests.
 #[cfg(doctest)]

@@ -49,7 +49,9 @@ pub struct QuadLight {
     edge_v: Vec3,
     normal: Vec3,
     area: f32,
-    is_rectangle: bool,
+    /// Squared distance from the centre within which the solid angle is sampled; 0 for shapes that
+    /// are no rectangles.
+    solid_within: f32,
     /// Radiance (W·m⁻²·sr⁻¹).
     pub radiance: Spectrum,
 }
@@ -70,7 +72,8 @@ impl QuadLight {
         let area = cross.length();
         let normal = cross.try_normalize().filter(|_| area.is_finite()).ok_or(LightError::NoArea)?;
         let is_rectangle = edge_u.dot(edge_v).abs() <= 1e-5 * edge_u.length() * edge_v.length();
-        Ok(Self { corner, edge_u, edge_v, normal, area, is_rectangle, radiance })
+        let solid_within = if is_rectangle { NEAR * (edge_u.length_squared() + edge_v.length_squared()) } else { 0.0 };
+        Ok(Self { corner, edge_u, edge_v, normal, area, solid_within, radiance })
     }
 
     /// Area (m²).
@@ -101,9 +104,7 @@ impl QuadLight {
     /// the area costs a tenth.
     #[inline]
     fn seen_from(&self, from: Vec3) -> Option<SolidRectangle> {
-        let near =
-            self.centre().distance_squared(from) < NEAR * (self.edge_u.length_squared() + self.edge_v.length_squared());
-        if self.is_rectangle && near { SolidRectangle::new(self, from) } else { None }
+        if self.centre().distance_squared(from) < self.solid_within { SolidRectangle::new(self, from) } else { None }
     }
 
     #[inline]

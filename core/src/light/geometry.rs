@@ -157,9 +157,15 @@ impl Source {
                 if exponent == 0.0 {
                     with(1.0, u * -2.0)
                 } else {
-                    let lower = float::powf(if exponent < 1.0 { c.max(MIN_COSINE) } else { c }, exponent - 1.0);
-                    let value = lower * c;
-                    with(value, n * (exponent * lower) - u * ((exponent + 2.0) * value))
+                    // c^(s−1)/r² as a square, so that a small power and a small distance meet before
+                    // either leaves the range of f32.
+                    let base = if exponent < 1.0 { c.max(MIN_COSINE) } else { c };
+                    let root = float::powf(base, 0.5 * (exponent - 1.0)) * inverse;
+                    let lower = root * root;
+                    Geometry {
+                        value: lower * c,
+                        gradient: (n * exponent - u * ((exponent + 2.0) * c)) * lower * inverse,
+                    }
                 }
             }
             Falloff::Spot { beam, cutoff } => {

@@ -80,11 +80,14 @@ impl core::fmt::Display for LightError {
 
 impl core::error::Error for LightError {}
 
-/// Squared radius of a light's near field over its area.
+/// Squared radius of a flat light's near field over its area.
 ///
 /// Larger: more of the medium is reached by connections that know nothing of its density.
 /// Smaller: collisions close to the light make outliers.
-const NEAR_FIELD_AREAS: f32 = 0.25;
+const NEAR_FLAT: f32 = 0.25;
+
+/// The same for a sphere, which shines to all sides and is small where it matters: a lamp in fog.
+const NEAR_SPHERE: f32 = 16.0;
 
 /// The ball around a light in which its `1/r²` rules: see [`Light::near_field`].
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -212,16 +215,16 @@ impl Light<'_> {
     #[inline]
     #[must_use]
     pub fn near_field(&self) -> Option<NearField> {
-        let (centre, area) = match self {
+        let (centre, radius2) = match self {
             Self::Point(light) => (light.position, f32::INFINITY),
             Self::Phong(light) => (light.position, f32::INFINITY),
             Self::Spot(light) => (light.position, f32::INFINITY),
-            Self::Quad(light) => (light.centre(), light.area()),
-            Self::Sphere(light) => (light.centre, light.area()),
-            Self::Mesh(light) => (light.centre(), light.area()),
+            Self::Quad(light) => (light.centre(), NEAR_FLAT * light.area()),
+            Self::Sphere(light) => (light.centre, NEAR_SPHERE * light.area()),
+            Self::Mesh(light) => (light.centre(), NEAR_FLAT * light.area()),
             Self::Sun(_) | Self::Constant(_) | Self::Environment(_) => return None,
         };
-        Some(NearField { centre, radius2: NEAR_FIELD_AREAS * area })
+        Some(NearField { centre, radius2 })
     }
 
     /// A point of the light to spread a connection around, before it is known where on a ray the

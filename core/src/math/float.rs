@@ -118,6 +118,21 @@ pub fn cbrt(x: f32) -> f32 {
     libm::cbrtf(x)
 }
 
+/// The smaller of two numbers; `b` if either is NaN. One instruction, where `f32::min` with its
+/// care for NaN is three.
+#[inline]
+#[must_use]
+pub fn min(a: f32, b: f32) -> f32 {
+    if a < b { a } else { b }
+}
+
+/// The larger of two numbers; `b` if either is NaN.
+#[inline]
+#[must_use]
+pub fn max(a: f32, b: f32) -> f32 {
+    if a > b { a } else { b }
+}
+
 /// Largest integer not above `x`.
 #[inline]
 #[must_use]

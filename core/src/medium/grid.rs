@@ -3,42 +3,13 @@
 use glam::{Affine3, Mat3, Vec3};
 
 use super::density::{Cell, Density, cell_count};
-use super::majorant::{self, MinMax, Run, blocks_along};
-use super::region::{BoxRegion, LocalLine};
+use super::majorant::{Field, MinMax, Reach, blocks_along};
+use super::region::BoxRegion;
 use super::{MediumError, ball};
 use crate::host::{Face, Gradients, Medium, Properties, Stretch};
 use crate::math::Ray;
 use crate::phase::Phase;
 use crate::spectrum::{Gradient, Hessian, Spectrum};
-
-/// A density with the bounds of its blocks.
-#[derive(Debug, Clone, Copy)]
-struct Field<'a> {
-    density: Density<'a>,
-    blocks: &'a [MinMax],
-    whole: MinMax,
-}
-
-impl<'a> Field<'a> {
-    fn new(density: Density<'a>, size: [u32; 3], blocks: &'a mut [MinMax]) -> Result<Self, MediumError> {
-        density.check(size)?;
-        if blocks.len() != Grid::block_count(size) {
-            return Err(MediumError::Blocks);
-        }
-        let whole = majorant::fill(blocks, &density, size);
-        Ok(Self { density, blocks, whole })
-    }
-
-    #[inline]
-    fn bounds(&self, block: Option<usize>) -> MinMax {
-        block.map_or(self.whole, |i| self.blocks.get(i).copied().unwrap_or(self.whole))
-    }
-
-    #[inline]
-    fn is_empty(&self, block: usize) -> bool {
-        self.blocks.get(block).is_some_and(|b| b.max == 0.0)
-    }
-}
 
 /// A voxel grid: densities in lent memory, trilinear between cell centres, placed anywhere.
 ///
@@ -76,22 +47,23 @@ impl<'a> Field<'a> {
 /// ```
 #[derive(Debug, Clone, Copy)]
 pub struct Grid<'a> {
-    size: [u32; 3],
+    pub(super) size: [u32; 3],
     /// From the world to `p·n + 1/2`.
-    shifted_from_world: Affine3,
+    pub(super) shifted_from_world: Affine3,
     /// From the world to `p·n`.
-    cells_from_world: Affine3,
-    /// Cells that a metre may span, in the worst direction; largest coordinate of the world's origin.
-    reach: (f32, f32),
-    resolution: f32,
-    density: Field<'a>,
-    absorption_density: Option<Field<'a>>,
-    emission_density: Option<Field<'a>>,
-    scattering: Spectrum,
-    absorption: Spectrum,
-    emission: Spectrum,
-    phase: Phase,
-    region: BoxRegion,
+    pub(super) cells_from_world: Affine3,
+    pub(super) reach: Reach,
+    pub(super) resolution: f32,
+    /// Largest channel of extinction (m⁻¹) per unit of density, and of absorption density.
+    pub(super) thickest: (f32, f32),
+    pub(super) density: Field<'a>,
+    pub(super) absorption_density: Option<Field<'a>>,
+    pub(super) emission_density: Option<Field<'a>>,
+    pub(super) scattering: Spectrum,
+    pub(super) absorption: Spectrum,
+    pub(super) emission: Spectrum,
+    pub(super) phase: Phase,
+    pub(super) region: BoxRegion,
 }
 
 impl<'a> Grid<'a> {
@@ -140,18 +112,18 @@ impl<'a> Grid<'a> {
         let cells_from_world = Affine3 { matrix3: scale * local.matrix3, translation: scale * local.translation };
         let shifted_from_world =
             Affine3 { translation: cells_from_world.translation + Vec3::splat(0.5), ..cells_from_world };
-        if !(cells_from_world.is_finite()) {
+        if !cells_from_world.is_finite() {
             return Err(MediumError::Placement);
         }
-        let row = |i: usize| cells_from_world.matrix3.row(i).abs().element_sum();
         let edges = [local_to_world.matrix3.x_axis, local_to_world.matrix3.y_axis, local_to_world.matrix3.z_axis];
         let edge = |i: usize| edges[i].length() / cells[i];
         let grid = Self {
             size,
             shifted_from_world,
             cells_from_world,
-            reach: (row(0).max(row(1)).max(row(2)), cells_from_world.translation.abs().max_element()),
+            reach: Reach::new(&cells_from_world, edges.iter().map(|e| e.length()).sum()),
             resolution: edge(0).min(edge(1)).min(edge(2)).max(f32::MIN_POSITIVE),
+            thickest: ((absorption + scattering).max_element(), 0.0),
             density: Field::new(density, size, blocks)?,
             absorption_density: None,
             emission_density: None,
@@ -171,6 +143,7 @@ impl<'a> Grid<'a> {
     /// As in [`Grid::new`].
     pub fn with_absorption_grid(mut self, density: Density<'a>, blocks: &'a mut [MinMax]) -> Result<Self, MediumError> {
         self.absorption_density = Some(Field::new(density, self.size, blocks)?);
+        self.thickest = (self.scattering.max_element(), self.absorption.max_element());
         self.check()
     }
 
@@ -204,7 +177,7 @@ impl<'a> Grid<'a> {
         if !(self.emission.is_valid() && (self.emission * self.emission_field().whole.max).is_finite()) {
             return Err(MediumError::Emission);
         }
-        let bounds = self.bounds(None);
+        let bounds = self.stretch_of(&self.bounds(None), f32::INFINITY);
         if bounds.majorant.is_finite() { Ok(self) } else { Err(MediumError::Coefficients) }
     }
 
@@ -225,11 +198,6 @@ impl<'a> Grid<'a> {
     #[must_use]
     pub fn size(&self) -> [u32; 3] {
         self.size
-    }
-
-    #[inline]
-    fn absorption_field(&self) -> &Field<'a> {
-        self.absorption_density.as_ref().unwrap_or(&self.density)
     }
 
     #[inline]
@@ -256,52 +224,6 @@ impl<'a> Grid<'a> {
         }
     }
 
-    /// Bounds of a block, or of the whole grid, as a stretch without end.
-    #[inline]
-    fn bounds(&self, block: Option<usize>) -> Stretch {
-        let density = self.density.bounds(block);
-        let (minorant, majorant) = match &self.absorption_density {
-            None => {
-                let extinction = self.absorption + self.scattering;
-                (extinction * density.min, extinction * density.max)
-            }
-            Some(field) => {
-                let other = field.bounds(block);
-                let sum = |s: f32, a: f32| self.scattering * s + self.absorption * a;
-                (sum(density.min, other.min), sum(density.max, other.max))
-            }
-        };
-        let mut stretch = Stretch { until: f32::INFINITY, minorant, majorant };
-        if stretch.is_constant() {
-            self.keep_promises(block, &mut stretch);
-        }
-        stretch
-    }
-
-    /// Equal bounds promise that everything is constant: not so where only emission, or the two
-    /// parts of extinction in a sum that rounding makes constant, vary.
-    #[cold]
-    fn keep_promises(&self, block: Option<usize>, stretch: &mut Stretch) {
-        let is_constant = |field: &Field<'_>, coefficient: Spectrum| {
-            let bounds = field.bounds(block);
-            coefficient.is_black() || bounds.min == bounds.max
-        };
-        let emits = !self.emission.is_black() && self.emission_field().bounds(block).max > 0.0;
-        let holds = is_constant(&self.density, self.scattering)
-            && is_constant(self.absorption_field(), self.absorption)
-            && is_constant(self.emission_field(), self.emission)
-            && !(emits && stretch.majorant.is_black());
-        if !holds {
-            stretch.majorant = stretch.majorant.map(|c| c.max(f32::MIN_POSITIVE) * (1.0 + 2.0 * f32::EPSILON));
-        }
-    }
-
-    #[inline]
-    fn is_empty(&self, block: usize) -> bool {
-        let empty = |field: &Option<Field<'_>>| field.as_ref().is_none_or(|f| f.is_empty(block));
-        self.density.is_empty(block) && empty(&self.absorption_density) && empty(&self.emission_density)
-    }
-
     /// From a gradient in cell coordinates to one in the world.
     #[inline]
     fn gradient_to_world(&self, gradient: Vec3) -> Vec3 {
@@ -324,17 +246,11 @@ impl Medium for Grid<'_> {
         }
     }
 
+    /// The empty blocks ahead; or the first that is not, and those behind it as long as one bound
+    /// for all costs less than asking again.
     #[inline]
     fn stretch(&self, ray: &Ray, from: f32) -> Stretch {
-        let line = LocalLine::new(&self.cells_from_world, ray);
-        let start = self.reach.0 * ray.origin.abs().max_element() + self.reach.1;
-        let run =
-            majorant::walk(&line, self.size, from, ray.length, (self.reach.0, start), |block| self.is_empty(block));
-        match run {
-            Run::Vacuum(until) => Stretch::vacuum(until),
-            Run::Block(block, until) => Stretch { until, ..self.bounds(Some(block)) },
-            Run::Whole(until) => Stretch { until, ..self.bounds(None) },
-        }
+        self.joined_stretch(ray, from)
     }
 
     #[inline]

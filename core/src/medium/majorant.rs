@@ -1,12 +1,16 @@
 //! A coarse grid of bounds, and the walk of a ray through it.
 
 use bytemuck::{Pod, Zeroable};
-use glam::Vec3;
+use glam::{Affine3, Vec3};
 
-use super::Density;
-use super::region::{LocalLine, Slabs};
+use super::region::{LocalLine, lesser};
+use super::{Density, Grid, MediumError};
 
 /// Cells along the edge of a block.
+///
+/// Measured on a plume of 64³ cells with joined stretches: against 8, blocks of 4 cost some 5 %
+/// more in thin smoke (a ray's majorant thickness around 8) and save 30 % of a free flight where
+/// it is ten times as thick, for fewer null collisions.
 pub const BLOCK: u32 = 4;
 
 /// Bounds of density in a block of [`BLOCK`]³ cells.
@@ -74,15 +78,28 @@ pub(super) fn fill(blocks: &mut [MinMax], density: &Density<'_>, size: [u32; 3])
     whole
 }
 
-/// A run of blocks along a ray.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Run {
-    /// Nothing up to the distance (m), which may be infinite.
-    Vacuum(f32),
-    /// The block of this index up to the distance (m).
-    Block(usize, f32),
-    /// Positions are too coarse to tell blocks apart: all of the grid up to the distance (m).
-    Whole(f32),
+/// A density with the bounds of its blocks.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Field<'a> {
+    pub(super) density: Density<'a>,
+    blocks: &'a [MinMax],
+    pub(super) whole: MinMax,
+}
+
+impl<'a> Field<'a> {
+    pub(super) fn new(density: Density<'a>, size: [u32; 3], blocks: &'a mut [MinMax]) -> Result<Self, MediumError> {
+        density.check(size)?;
+        if blocks.len() != Grid::block_count(size) {
+            return Err(MediumError::Blocks);
+        }
+        let whole = fill(blocks, &density, size);
+        Ok(Self { density, blocks, whole })
+    }
+
+    #[inline]
+    pub(super) fn bounds(&self, block: Option<usize>) -> MinMax {
+        block.map_or(self.whole, |i| self.blocks.get(i).copied().unwrap_or(self.whole))
+    }
 }
 
 /// Where rounding of positions could reach this many cells, blocks are not told apart: 2¹⁸ cells
@@ -90,90 +107,156 @@ pub(super) enum Run {
 /// cell.
 const FAR: f32 = 262_144.0;
 
-/// Walks from `from` along a line, in cell coordinates `[0, size]`, to the end of the first block
-/// in which something is, or of the empty blocks before it.
-///
-/// `reach` is how many cells a distance of 1 m may span (largest row sum of the map) and the
-/// largest coordinate the line starts from.
-#[inline]
-pub(super) fn walk(
-    line: &LocalLine,
-    size: [u32; 3],
-    from: f32,
-    length: f32,
-    reach: (f32, f32),
-    is_empty: impl Fn(usize) -> bool,
-) -> Run {
-    let slabs: Slabs = line.slabs(Vec3::new(size[0] as f32, size[1] as f32, size[2] as f32));
-    let Some((near, far)) = slabs.interval() else { return Run::Vacuum(f32::INFINITY) };
-    if far <= from {
-        return Run::Vacuum(f32::INFINITY);
-    }
-    let mut t = near.max(from);
-    let is_precise = reach.0 * far + reach.1 <= FAR;
-    if !is_precise {
-        return if t > from { Run::Vacuum(t) } else { Run::Whole(far) };
-    }
-    let blocks = blocks_along(size);
-    let start = line.origin + line.direction * t;
-    const PER_CELL: f32 = 1.0 / BLOCK as f32;
-    // One axis of the walk: block index, its step, the plane where the block ends, the number of
-    // blocks left, and how far the index of the whole grid moves.
-    let axis = |i: usize, stride: usize| {
-        let index = ((start[i] * PER_CELL) as u32).min(blocks[i] - 1);
-        let forward = line.direction[i] > 0.0;
-        let plane = ((index + u32::from(forward)) * BLOCK) as f32;
-        Axis {
-            index: index as usize * stride,
+/// How a line meets a grid.
+#[derive(Debug)]
+pub(super) enum Entry {
+    /// Nothing of it lies ahead.
+    Miss,
+    /// Positions are too coarse to tell blocks apart: all of the grid between two distances (m).
+    Coarse(f32, f32),
+    /// Blocks, one after the other.
+    Blocks(Walk),
+}
+
+/// The part of a line in one block.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Segment {
+    pub(super) block: usize,
+    /// Distances (m) between which it lies there; the second is greater.
+    pub(super) begin: f32,
+    pub(super) end: f32,
+}
+
+/// A walk through the blocks along a line; after Amanatides and Woo 1987, but with every distance
+/// computed from the origin, since a sum of steps would drift.
+#[derive(Debug)]
+pub(super) struct Walk {
+    x: Axis,
+    y: Axis,
+    z: Axis,
+    block: usize,
+    t: f32,
+    is_over: bool,
+}
+
+#[derive(Debug)]
+struct Axis {
+    stride: usize,
+    step: f32,
+    /// Where the grid ends.
+    end: f32,
+    /// The plane where the block ends, and the distance (m) to it.
+    plane: f32,
+    exit: f32,
+    /// Blocks left beyond it.
+    left: i32,
+    origin: f32,
+    inverse: f32,
+}
+
+impl Axis {
+    #[inline(always)]
+    fn new(line: (f32, f32, f32), start: f32, stride: usize, size: u32) -> (Self, usize) {
+        const EDGE: f32 = BLOCK as f32;
+        let (origin, direction, inverse) = line;
+        let blocks = size.div_ceil(BLOCK);
+        let index = ((start * (1.0 / EDGE)) as u32).min(blocks - 1);
+        let forward = direction > 0.0;
+        let end = size as f32;
+        let plane = lesser((index + u32::from(forward)) as f32 * EDGE, end);
+        let axis = Self {
             stride: if forward { stride } else { stride.wrapping_neg() },
-            step: if forward { BLOCK as f32 } else { -(BLOCK as f32) },
+            step: if forward { EDGE } else { -EDGE },
+            end,
             plane,
-            left: if forward { blocks[i] - 1 - index } else { index },
-            exit: (plane - line.origin[i]) * line.inverse[i],
-        }
-    };
-    let mut x = axis(0, 1);
-    let mut y = axis(1, blocks[0] as usize);
-    let mut z = axis(2, blocks[0] as usize * blocks[1] as usize);
-    let mut index = x.index + y.index + z.index;
-    loop {
-        let exit = x.exit.min(y.exit).min(z.exit);
-        // A block that rounding makes shorter than nothing holds no distance to speak of.
-        if exit > t {
-            if !is_empty(index) {
-                return if t > from { Run::Vacuum(t) } else { Run::Block(index, exit.min(far)) };
-            }
-            t = exit;
-            if t >= far {
-                return Run::Vacuum(f32::INFINITY);
-            }
-            if t > length {
-                return Run::Vacuum(t);
-            }
-        }
-        let (axis, i) = if x.exit <= y.exit && x.exit <= z.exit {
-            (&mut x, 0)
-        } else if y.exit <= z.exit {
-            (&mut y, 1)
-        } else {
-            (&mut z, 2)
+            exit: (plane - origin) * inverse,
+            left: (if forward { blocks - 1 - index } else { index }) as i32,
+            origin,
+            inverse,
         };
-        if axis.left == 0 {
-            return Run::Vacuum(f32::INFINITY);
+        (axis, index as usize * stride)
+    }
+
+    /// Goes on to the next block if this axis ends the current one at `end` (m). Returns whether it
+    /// did, by how much the index changes, and whether that lies in the grid.
+    #[inline(always)]
+    fn pass(&mut self, end: f32) -> (bool, usize, bool) {
+        if self.exit != end {
+            return (false, 0, true);
         }
-        axis.left -= 1;
-        axis.plane += axis.step;
-        // From the origin each time: a sum of steps would drift.
-        axis.exit = (axis.plane - line.origin[i]) * line.inverse[i];
-        index = index.wrapping_add(axis.stride);
+        self.left -= 1;
+        // The last block may be cut short, and is then left through the grid's end; on the way
+        // back, planes are counted from the start.
+        self.plane = lesser(self.plane + self.step, self.end);
+        self.exit = (self.plane - self.origin) * self.inverse;
+        (true, self.stride, self.left >= 0)
     }
 }
 
-struct Axis {
-    index: usize,
-    stride: usize,
-    step: f32,
-    plane: f32,
-    left: u32,
-    exit: f32,
+/// The distance of a line's origin from the world's (m, largest component) plus the distance along
+/// it up to which rounding of positions is small beside cells.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Reach(f32);
+
+impl Reach {
+    /// Of a map to cells, for a grid no wider than `diameter` (m).
+    pub(super) fn new(cells_from_world: &Affine3, diameter: f32) -> Self {
+        let row = |i: usize| cells_from_world.matrix3.row(i).abs().element_sum();
+        let per_metre = row(0).max(row(1)).max(row(2));
+        let offset = cells_from_world.translation.abs().max_element();
+        // Cells that a metre may span in the worst direction; positions inside lie a diameter
+        // farther than where the line is asked.
+        Self((FAR - offset) / per_metre - diameter)
+    }
+}
+
+impl Walk {
+    /// From distance `from` (m) along a line in cell coordinates `[0, size]`, whose origin has the
+    /// largest component `origin` (m) in the world.
+    #[inline]
+    pub(super) fn enter(line: &LocalLine, size: [u32; 3], from: f32, origin: f32, reach: &Reach) -> Entry {
+        let end = Vec3::new(size[0] as f32, size[1] as f32, size[2] as f32);
+        let (o, d, inverse) = (line.origin, line.direction, line.inverse);
+        let mut t = from;
+        let mut start = o + d * t;
+        let is_inside = start.cmpge(Vec3::ZERO).all() && start.cmple(end).all();
+        let is_precise = origin + t <= reach.0;
+        if !(is_inside && is_precise) {
+            let Some((near, far)) = line.slabs(end).interval() else { return Entry::Miss };
+            if far <= from {
+                return Entry::Miss;
+            }
+            t = near.max(from);
+            let is_precise = origin + t <= reach.0;
+            if !is_precise {
+                return Entry::Coarse(t, far);
+            }
+            start = o + d * t;
+        }
+        let (nx, ny) = (size[0].div_ceil(BLOCK) as usize, size[1].div_ceil(BLOCK) as usize);
+        let (x, i) = Axis::new((o.x, d.x, inverse.x), start.x, 1, size[0]);
+        let (y, j) = Axis::new((o.y, d.y, inverse.y), start.y, nx, size[1]);
+        let (z, k) = Axis::new((o.z, d.z, inverse.z), start.z, nx * ny, size[2]);
+        Entry::Blocks(Self { x, y, z, block: i + j + k, t, is_over: false })
+    }
+
+    /// The next block in which the line has a length; `None` beyond the last.
+    #[inline(always)]
+    pub(super) fn next(&mut self) -> Option<Segment> {
+        while !self.is_over {
+            let end = lesser(lesser(self.x.exit, self.y.exit), self.z.exit);
+            let block = self.block;
+            let (x, y, z) = (self.x.pass(end), self.y.pass(end), self.z.pass(end));
+            self.block = block.wrapping_add(x.1).wrapping_add(y.1).wrapping_add(z.1);
+            // On an edge two axes pass at once; none does only if distances are no numbers.
+            self.is_over = !((x.0 | y.0 | z.0) & x.2 & y.2 & z.2);
+            let begin = self.t;
+            // Where rounding makes a block shorter than nothing, there is no distance to speak of.
+            if end > begin {
+                self.t = end;
+                return Some(Segment { block, begin, end });
+            }
+        }
+        None
+    }
 }

@@ -15,12 +15,14 @@
 //! |---|---|
 //! | [`homogeneous`] | the same everywhere |
 //! | [`grid`] | voxels, trilinear between cell centres |
-//! | [`density`], [`majorant`] | its storage and interpolation; its blocks of bounds and the walk through them |
-//! | [`noise`] | fractal noise |
+//! | [`density`] | its storage and interpolation |
+//! | [`majorant`], `grid_stretch` | its blocks of bounds and the walk through them; how they are joined |
+//! | [`noise`], `perlin` | fractal noise |
 //! | [`region`] | parts of space: boxes, balls |
 //! | [`placed`] | a medium in a region, with holes |
 //! | [`overlap`] | several in the same space |
 //! | [`any`] | one of the above as plain data |
+//! | `ball` | quadrature in a ball |
 //! | [`error`] | what constructors refuse |
 
 pub mod any;
@@ -28,6 +30,7 @@ mod ball;
 pub mod density;
 pub mod error;
 pub mod grid;
+mod grid_stretch;
 pub mod homogeneous;
 pub mod majorant;
 pub mod noise;

@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 use super::MediumError;
-use super::perlin::{self, MAX_SLOPE, MAX_VALUE};
+use super::perlin::{self, MAX_CURVATURE, MAX_SLOPE, MAX_VALUE};
 use crate::host::{Gradients, Medium, Properties, Stretch};
 use crate::math::Ray;
 use crate::phase::Phase;
@@ -78,19 +78,18 @@ impl FractalNoise {
         core::iter::successors(Some(first), next).take(self.octaves as usize)
     }
 
-    /// Each octave's frequency (m⁻¹), amplitude, and noise at a point with its gradient per cell.
+    /// Frequency (m⁻¹), amplitude and seed of each octave.
     #[inline]
-    fn octaves_at(self, point: Vec3) -> impl Iterator<Item = (f32, f32, (f32, Vec3))> {
-        (0_u32..).zip(self.octave_scales()).map(move |(i, (frequency, amplitude))| {
-            let seed = self.seed.wrapping_add(i.wrapping_mul(0x9e37_79b9));
-            (frequency, amplitude, perlin::noise(point * frequency, seed))
-        })
+    fn octaves(self) -> impl Iterator<Item = (f32, f32, u32)> {
+        let seed = move |i: u32| self.seed.wrapping_add(i.wrapping_mul(0x9e37_79b9));
+        (0_u32..).zip(self.octave_scales()).map(move |(i, (frequency, amplitude))| (frequency, amplitude, seed(i)))
     }
 
     /// Density at a point.
+    #[inline]
     #[must_use]
     pub fn density(self, point: Vec3) -> f32 {
-        let sum = self.octaves_at(point).map(|(_, amplitude, (value, _))| amplitude * value).sum::<f32>();
+        let sum = self.octaves().map(|(f, amplitude, seed)| amplitude * perlin::value(point * f, seed)).sum::<f32>();
         (self.offset + sum).max(0.0).min(self.max_density)
     }
 
@@ -98,24 +97,44 @@ impl FractalNoise {
     #[must_use]
     pub fn density_gradient(self, point: Vec3) -> Vec3 {
         let (mut sum, mut gradient) = (self.offset, Vec3::ZERO);
-        for (frequency, amplitude, (value, slope)) in self.octaves_at(point) {
+        for (frequency, amplitude, seed) in self.octaves() {
+            let (value, slope) = perlin::noise(point * frequency, seed);
             sum += amplitude * value;
             gradient += slope * (amplitude * frequency);
         }
         if sum > 0.0 && sum < self.max_density { gradient } else { Vec3::ZERO }
     }
 
-    /// Bounds of density within `radius` (m) of a point: of each octave, what its steepest slope
-    /// leaves possible around its value there.
-    fn density_bounds(self, centre: Vec3, radius: f32) -> (f32, f32) {
-        // Rounding of one octave's value and of the sums.
+    /// Bounds of density on the line through `middle` along `direction`, up to `half` (m) to either
+    /// side, when positions are uncertain by `blur` (m): of each octave, what its slope there and
+    /// the largest curvature, or the steepest slope, leave possible.
+    fn density_bounds(self, middle: Vec3, direction: Vec3, half: f32, blur: f32) -> (f32, f32) {
+        // Rounding of one octave's value, slope and of the sums.
         const ROUNDING: f32 = 1e-5;
         let (mut low, mut high) = (self.offset, self.offset);
-        for (frequency, amplitude, (value, _)) in self.octaves_at(centre) {
-            let change = MAX_SLOPE * frequency * radius + ROUNDING;
+        for (frequency, amplitude, seed) in self.octaves() {
+            let (value, gradient) = perlin::noise(middle * frequency, seed);
+            let (length, uncertainty) = (frequency * half, frequency * blur);
+            let change = if length < 1.0 {
+                let slope = gradient.dot(direction).abs() + MAX_CURVATURE * uncertainty + ROUNDING;
+                (MAX_SLOPE * length).min((slope + 0.5 * MAX_CURVATURE * length) * length)
+            } else {
+                2.0 * MAX_VALUE
+            };
+            let change = change + MAX_SLOPE * uncertainty + ROUNDING;
             low += amplitude * (value - change).max(-MAX_VALUE);
             high += amplitude * (value + change).min(MAX_VALUE);
         }
+        self.clamped(low, high)
+    }
+
+    /// Bounds of density anywhere.
+    fn widest_bounds(self) -> (f32, f32) {
+        let reach = self.octave_scales().map(|(_, amplitude)| amplitude * MAX_VALUE).sum::<f32>();
+        self.clamped(self.offset - reach, self.offset + reach)
+    }
+
+    fn clamped(self, low: f32, high: f32) -> (f32, f32) {
         let slack = 4.0 * f32::EPSILON * (low.abs() + high.abs());
         let clamp = |v: f32| v.max(0.0).min(self.max_density);
         (clamp(low - slack), clamp(high + slack))
@@ -170,7 +189,7 @@ impl Noise {
         let phase = phase.into().check()?;
         // A stretch costs about as much as a collision: long enough for one of each, short enough
         // for the first octave to be told from its extremes.
-        let (_, dense) = shape.density_bounds(Vec3::ZERO, f32::MAX);
+        let (_, dense) = shape.widest_bounds();
         let thickest = ((absorption + scattering) * dense).max_element();
         let cell = 1.0 / shape.frequency;
         let step = (1.0 / thickest).clamp(cell / 16.0, cell / 2.0);
@@ -227,8 +246,8 @@ impl Medium for Noise {
             let until = (t + self.step).max(t.next_up());
             let middle = ray.at(t + 0.5 * (until - t));
             let coordinate = ray.origin.abs().max_element() + until;
-            let radius = 0.5 * (until - t) + ROUNDING * coordinate;
-            let (low, high) = self.shape.density_bounds(middle, radius);
+            let (half, blur) = (0.5 * (until - t), ROUNDING * coordinate);
+            let (low, high) = self.shape.density_bounds(middle, ray.direction, half, blur);
             if high > 0.0 {
                 return if t > from { Stretch::vacuum(t) } else { self.bounded(until, low, high) };
             }

@@ -117,7 +117,7 @@ impl Region {
     pub fn interval(&self, ray: &Ray) -> Option<(f32, f32)> {
         match self {
             Self::Everywhere => Some((f32::NEG_INFINITY, f32::INFINITY)),
-            Self::Box(cube) => cube.slabs(ray).interval(),
+            Self::Box(cube) => cube.interval(ray),
             Self::Sphere(sphere) => sphere.interval(ray),
         }
     }
@@ -173,28 +173,23 @@ impl BoxRegion {
     }
 
     #[inline]
-    fn slabs(&self, ray: &Ray) -> Slabs {
-        let line = LocalLine::new(&self.local_from_world, ray);
-        line.slabs(Vec3::ONE)
+    fn interval(&self, ray: &Ray) -> Option<(f32, f32)> {
+        LocalLine::new(&self.local_from_world, ray).slabs(Vec3::ONE).interval()
     }
 
     pub(super) fn crossings(&self, ray: &Ray) -> Option<[Crossing; 2]> {
-        let slabs = self.slabs(ray);
+        let line = LocalLine::new(&self.local_from_world, ray);
+        let slabs = line.slabs(Vec3::ONE);
         let (entry, exit) = slabs.interval()?;
-        let axis_of = |distances: Vec3, at: f32| (0..3).find(|&i| distances[i] == at).unwrap_or(0);
-        // The gradient of a local coordinate in the world is a row of the inverse map.
-        let normal = |axis: usize, sign: f32| {
+        let crossing = |distances: Vec3, distance: f32, sign: f32| {
+            let axis = (0..3).find(|&i| distances[i] == distance).unwrap_or(0);
+            // The gradient of a local coordinate in the world is a row of the inverse map.
             let row = self.local_from_world.matrix3.row(axis);
             // Scaled before the square root, so that neither tiny nor huge boxes lose it.
-            let scaled = row / row.abs().max_element();
-            scaled.normalize_or(ray.direction) * sign
+            let normal = (row / row.abs().max_element()).normalize_or(ray.direction);
+            Crossing { distance, normal: normal * sign.copysign(sign * line.direction[axis]) }
         };
-        let along = |axis: usize| self.local_from_world.matrix3.row(axis).dot(ray.direction);
-        let (i, o) = (axis_of(slabs.near, entry), axis_of(slabs.far, exit));
-        Some([
-            Crossing { distance: entry, normal: normal(i, if along(i) > 0.0 { -1.0 } else { 1.0 }) },
-            Crossing { distance: exit, normal: normal(o, if along(o) > 0.0 { 1.0 } else { -1.0 }) },
-        ])
+        Some([crossing(slabs.near, entry, -1.0), crossing(slabs.far, exit, 1.0)])
     }
 }
 
@@ -249,21 +244,36 @@ impl LocalLine {
     #[inline]
     pub(super) fn slabs(&self, size: Vec3) -> Slabs {
         let (a, b) = (-self.origin * self.inverse, (size - self.origin) * self.inverse);
-        Slabs { near: a.min(b), far: a.max(b) }
+        let near = Vec3::new(lesser(a.x, b.x), lesser(a.y, b.y), lesser(a.z, b.z));
+        let far = Vec3::new(greater(a.x, b.x), greater(a.y, b.y), greater(a.z, b.z));
+        Slabs { near, far }
     }
+}
+
+/// The lesser number; one instruction, unlike `f32::min`, which promises an answer beside NaN.
+#[inline(always)]
+pub(super) fn lesser(a: f32, b: f32) -> f32 {
+    if a < b { a } else { b }
+}
+
+/// The greater number.
+#[inline(always)]
+fn greater(a: f32, b: f32) -> f32 {
+    if a > b { a } else { b }
 }
 
 /// Distances at which a line crosses three pairs of parallel planes.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Slabs {
-    pub(super) near: Vec3,
-    pub(super) far: Vec3,
+    near: Vec3,
+    far: Vec3,
 }
 
 impl Slabs {
     #[inline]
     pub(super) fn interval(&self) -> Option<(f32, f32)> {
-        let (near, far) = (self.near.max_element(), self.far.min_element());
+        let near = greater(greater(self.near.x, self.near.y), self.near.z);
+        let far = lesser(lesser(self.far.x, self.far.y), self.far.z);
         (near < far).then_some((near, far))
     }
 }

@@ -1,1 +1,37 @@
-//! To come.
+//! Layer 6: light scattered more than once, by random walks with gradients.
+//!
+//! ```text
+//! L_m ≈ (1/N) Σ_paths Σ_{k≥1} W_k L_s(x_k, ω'_k),
+//! ∇(W_k L_s) = W_k L_s Σ_i [∇σₛ(x_i)/σₛ(x_i) − ∇τ_joint(x_{i−1}, x_i)] + W_k ∇L_s(x_k)
+//! ```
+//!
+//! Jarosz et al. 2008, Eq. 27–30, as in the sheet's § 1.7: the whole path is translated with its
+//! start; phase functions, densities, lengths and roulette are frozen. Departs from the paper:
+//!
+//! - lengths come from delta tracking, which suits heterogeneous media; Eq. 29 remains as a choice;
+//! - within its near field ([`Light::near_field`](crate::light::Light::near_field): all of space for
+//!   lights without extent) a light is joined not to the collisions but to a point of every segment,
+//!   sampled equiangularly (Kulla and Fajardo 2012), which takes the `1/ρ²` out along the segment.
+//!   What is left of `‖∇L‖` still diverges logarithmically, so the fall-off of lights without extent
+//!   may be held constant within a small distance ([`Settings::closest`]);
+//! - the light of surfaces enters through the direction in which the walk goes on anyway.
+//!
+//! `L_m` does not contain `σₛ` of the point itself. The light a surface sends straight to that
+//! point is single scattering and left out here. Emission of the medium is left out, too.
+//!
+//! | file | holds |
+//! |---|---|
+//! | `weight` | [`Weight`]: a path's weight and its gradient, in forward mode |
+//! | `flight` | the distance to the next collision: delta tracking, or J's Eq. 29 |
+//! | `walk` | [`Walk`]: one path; [`Incoming`]: the light it brings |
+//! | `estimate` | [`sample`], [`sample_directional`]: sums over paths |
+
+mod estimate;
+mod flight;
+mod walk;
+mod weight;
+
+pub use estimate::{sample, sample_directional};
+pub use flight::Lengths;
+pub use walk::{Incoming, Settings, Walk};
+pub use weight::Weight;

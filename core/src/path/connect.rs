@@ -63,9 +63,13 @@ pub(super) fn choose(
     choice: f32,
     u: Vec2,
 ) -> Option<(LightSample, f32)> {
-    let chosen = discrete::choose(lights.len(), |i| importance(&lights[i], point, in_medium), choice)?;
-    let sample = lights[chosen.index].sample(point, u)?;
-    Some((sample, chosen.probability))
+    if let [light] = lights {
+        // What cannot be reached, sampling itself finds out.
+        return if in_medium && is_near(light, point) { None } else { Some((light.sample(point, u)?, 1.0)) };
+    }
+    let weighted = lights.iter().map(|light| (importance(light, point, in_medium), light));
+    let (light, chosen) = discrete::choose(weighted, choice)?;
+    Some((light.sample(point, u)?, chosen.probability))
 }
 
 /// Transmittance times visibility between `origin` and a light, 0 or more per channel.
@@ -124,20 +128,12 @@ pub(super) fn along<M: Medium + ?Sized, S: Scene + ?Sized>(
     let lights = world.lights;
     let around =
         |pivot: Vec3, (near, far): (f32, f32)| Equiangular::new(segment.origin, segment.direction, pivot, near, far);
-    let strength = |i: usize| {
-        let light = &lights[i];
-        let Some(interval) = light.near_interval(segment, near, far) else { return 0.0 };
-        if lights.len() == 1 {
-            return 1.0;
-        }
-        let centre = light.near_field().map(|field| field.centre());
-        centre.and_then(|centre| around(centre, interval)).map_or(0.0, |e| e.weight() * light.intensity())
-    };
-    let Some(chosen) = discrete::choose(lights.len(), strength, random.0) else {
-        return Spectrum::ZERO;
-    };
-    let light = &lights[chosen.index];
-    let Some(interval) = light.near_interval(segment, near, far) else {
+    let reached = lights.iter().filter_map(|light| {
+        let interval = light.near_interval(segment, near, far)?;
+        let strength = if lights.len() == 1 { 1.0 } else { strength(light, segment, interval)? };
+        Some((strength, (light, interval)))
+    });
+    let Some(((light, interval), chosen)) = discrete::choose(reached, random.0) else {
         return Spectrum::ZERO;
     };
     let Some((pivot, source)) = light.anchor(random.2) else {
@@ -172,4 +168,16 @@ pub(super) fn along<M: Medium + ?Sized, S: Scene + ?Sized>(
         arriving *= transmittance(world.medium, &segment.with_length(distance), rng);
     }
     scattered * arriving * incident.irradiance * (weight / (equiangular.pdf(distance) * chosen.probability))
+}
+
+/// About what a light sends to a part of a ray: its intensity times `length / (r₀ r₁)`, which is
+/// the integral of `1/r²` but for the difference between the angle seen and its sine.
+#[inline]
+fn strength(light: &Light<'_>, segment: &Ray, (near, far): (f32, f32)) -> Option<f32> {
+    let centre = light.near_field()?.centre();
+    let start = segment.at(near).distance(centre);
+    // Infinitely far, length and distance cancel.
+    let stretch = if far.is_finite() { (far - near) / segment.at(far).distance(centre) } else { 1.0 };
+    // A light on the ray itself must not become infinitely strong.
+    Some(light.intensity() * (stretch / start).min(1e6 / (far - near).min(1e6)).max(1e-12))
 }

@@ -188,10 +188,8 @@ impl Phase {
         let (lobe, u_cos) = if self.count == 1 {
             (self.lobes[0], u.x)
         } else {
-            match discrete::choose(self.count, |i| self.weights[i].mean(), u.x) {
-                Some(choice) => (self.lobes[choice.index], choice.remainder),
-                None => (self.lobes[0], u.x),
-            }
+            let lobes = self.lobes().map(|(lobe, weight)| (weight.mean(), lobe));
+            discrete::choose(lobes, u.x).map_or((self.lobes[0], u.x), |(lobe, choice)| (lobe, choice.remainder))
         };
         let cosine = lobe.sample(u_cos);
         let (sin_azimuth, cos_azimuth) = crate::math::float::sin_cos(2.0 * PI * u.y);

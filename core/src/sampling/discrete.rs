@@ -15,39 +15,39 @@ pub struct Choice {
     pub remainder: f32,
 }
 
-/// Chooses among `count` entries in proportion to `weight(i)` (≥ 0) in one pass over the weights
-/// and one over the choice. `None` if all weights are 0.
+/// Chooses among entries in proportion to their weights (≥ 0), each computed once, along with
+/// whatever else was computed with it. `None` if no weight is positive.
+///
+/// Weighted reservoir of size 1 (Chao 1982) that stretches one uniform number over all its
+/// decisions: meant for up to some hundreds of entries, after which its bits run out.
 ///
 /// ```
 /// # use fogbow::sampling::discrete::choose;
-/// let weights = [1.0, 0.0, 3.0];
-/// let choice = choose(3, |i| weights[i], 0.5).unwrap();
-/// assert_eq!((choice.index, choice.probability), (2, 0.75));
+/// let (name, choice) = choose([(1.0, "a"), (0.0, "b"), (3.0, "c")], 0.5).unwrap();
+/// assert_eq!((name, choice.index, choice.probability), ("c", 2, 0.75));
 /// ```
 #[inline]
-pub fn choose(count: usize, weight: impl Fn(usize) -> f32, u: f32) -> Option<Choice> {
-    if count == 1 {
-        return (weight(0) > 0.0).then_some(Choice { index: 0, probability: 1.0, remainder: u });
-    }
-    let total: f32 = (0..count).map(&weight).sum();
-    if total <= 0.0 || !total.is_finite() {
-        return None;
-    }
-    let mut left = u * total;
-    let mut last = None;
-    for index in 0..count {
-        let w = weight(index);
-        if w <= 0.0 {
+pub fn choose<T>(entries: impl IntoIterator<Item = (f32, T)>, u: f32) -> Option<(T, Choice)> {
+    let mut total = 0.0;
+    let mut remainder = u;
+    let mut chosen = None;
+    for (index, (weight, entry)) in entries.into_iter().enumerate() {
+        if !(weight > 0.0 && weight < f32::INFINITY) {
             continue;
         }
-        last = Some(Choice { index, probability: w / total, remainder: ONE_MINUS_EPSILON });
-        if left < w {
-            return last.map(|c| Choice { remainder: (left / w).clamp(0.0, ONE_MINUS_EPSILON), ..c });
+        total += weight;
+        // The newcomer takes the upper end of the unit interval, so that one entry keeps `u` as it is.
+        let keep = 1.0 - weight / total;
+        if remainder >= keep {
+            remainder = if keep > 0.0 { (remainder - keep) / (1.0 - keep) } else { remainder };
+            chosen = Some((entry, index, weight));
+        } else {
+            remainder /= keep;
         }
-        left -= w;
     }
-    // Rounding carried `left` past the last weight.
-    last
+    let (entry, index, weight) = chosen?;
+    let remainder = remainder.clamp(0.0, ONE_MINUS_EPSILON);
+    Some((entry, Choice { index, probability: weight / total, remainder }))
 }
 
 /// Writes the running sums of `weights`, scaled to end at 1, over the weights themselves.

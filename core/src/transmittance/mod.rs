@@ -3,9 +3,11 @@
 //! | file | holds |
 //! |---|---|
 //! | [`tracking`] | flights to the next collision (delta tracking), transmittance (ratio tracking) |
+//! | [`thickness`] | optical thickness by closed forms and marching, with both gradients |
 //!
 //! Closed forms wherever a [`Stretch`](crate::host::Stretch) says that the medium is constant.
 
+pub mod thickness;
 pub mod tracking;
 
 pub use tracking::{Flight, flight, transmittance};

@@ -45,6 +45,13 @@ pub fn flight(medium: &(impl Medium + ?Sized), ray: &Ray, throughput: Spectrum, 
     if medium.is_grey() { grey(medium, ray, u, rng) } else { coloured(medium, ray, throughput, u, rng) }
 }
 
+/// Optical thickness of an exponential step. `1 − u` is exact for the multiples of 2⁻²⁴ that uniform
+/// numbers are, so the plain logarithm is as good as `ln_1p` here, and twice as fast.
+#[inline]
+fn step(u: f32) -> f32 {
+    -float::ln(1.0 - u)
+}
+
 /// Bookkeeping of the part of a ray that holds a medium.
 struct Span(Option<(f32, f32)>);
 
@@ -68,7 +75,7 @@ fn grey(medium: &(impl Medium + ?Sized), ray: &Ray, u: f32, rng: &mut Generator)
     let mut t = 0.0;
     // Optical thickness up to the next tentative collision; what a stretch does not use up is
     // carried into the next.
-    let mut thickness = -float::ln_1p(-u);
+    let mut thickness = step(u);
     while t < ray.length {
         let stretch = medium.stretch(ray, t);
         let end = stretch.until.min(ray.length);
@@ -78,12 +85,12 @@ fn grey(medium: &(impl Medium + ?Sized), ray: &Ray, u: f32, rng: &mut Generator)
             let inverse = 1.0 / bound;
             let start = t;
             loop {
-                let step = thickness * inverse;
-                if t + step >= end {
+                let length = thickness * inverse;
+                if t + length >= end {
                     thickness = (thickness - (end - t) * bound).max(0.0);
                     break;
                 }
-                t += step;
+                t += length;
                 let point = ray.at(t);
                 if emissive {
                     emission += medium.properties(point).emission * inverse;
@@ -101,7 +108,7 @@ fn grey(medium: &(impl Medium + ?Sized), ray: &Ray, u: f32, rng: &mut Generator)
                         span: span.finish(t),
                     };
                 }
-                thickness = -float::ln_1p(-uniform(rng));
+                thickness = step(uniform(rng));
             }
             span.extend(start, end);
         }
@@ -127,7 +134,7 @@ fn coloured(medium: &(impl Medium + ?Sized), ray: &Ray, throughput: Spectrum, u:
     let mut emission = Spectrum::ZERO;
     let mut span = Span(None);
     let mut t = 0.0;
-    let mut thickness = -float::ln_1p(-u);
+    let mut thickness = step(u);
     while t < ray.length {
         let stretch = medium.stretch(ray, t);
         let end = stretch.until.min(ray.length);
@@ -136,14 +143,14 @@ fn coloured(medium: &(impl Medium + ?Sized), ray: &Ray, throughput: Spectrum, u:
         if majorant.max_element() > 0.0 {
             let bound = majorant[channel];
             loop {
-                let step = if bound > 0.0 { thickness / bound } else { f32::INFINITY };
-                let travelled = step.min(end - t);
+                let length = if bound > 0.0 { thickness / bound } else { f32::INFINITY };
+                let travelled = length.min(end - t);
                 relative = passed(relative, majorant, channel, travelled);
-                if t + step >= end {
+                if t + length >= end {
                     thickness = (thickness - (end - t) * bound).max(0.0);
                     break;
                 }
-                t += step;
+                t += length;
                 let properties = medium.properties(ray.at(t));
                 if emissive {
                     let density = mixture(relative * majorant);
@@ -163,7 +170,7 @@ fn coloured(medium: &(impl Medium + ?Sized), ray: &Ray, throughput: Spectrum, u:
                 }
                 let null = (majorant - extinction).max(Spectrum::ZERO);
                 relative *= null / null[channel];
-                thickness = -float::ln_1p(-uniform(rng));
+                thickness = step(uniform(rng));
             }
             span.extend(start, end);
         }
@@ -231,7 +238,7 @@ fn grey_transmittance(medium: &(impl Medium + ?Sized), ray: &Ray, rng: &mut (imp
         if range > 0.0 {
             let inverse = 1.0 / range;
             loop {
-                t -= float::ln_1p(-uniform(rng)) * inverse;
+                t += step(uniform(rng)) * inverse;
                 if t >= end {
                     break;
                 }
@@ -266,7 +273,7 @@ fn coloured_transmittance(medium: &(impl Medium + ?Sized), ray: &Ray, rng: &mut 
         if range > 0.0 {
             let inverse = 1.0 / range;
             loop {
-                t -= float::ln_1p(-uniform(rng)) * inverse;
+                t += step(uniform(rng)) * inverse;
                 if t >= end {
                     break;
                 }

@@ -42,21 +42,22 @@ pub(super) enum Primitive {
 }
 
 impl Primitive {
-    /// The outward normal (unit; not normalised for boxes) at a point of the surface.
+    /// The outward normal (unit) at a point of the surface.
+    #[inline]
     pub(super) fn normal(&self, point: Vec3) -> Vec3 {
         match self {
             Self::Flat { normal, .. } => *normal,
             Self::Sphere { centre, radius } => ((point - centre) / *radius).normalize(),
             Self::Box { rows } => {
-                let mut best = (0.0_f32, Vec3::Z);
+                // Of the three coordinates, the one nearest to ±1 tells the face.
+                let (mut largest, mut outward) = (0.0_f32, Vec3::Z);
                 for (gradient, start) in rows {
                     let coordinate = gradient.dot(point) + start;
-                    // Opposite faces share a direction.
-                    if coordinate.abs() > best.0 {
-                        best = (coordinate.abs(), gradient.normalize() * coordinate.signum());
+                    if coordinate.abs() > largest {
+                        (largest, outward) = (coordinate.abs(), *gradient * coordinate.signum());
                     }
                 }
-                best.1
+                outward.normalize()
             }
         }
     }

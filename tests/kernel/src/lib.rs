@@ -7,7 +7,10 @@
 #![no_std]
 
 mod digest;
+mod estimates;
+mod media;
 mod sections;
+mod walks;
 
 pub use digest::Digest;
 

@@ -5,7 +5,6 @@ use fogbow::light::{
     EnvironmentMap, Light, MeshLight, PhongLight, PointLight, QuadLight, SphereLight, SpotLight, Sun, Triangle,
 };
 use fogbow::math::{Bounds, Frame, Mat3, Ray, Vec2, Vec3, float, quadrature};
-use fogbow::medium::Homogeneous;
 use fogbow::phase::{Deflection, Lobe, Phase, deflection};
 use fogbow::sampling::uniform::uniform2;
 use fogbow::sampling::{Generator, discrete, distance, mis, uniform, warp};
@@ -13,7 +12,7 @@ use fogbow::spectrum::{Gradient, Hessian, Spectrum};
 use fogbow::storage::List;
 use fogbow::surface::Surface;
 
-use crate::{Digest, Section};
+use crate::{Digest, Section, estimates, media, walks};
 
 /// Every section, lowest layer first.
 pub const SECTIONS: &[Section] = &[
@@ -21,27 +20,34 @@ pub const SECTIONS: &[Section] = &[
     Section { name: "spectrum", run: spectrum },
     Section { name: "storage", run: storage },
     Section { name: "sampling", run: sampling },
+    Section { name: "sh", run: estimates::spherical_harmonics },
     Section { name: "phase", run: phase },
     Section { name: "surface", run: surface },
     Section { name: "host", run: host },
-    Section { name: "medium", run: medium },
+    Section { name: "medium", run: media::medium },
     Section { name: "light", run: light },
+    Section { name: "transmittance", run: media::transmittance },
+    Section { name: "thickness", run: estimates::thickness },
+    Section { name: "single_scatter", run: estimates::single_scatter },
+    Section { name: "march", run: estimates::march },
+    Section { name: "multiple_scatter", run: estimates::multiple_scatter },
+    Section { name: "path", run: walks::path },
 ];
 
 /// Inputs of each section: enough to pass through every branch, few enough for a browser.
-const ROUNDS: usize = 256;
+pub(crate) const ROUNDS: usize = 256;
 
 /// A point within 4 m of the origin.
-fn point(rng: &mut Generator) -> Vec3 {
+pub(crate) fn point(rng: &mut Generator) -> Vec3 {
     let p = uniform2(rng);
     (Vec3::new(p.x, p.y, uniform(rng)) - Vec3::splat(0.5)) * 8.0
 }
 
-fn direction(rng: &mut Generator) -> Vec3 {
+pub(crate) fn direction(rng: &mut Generator) -> Vec3 {
     warp::uniform_sphere(uniform2(rng))
 }
 
-fn colour(rng: &mut Generator) -> Spectrum {
+pub(crate) fn colour(rng: &mut Generator) -> Spectrum {
     let p = uniform2(rng);
     Spectrum::new(p.x, p.y, uniform(rng))
 }
@@ -129,7 +135,7 @@ fn sampling(out: &mut Digest) {
         out.float(mis::balance(u.x, u.y));
         out.float(mis::power(u.x, u.y));
         let weights = colour(&mut rng).0;
-        out.option(discrete::choose(3, |i| weights[i], u.x), |out, choice| {
+        out.option(discrete::choose(weights.map(|w| (w, ())), u.x), |out, ((), choice)| {
             out.int(choice.index as u64);
             out.float(choice.probability);
             out.float(choice.remainder);
@@ -218,7 +224,7 @@ impl Medium for Haze {
     }
 }
 
-fn questions(out: &mut Digest, medium: &dyn Medium, rng: &mut Generator) {
+pub(crate) fn questions(out: &mut Digest, medium: &dyn Medium, rng: &mut Generator) {
     let at = point(rng);
     let properties = medium.properties(at);
     [properties.absorption, properties.scattering, properties.emission, properties.albedo(), medium.extinction(at)]
@@ -245,19 +251,6 @@ fn host(out: &mut Digest) {
     let mut rng = Generator::new(7);
     for _ in 0..ROUNDS {
         questions(out, &Haze, &mut rng);
-    }
-}
-
-fn medium(out: &mut Digest) {
-    let mut rng = Generator::new(8);
-    for _ in 0..ROUNDS {
-        let (absorption, scattering) = (colour(&mut rng), colour(&mut rng));
-        let fog = Homogeneous::new(absorption, scattering, Lobe::HenyeyGreenstein { g: 0.7 })
-            .and_then(|fog| fog.with_emission(absorption));
-        match fog {
-            Ok(fog) => questions(out, &fog, &mut rng),
-            Err(_) => out.int(u64::MAX),
-        }
     }
 }
 

@@ -1,0 +1,122 @@
+//! Front-to-back integration.
+
+use glam::Vec3;
+
+use crate::host::{Medium, Properties};
+use crate::math::{Ray, float};
+use crate::sampling::distance::truncated_exponential;
+use crate::spectrum::Spectrum;
+
+/// Most steps along one ray: a step function that returns too little must not hang the host.
+const MAX_STEPS: u32 = 1 << 20;
+
+/// Transmittance below which an endless medium hides what is left of it.
+const NEGLIGIBLE: f32 = 1e-7;
+
+/// Light along an eye ray.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct EyeRay {
+    /// Radiance (W·m⁻²·sr⁻¹) scattered and emitted towards the eye by the medium.
+    pub radiance: Spectrum,
+    /// Transmittance of the whole ray: what lies behind it is multiplied by this and added.
+    pub transmittance: Spectrum,
+}
+
+/// Integrates in-scattered and emitted light along `ray`, as seen from its origin.
+///
+/// `step(distance)` is the length (m) of the step that starts at `distance`; `in_scattering(point,
+/// to_eye, properties)` is `L_i` (W·m⁻²·sr⁻¹), *without* `σₛ`, asked once per step outside vacuum;
+/// `offset`, in [0, 1), places the sample in every step.
+///
+/// ```text
+/// L = Σ T(t_i) (σₛ L_i + ε) (1 − e^{−σₜ Δ_i})/σₜ,   T ← T e^{−σₜ Δ_i}
+/// ```
+///
+/// On constant stretches the transmittance is exact and the sample is placed by the truncated
+/// exponential law, so that `L_i` alone decides the error; elsewhere the medium is taken as constant
+/// within a step. Steps end at the stretches' ends and at the end of the ray. Vacuum costs nothing.
+/// An endless ray stops where the medium ends or hides the rest.
+///
+/// ```
+/// # use fogbow::{march::eye_ray, math::{Ray, Vec3}, medium::Homogeneous, phase::Lobe, spectrum::Spectrum};
+/// let fog = Homogeneous::new(Spectrum::splat(0.5), Spectrum::splat(0.5), Lobe::Isotropic).unwrap();
+/// let ray = Ray::new(Vec3::ZERO, Vec3::X).with_length(2.0);
+/// let seen = eye_ray(&ray, &fog, |_| 0.3, |_, _, _| Spectrum::ONE, 0.5);
+/// assert!((seen.radiance[0] - 0.5 * (1.0 - (-2.0_f32).exp())).abs() < 1e-6);
+/// assert!((seen.transmittance[0] - (-2.0_f32).exp()).abs() < 1e-6);
+/// ```
+pub fn eye_ray(
+    ray: &Ray,
+    medium: &(impl Medium + ?Sized),
+    mut step: impl FnMut(f32) -> f32,
+    mut in_scattering: impl FnMut(Vec3, Vec3, &Properties) -> Spectrum,
+    offset: f32,
+) -> EyeRay {
+    let to_eye = -ray.direction;
+    let mut radiance = Spectrum::ZERO;
+    let mut thickness = Spectrum::ZERO;
+    let mut at = 0.0_f32;
+    let mut left = MAX_STEPS;
+    while at < ray.length && left > 0 {
+        let stretch = medium.stretch(ray, at);
+        let until = if stretch.until > at { stretch.until } else { at + medium.resolution().max(at * 1e-6) };
+        let until = until.min(ray.length);
+        left -= 1;
+        if stretch.majorant.is_black() {
+            at = until;
+            continue;
+        }
+        let constant = stretch.is_constant();
+        let (entry, before) = (at, thickness);
+        // A host's step of 0 or NaN must still lead on.
+        let least = if until.is_finite() { (until - at) * 1e-6 } else { 1e-6 };
+        while at < until && left > 0 {
+            left -= 1;
+            let transmittance = thickness.transmitted();
+            if transmittance.max_element() < NEGLIGIBLE && (until.is_infinite() || transmittance.is_black()) {
+                return EyeRay { radiance, transmittance: Spectrum::ZERO };
+            }
+            let wanted = step(at);
+            let wanted = if wanted > least { wanted } else { least };
+            // What is left over by rounding is no step of its own.
+            let end = if at + wanted >= until * (1.0 - 1e-6) { until } else { at + wanted };
+            let end = if end.is_finite() { end } else { at + 1.0 / stretch.majorant.max_element() };
+            let length = end - at;
+            if !(length > 0.0) {
+                at = until;
+                break;
+            }
+            let (distance, extinction, weight, properties);
+            if constant {
+                let sample = truncated_exponential(offset, stretch.majorant.mean(), length);
+                distance = sample.distance;
+                properties = medium.properties(ray.at(at + distance));
+                extinction = stretch.majorant;
+                weight = (extinction * distance).transmitted() / sample.pdf;
+            } else {
+                distance = offset * length;
+                properties = medium.properties(ray.at(at + distance));
+                extinction = properties.extinction();
+                weight = extinction.map(|sigma| attenuated_length(sigma, length));
+            }
+            if !(properties.scattering.is_black() && properties.emission.is_black()) {
+                let mut source = properties.emission;
+                if !properties.scattering.is_black() {
+                    source += properties.scattering * in_scattering(ray.at(at + distance), to_eye, &properties);
+                }
+                radiance += transmittance * weight * source;
+            }
+            // From the stretch's beginning where it can be: the rounding of many steps adds up.
+            thickness = if constant { before + extinction * (end - entry) } else { thickness + extinction * length };
+            at = end;
+        }
+    }
+    EyeRay { radiance, transmittance: thickness.transmitted() }
+}
+
+/// `∫₀ᵈ e^{−σt} dt = (1 − e^{−σd})/σ` (m).
+#[inline]
+fn attenuated_length(extinction: f32, length: f32) -> f32 {
+    let a = extinction * length;
+    if a < 1e-4 { length * (1.0 - 0.5 * a) } else { -float::exp_m1(-a) / extinction }
+}

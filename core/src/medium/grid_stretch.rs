@@ -1,0 +1,140 @@
+//! Bounds of a voxel grid along a ray.
+
+use super::Grid;
+use super::majorant::{Entry, Field, MinMax, Walk};
+use super::region::LocalLine;
+use crate::host::Stretch;
+use crate::math::Ray;
+use crate::spectrum::Spectrum;
+
+/// Expected null collisions a joined stretch may add over its blocks by themselves: asking for a
+/// stretch costs some three collisions. With 0 a ray through thin smoke takes twice the time; with
+/// more, the bounds of thick clouds get loose.
+const WASTE: f32 = 1.0;
+
+/// Majorant thickness of a stretch at which no more is joined: a walk has most likely ended by then.
+const ENOUGH: f32 = 2.0;
+
+/// Bounds of the densities of a grid; those without a field repeat the first.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct FieldBounds {
+    density: MinMax,
+    absorption: MinMax,
+    emission: MinMax,
+}
+
+impl FieldBounds {
+    #[inline]
+    fn union(&self, other: &Self) -> Self {
+        Self {
+            density: self.density.union(other.density),
+            absorption: self.absorption.union(other.absorption),
+            emission: self.emission.union(other.emission),
+        }
+    }
+
+    #[inline]
+    fn is_constant(&self) -> bool {
+        [self.density, self.absorption, self.emission].iter().all(|b| b.min == b.max)
+    }
+
+    #[inline]
+    fn is_empty(&self) -> bool {
+        self.density.max == 0.0 && self.absorption.max == 0.0 && self.emission.max == 0.0
+    }
+}
+
+impl Grid<'_> {
+    /// See [`Medium::stretch`](crate::host::Medium::stretch) of a grid.
+    #[inline]
+    pub(super) fn joined_stretch(&self, ray: &Ray, from: f32) -> Stretch {
+        let line = LocalLine::new(&self.cells_from_world, ray);
+        let origin = ray.origin.abs().max_element();
+        let mut walk = match Walk::enter(&line, self.size, from, origin, &self.reach) {
+            Entry::Miss => return Stretch::vacuum(f32::INFINITY),
+            Entry::Coarse(near, _) if near > from => return Stretch::vacuum(near),
+            Entry::Coarse(_, far) => return self.stretch_of(&self.bounds(None), far),
+            Entry::Blocks(walk) => walk,
+        };
+        let (mut run, mut until) = loop {
+            let Some(segment) = walk.next() else { return Stretch::vacuum(f32::INFINITY) };
+            let bounds = self.bounds(Some(segment.block));
+            if !bounds.is_empty() {
+                if segment.begin > from {
+                    return Stretch::vacuum(segment.begin);
+                }
+                break (bounds, segment.end);
+            }
+            if segment.end > ray.length {
+                return Stretch::vacuum(segment.end);
+            }
+        };
+        let is_constant = run.is_constant();
+        let mut thickness = self.thickest(&run) * (until - from);
+        while until < ray.length && (is_constant || thickness < ENOUGH) {
+            let Some(segment) = walk.next() else { break };
+            let bounds = self.bounds(Some(segment.block));
+            let joined = run.union(&bounds);
+            if is_constant {
+                if joined != run {
+                    break;
+                }
+            } else {
+                let higher = self.thickest(&joined);
+                thickness += self.thickest(&bounds) * (segment.end - until);
+                let is_wasteful = higher * (segment.end - from) - thickness > WASTE;
+                if is_wasteful || bounds.is_constant() && !bounds.is_empty() {
+                    break;
+                }
+                run = joined;
+            }
+            until = segment.end;
+        }
+        self.stretch_of(&run, until)
+    }
+
+    /// Bounds of every density in a block, or in the whole grid.
+    #[inline]
+    pub(super) fn bounds(&self, block: Option<usize>) -> FieldBounds {
+        let density = self.density.bounds(block);
+        let of = |field: &Option<Field<'_>>| field.as_ref().map_or(density, |f| f.bounds(block));
+        FieldBounds { density, absorption: of(&self.absorption_density), emission: of(&self.emission_density) }
+    }
+
+    /// Upper bound of extinction (m⁻¹) in any channel.
+    #[inline]
+    fn thickest(&self, bounds: &FieldBounds) -> f32 {
+        self.thickest.0 * bounds.density.max + self.thickest.1 * bounds.absorption.max
+    }
+
+    #[inline]
+    pub(super) fn stretch_of(&self, bounds: &FieldBounds, until: f32) -> Stretch {
+        let sum = |s: f32, a: f32| match self.absorption_density {
+            // Rounded as in a lookup.
+            None => (self.absorption + self.scattering) * s,
+            Some(_) => self.scattering * s + self.absorption * a,
+        };
+        let minorant = sum(bounds.density.min, bounds.absorption.min);
+        let majorant = sum(bounds.density.max, bounds.absorption.max);
+        let mut stretch = Stretch { until, minorant, majorant };
+        if stretch.is_constant() {
+            self.keep_promises(bounds, &mut stretch);
+        }
+        stretch
+    }
+
+    /// Equal bounds promise that everything is constant: not so where only emission, or the two
+    /// parts of extinction in a sum that rounding makes constant, vary.
+    #[cold]
+    fn keep_promises(&self, bounds: &FieldBounds, stretch: &mut Stretch) {
+        let is_constant = |bounds: MinMax, coefficient: Spectrum| coefficient.is_black() || bounds.min == bounds.max;
+        let emits = !self.emission.is_black() && bounds.emission.max > 0.0;
+        let holds = is_constant(bounds.density, self.scattering)
+            && is_constant(bounds.absorption, self.absorption)
+            && is_constant(bounds.emission, self.emission)
+            && !(emits && stretch.majorant.is_black());
+        if !holds {
+            stretch.majorant = stretch.majorant.map(|c| c.max(f32::MIN_POSITIVE) * (1.0 + 2.0 * f32::EPSILON));
+        }
+    }
+}

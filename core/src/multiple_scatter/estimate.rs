@@ -1,0 +1,87 @@
+//! Sums over paths.
+
+use glam::{Vec2, Vec3};
+
+use super::walk::{Incoming, Walk};
+use crate::host::{Hit, Medium, Rng, Scene};
+use crate::math::Ray;
+use crate::phase::Phase;
+use crate::sampling::{uniform, uniform2};
+use crate::single_scatter::{Contribution, Directional, Sums};
+use crate::spectrum::Spectrum;
+
+/// Walks `paths` paths whose first directions are stratified in their cosine.
+fn for_each_path<M: Medium + ?Sized, S: Scene + ?Sized>(
+    walk: &Walk<'_, M, S>,
+    point: Vec3,
+    mut outgoing: impl FnMut(&Ray, &Hit) -> Spectrum,
+    paths: u32,
+    rng: &mut (impl Rng + ?Sized),
+    mut visit: impl FnMut(&Incoming),
+) {
+    let share = 1.0 / paths.max(1) as f32;
+    let shift = uniform2(rng);
+    for j in 0..paths {
+        // The golden ratio spreads the azimuths whatever the number of paths.
+        let azimuth = f64::from(j) * 0.618_033_988_749_894_9 + f64::from(shift.y);
+        let first = Vec2::new(
+            ((j as f32 + uniform(rng)) * share).min(1.0 - f32::EPSILON),
+            (azimuth - libm::floor(azimuth)) as f32,
+        );
+        let mut incoming = walk.path(point, first, &mut outgoing, rng);
+        incoming.light = incoming.light * share;
+        visit(&incoming);
+    }
+}
+
+/// Multiply scattered radiance at `point` towards `to_eye` (unit), with its gradient and the sums of
+/// J's Eq. 34: each path is one summand, its vertices' gradients added as vectors.
+///
+/// Unbiased but for the marching of transmittance towards lights, the cut at
+/// [`Settings::max_vertices`](super::Settings) and [`Settings::closest`](super::Settings). The
+/// unshadowed sums equal the others: shadows inside a path are part of it.
+///
+/// ```
+/// # use fogbow::{host::Empty, light::{Light, Sun}, math::Vec3, medium::Homogeneous, phase::{Lobe, Phase}};
+/// # use fogbow::multiple_scatter::{Settings, Walk, sample};
+/// # use fogbow::{sampling::Generator, spectrum::Spectrum, transmittance::thickness::Steps};
+/// let dark = Homogeneous::new(Spectrum::ONE, Spectrum::ZERO, Lobe::Isotropic).unwrap();
+/// let lights = [Light::Sun(Sun::new(Vec3::Z, Spectrum::ONE).unwrap())];
+/// let settings = Settings::new(Steps::Length(0.1));
+/// let walk = Walk { medium: &dark, scene: &Empty, lights: &lights, settings };
+/// let phase = Phase::ISOTROPIC;
+/// let sums = sample(&walk, Vec3::ZERO, Vec3::X, &phase, |_, _| Spectrum::ZERO, 8, &mut Generator::new(1));
+/// assert_eq!(sums.value, Spectrum::ZERO);   // soot scatters nothing
+/// ```
+#[must_use]
+pub fn sample<M: Medium + ?Sized, S: Scene + ?Sized>(
+    walk: &Walk<'_, M, S>,
+    point: Vec3,
+    to_eye: Vec3,
+    phase: &Phase,
+    outgoing: impl FnMut(&Ray, &Hit) -> Spectrum,
+    paths: u32,
+    rng: &mut (impl Rng + ?Sized),
+) -> Sums {
+    let mut sums = Sums::default();
+    for_each_path(walk, point, outgoing, paths, rng, |incoming| sums.add(&incoming.scatter(to_eye, phase), true));
+    sums
+}
+
+/// [`sample`] for all directions at once: adds to the expansion's coefficients; the sums returned
+/// are of the mean over directions, `L₀₀ Y₀₀`.
+pub fn sample_directional<M: Medium + ?Sized, S: Scene + ?Sized>(
+    walk: &Walk<'_, M, S>,
+    point: Vec3,
+    outgoing: impl FnMut(&Ray, &Hit) -> Spectrum,
+    paths: u32,
+    rng: &mut (impl Rng + ?Sized),
+    into: &mut Directional<'_>,
+) -> Sums {
+    let mut sums = Sums::default();
+    for_each_path(walk, point, outgoing, paths, rng, |incoming| {
+        let mean: Contribution = incoming.scatter_directional(into.moments, into.coefficients);
+        sums.add(&mean, true);
+    });
+    sums
+}

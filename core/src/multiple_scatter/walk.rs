@@ -1,0 +1,253 @@
+//! One random walk.
+
+use glam::{Vec2, Vec3};
+
+use super::Weight;
+use super::flight::{Collision, Lengths, fly, own};
+use crate::host::{Hit, Medium, Properties, Rng, Scene};
+use crate::light::{Falloff, Light};
+use crate::math::Ray;
+use crate::phase::{self, Phase};
+use crate::sampling::discrete::choose;
+use crate::sampling::distance::Equiangular;
+use crate::sampling::{Generator, uniform, uniform2, warp};
+use crate::sh::Coefficient;
+use crate::single_scatter::{self, Arrival, Contribution, nearest_surface, shadow_ray};
+use crate::spectrum::Spectrum;
+use crate::transmittance::thickness::{Marching, Steps, optical_thickness_with_gradients};
+
+/// Beyond this many distances to the light an endless segment is not sampled equiangularly: 10⁻⁴ of
+/// the angle lies there, and `tan` loses its digits.
+const ENDLESS: f32 = 1e4;
+
+/// Least probability of survival: below, the weights of the rare survivors show as fireflies.
+const MIN_SURVIVAL: f32 = 0.05;
+
+/// How to walk.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Settings {
+    /// Most vertices of a path.
+    pub max_vertices: u32,
+    /// Vertex (from 1) from which Russian roulette is played with the weight of each step.
+    pub roulette_from: u32,
+    /// How segments get their lengths.
+    pub lengths: Lengths,
+    /// How transmittance towards lights and its gradients are marched.
+    pub steps: Steps,
+    /// Connect one light per vertex, chosen by importance, rather than all.
+    pub one_light: bool,
+    /// Within this distance (m) of a light without extent the fall-off is held constant. At most
+    /// 10⁻³ mean free paths: the loss is about `(2/3) σₛ` times it, relative to first-collision light.
+    pub closest: f32,
+}
+
+impl Settings {
+    /// Walks of up to 64 vertices, tracked, with roulette from the fourth vertex on.
+    #[must_use]
+    pub const fn new(steps: Steps) -> Self {
+        Self { max_vertices: 64, roulette_from: 4, lengths: Lengths::Tracking, steps, one_light: false, closest: 0.0 }
+    }
+}
+
+/// What a walk needs of the world.
+#[derive(Debug, Clone, Copy)]
+pub struct Walk<'a, M: ?Sized, S: ?Sized> {
+    /// The medium.
+    pub medium: &'a M,
+    /// The surfaces.
+    pub scene: &'a S,
+    /// The lights.
+    pub lights: &'a [Light<'a>],
+    /// How to walk.
+    pub settings: Settings,
+}
+
+/// The light one path brings to its start, over the density of its first direction.
+///
+/// Without the phase function at the start: that is applied by [`Incoming::scatter`] for one
+/// direction or [`Incoming::scatter_directional`] for all.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Incoming {
+    /// First direction of the walk (unit).
+    pub to_light: Vec3,
+    /// Total over the path's vertices (W·m⁻²) with its gradient, the vector sum.
+    pub light: Contribution,
+}
+
+impl Incoming {
+    /// Scattered at the start towards `to_eye`; the first phase function is frozen, too.
+    #[inline]
+    #[must_use]
+    pub fn scatter(&self, to_eye: Vec3, phase: &Phase) -> Contribution {
+        let value = phase.value(phase::deflection(self.to_light, to_eye));
+        Contribution { radiance: self.light.radiance * value, gradient: self.light.gradient * value }
+    }
+
+    /// Scattered in all directions: adds to the coefficients, returns the mean over directions. The
+    /// coefficients `f_l Y_lm` of the first phase function have no gradient here (sheet § 1.7).
+    pub fn scatter_directional(&self, moments: &[Spectrum], expansion: &mut [Coefficient]) -> Contribution {
+        single_scatter::scatter_directional(self.to_light, &self.light, moments, expansion)
+    }
+}
+
+impl<M: Medium + ?Sized, S: Scene + ?Sized> Walk<'_, M, S> {
+    /// One path from `point`; `first` makes its first direction, uniform over the sphere.
+    ///
+    /// `outgoing(ray, hit)` is the radiance a surface sends back along the ray, as for
+    /// [`single_scatter::visit_surfaces`]; it is asked where the walk meets a surface after its first
+    /// collision.
+    pub fn path(
+        &self,
+        point: Vec3,
+        first: Vec2,
+        mut outgoing: impl FnMut(&Ray, &Hit) -> Spectrum,
+        rng: &mut (impl Rng + ?Sized),
+    ) -> Incoming {
+        let rng = &mut own(rng);
+        let to_light = warp::uniform_sphere(first);
+        let mut ray = Ray::new(point, to_light);
+        ray.length = nearest_surface(&ray, self.scene).map_or(f32::INFINITY, |hit| hit.distance);
+        let mut kappa = Spectrum::splat(1.0 / warp::uniform_sphere_pdf());
+        let mut weight = Weight::ONE;
+        let mut total = Contribution::ZERO;
+        for vertex in 1..=self.settings.max_vertices {
+            total += self.near_lights(&ray, &weight, kappa, rng);
+            let marching = self.marching(rng);
+            let hit = fly(&ray, self.medium, self.settings.lengths, weight.value * kappa, marching, rng);
+            let Some(Collision { distance, properties, factor }) = hit else { break };
+            let (segment, at) = (ray.with_length(distance), ray.at(distance));
+            let step = kappa * factor * properties.scattering;
+            if step.is_black() || !step.is_finite() {
+                break;
+            }
+            let slope = optical_thickness_with_gradients(&segment, self.medium, marching).gradient_joint;
+            let next = self.medium.gradients(at).scattering;
+            weight = weight.advance(kappa, factor, &slope, properties.scattering, &next);
+            if vertex >= self.settings.roulette_from {
+                let survival = step.max_element().clamp(MIN_SURVIVAL, 1.0);
+                if uniform(rng) >= survival {
+                    break;
+                }
+                weight = weight.scaled(1.0 / survival);
+            }
+            let to_eye = -ray.direction;
+            total += weight.carry(&self.lights_at(at, to_eye, &properties, rng));
+
+            let turn = properties.phase.sample(to_eye, uniform2(rng));
+            kappa = turn.weight;
+            ray = Ray { origin: at, direction: turn.to_light, length: f32::INFINITY };
+            if let Some(hit) = nearest_surface(&ray, self.scene) {
+                ray.length = hit.distance;
+                let marching = self.marching(rng);
+                let radiance = outgoing(&ray, &hit);
+                let arrival = Arrival::from_surface(&ray, &hit, radiance, turn.pdf, self.medium, marching);
+                if let Some(arrival) = arrival {
+                    total += weight.carry(&arrival.scatter(to_eye, &properties.phase));
+                }
+            }
+        }
+        // A light or a hit within rounding of a vertex may leave the range of f32.
+        if !(total.radiance.is_finite() && total.gradient.is_finite()) {
+            total = Contribution::ZERO;
+        }
+        Incoming { to_light, light: total }
+    }
+
+    #[inline]
+    fn marching(&self, rng: &mut Generator) -> Marching {
+        Marching { steps: self.settings.steps, offset: uniform(rng) }
+    }
+
+    /// Single scattering at a vertex of the lights in whose near field it does not lie.
+    fn lights_at(&self, at: Vec3, to_eye: Vec3, properties: &Properties, rng: &mut Generator) -> Contribution {
+        let importance = |light: &Light<'_>| {
+            let near = light.near_field().is_some_and(|field| field.contains(at));
+            if near { 0.0 } else { light.importance(at) }
+        };
+        self.each_light(importance, rng, |light, share, rng| {
+            let mut sample = light.sample(at, uniform2(rng))?;
+            sample.source.weight = sample.source.weight / share;
+            let arrival = Arrival::from_source(at, self.medium, &sample.source, self.marching(rng), 0.0)?;
+            (!self.scene.is_blocked(&shadow_ray(at, &sample.source)))
+                .then(|| arrival.scatter(to_eye, &properties.phase))
+        })
+    }
+
+    /// Light scattered somewhere along a segment within a light's near field, carried to the start.
+    fn near_lights(&self, ray: &Ray, weight: &Weight, kappa: Spectrum, rng: &mut Generator) -> Contribution {
+        let importance = |light: &Light<'_>| match light.near_field() {
+            Some(field) => light.intensity() / height(ray, field.centre()),
+            None => 0.0,
+        };
+        self.each_light(importance, rng, |light, share, rng| {
+            let (position, source) = light.anchor(uniform2(rng))?;
+            let end = ray.length.min(ENDLESS * ray.origin.distance(position).max(self.medium.resolution()));
+            let (near, far) = light.near_interval(ray, 0.0, end)?;
+            let law = Equiangular::new(ray.origin, ray.direction, position, near, far)?;
+            let distance = law.sample(uniform(rng)).clamp(near, far);
+            let (at, marching) = (ray.at(distance), self.marching(rng));
+            let properties = self.medium.properties(at);
+            if properties.scattering.is_black() {
+                return None;
+            }
+            let source = match source {
+                Some(source) => source,
+                None => light.sample(at, uniform2(rng))?.source,
+            };
+            let closest = if source.falloff == Falloff::Area { 0.0 } else { self.settings.closest };
+            let arrival = Arrival::from_source(at, self.medium, &source, marching, closest)?;
+            if self.scene.is_blocked(&shadow_ray(at, &source)) {
+                return None;
+            }
+            let segment = optical_thickness_with_gradients(&ray.with_length(distance), self.medium, marching);
+            let frozen = kappa / (law.pdf(distance) * share);
+            let slope = self.medium.gradients(at).scattering;
+            let through = segment.value.transmitted();
+            let joined = weight.advance(frozen, through, &segment.gradient_joint, properties.scattering, &slope);
+            Some(joined.carry(&arrival.scatter(-ray.direction, &properties.phase)))
+        })
+    }
+
+    /// Sum of `connect` over all lights with positive importance, or its value for one of them over
+    /// the probability it was chosen with.
+    fn each_light(
+        &self,
+        importance: impl Fn(&Light<'_>) -> f32,
+        rng: &mut Generator,
+        mut connect: impl FnMut(&Light<'_>, f32, &mut Generator) -> Option<Contribution>,
+    ) -> Contribution {
+        let mut sum = Contribution::ZERO;
+        if self.settings.one_light {
+            let weighted = self.lights.iter().map(|light| (importance(light), light));
+            if let Some((light, choice)) = choose(weighted, uniform(rng)) {
+                sum += connect(light, choice.probability, rng).unwrap_or_default();
+            }
+            return sum;
+        }
+        for light in self.lights {
+            if importance(light) > 0.0 {
+                sum += connect(light, 1.0, rng).unwrap_or_default();
+            }
+        }
+        sum
+    }
+}
+
+/// Distance (m) of a light from a ray: its light along the ray sums up to about π over this.
+fn height(ray: &Ray, position: Vec3) -> f32 {
+    let along = ray.direction.dot(position - ray.origin).clamp(0.0, ray.length);
+    ray.at(along).distance(position).max(1e-6)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn height_of_a_light_behind_the_ray_is_its_distance() {
+        let ray = Ray::new(Vec3::ZERO, Vec3::X);
+        assert_eq!(height(&ray, Vec3::new(-3.0, 4.0, 0.0)), 5.0);
+        assert_eq!(height(&ray, Vec3::new(3.0, 4.0, 0.0)), 4.0);
+        assert!(height(&ray, Vec3::X) > 0.0, "a light on the ray itself");
+    }
+}

@@ -1,0 +1,253 @@
+//! Light that arrives through the medium, and what a phase function makes of it.
+
+use glam::Vec3;
+
+use crate::host::{Hit, Medium};
+use crate::light::{Falloff, Source};
+use crate::math::Ray;
+use crate::phase::{self, Phase, deflection_gradient};
+use crate::sh::{self, Coefficient, MAX_DEGREE};
+use crate::spectrum::{Gradient, Spectrum};
+use crate::transmittance::thickness::{self, Marching};
+
+/// Smallest cosine in the gradient of a surface hit: `1/c` at grazing hits has a variance that
+/// grows without bound near silhouettes (sheet § 1.5).
+const MIN_HIT_COSINE: f32 = 1e-3;
+
+/// Light that arrives at a point from one direction, after fog and before shadows.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Arrival {
+    /// Where it comes from (unit).
+    pub to_light: Vec3,
+    /// How far (m); infinite for a distant source.
+    pub distance: f32,
+    /// Irradiance across the light, `w T H` (W·m⁻²).
+    pub irradiance: Spectrum,
+    /// `w (T ∇H + H ∇T)` (W·m⁻³).
+    pub gradient: Gradient,
+}
+
+/// One summand of an estimate: radiance (W·m⁻²·sr⁻¹) and its gradient (W·m⁻³·sr⁻¹).
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Contribution {
+    /// `L_j`.
+    pub radiance: Spectrum,
+    /// `∇L_j`.
+    pub gradient: Gradient,
+}
+
+impl Contribution {
+    /// Nothing.
+    pub const ZERO: Self = Self { radiance: Spectrum::ZERO, gradient: Gradient::ZERO };
+}
+
+impl core::ops::Mul<f32> for Contribution {
+    type Output = Self;
+    #[inline]
+    fn mul(self, factor: f32) -> Self {
+        Self { radiance: self.radiance * factor, gradient: self.gradient * factor }
+    }
+}
+
+impl core::ops::AddAssign for Contribution {
+    #[inline]
+    fn add_assign(&mut self, other: Self) {
+        self.radiance += other.radiance;
+        self.gradient += other.gradient;
+    }
+}
+
+impl Arrival {
+    /// Light from `source` at `point`; `None` where nothing arrives (at the source itself, behind
+    /// it, outside its cone).
+    ///
+    /// ```text
+    /// E = w T H,   ∇E = w (T ∇H + H ∇T),   ∇T with the source fixed
+    /// ```
+    ///
+    /// `closest` (m) bounds the fall-off of a source within the medium: nearer, `H` is that at this
+    /// distance and `∇H = 0`. 0 leaves it exact; see [`crate::multiple_scatter`] for when not to.
+    ///
+    /// ```
+    /// # use fogbow::{host::Empty, light::PointLight, math::Vec3, spectrum::Spectrum};
+    /// # use fogbow::{single_scatter::Arrival, transmittance::thickness::Marching};
+    /// let lamp = PointLight::new(Vec3::new(0.0, 0.0, 2.0), Spectrum::ONE).unwrap().source();
+    /// let arrival = Arrival::from_source(Vec3::ZERO, &Empty, &lamp, Marching::midpoints(8), 0.0).unwrap();
+    /// assert_eq!((arrival.irradiance[0], arrival.gradient.z[0]), (0.25, 0.25));   // nearer is brighter
+    /// ```
+    #[must_use]
+    pub fn from_source(
+        point: Vec3,
+        medium: &(impl Medium + ?Sized),
+        source: &Source,
+        marching: Marching,
+        closest: f32,
+    ) -> Option<Self> {
+        let ray = if source.falloff == Falloff::Distant {
+            Ray { origin: point, direction: -source.normal, length: f32::INFINITY }
+        } else {
+            Ray::between(point, source.position)
+        };
+        let (irradiance, slope) = if ray.length < closest {
+            let (held, _) = source.irradiance(source.position - ray.direction * closest)?;
+            (held, Gradient::ZERO)
+        } else {
+            source.irradiance(point)?
+        };
+        if irradiance.is_black() && slope == Gradient::ZERO {
+            return None;
+        }
+        let arrival = Self::through(&ray, medium, irradiance, slope, marching);
+        // Within about 10⁻¹² m of a strong source 1/r³ leaves the range of f32: as at the source itself.
+        (arrival.irradiance.is_finite() && arrival.gradient.is_finite()).then_some(arrival)
+    }
+
+    /// Light from a surface that a ray from its origin has hit, the ray's direction being drawn with
+    /// density `pdf` (sr⁻¹) and `outgoing` the radiance (W·m⁻²·sr⁻¹) the surface sends back.
+    ///
+    /// ```text
+    /// w H = L/pdf,   ∇(w H) = (L/pdf) (n − 3cu)/(c r)
+    /// ```
+    ///
+    /// The hit stays where it is while the point moves, the density is frozen, and `c` is at least
+    /// 10⁻³ in the gradient. Source: sheet § 1.5 (Jarosz et al. 2008, Eq. 9–13; Eq. 13 lacks 1/(4π)).
+    #[must_use]
+    pub fn from_surface(
+        ray: &Ray,
+        hit: &Hit,
+        outgoing: Spectrum,
+        pdf: f32,
+        medium: &(impl Medium + ?Sized),
+        marching: Marching,
+    ) -> Option<Self> {
+        if outgoing.is_black() || !(hit.distance > 0.0 && pdf > 0.0) {
+            return None;
+        }
+        let u = -ray.direction;
+        let signed = hit.normal.dot(u);
+        // The side that is seen.
+        let normal = if signed < 0.0 { -hit.normal } else { hit.normal };
+        let cosine = signed.abs();
+        let irradiance = outgoing / pdf;
+        let slope = (normal - u * (3.0 * cosine)) / cosine.max(MIN_HIT_COSINE) / hit.distance;
+        let slope = Gradient::outer(irradiance, slope);
+        let arrival = Self::through(&ray.with_length(hit.distance), medium, irradiance, slope, marching);
+        (arrival.irradiance.is_finite() && arrival.gradient.is_finite()).then_some(arrival)
+    }
+
+    fn through(
+        ray: &Ray,
+        medium: &(impl Medium + ?Sized),
+        irradiance: Spectrum,
+        slope: Gradient,
+        marching: Marching,
+    ) -> Self {
+        let t = thickness::transmittance_with_gradients(ray, medium, marching);
+        Self {
+            to_light: ray.direction,
+            distance: ray.length,
+            irradiance: irradiance * t.value,
+            gradient: slope * t.value + t.gradient_fixed * irradiance,
+        }
+    }
+
+    /// Scattered once towards `to_eye` (unit): `L = p E`, `∇L = E ∇p + p ∇E`.
+    #[inline]
+    #[must_use]
+    pub fn scatter(&self, to_eye: Vec3, phase: &Phase) -> Contribution {
+        let deflection = phase::deflection(self.to_light, to_eye);
+        let value = phase.value(deflection);
+        let turn = deflection_gradient(self.to_light, to_eye, self.distance);
+        let slope = Gradient::outer(phase.derivative(deflection), turn);
+        Contribution { radiance: value * self.irradiance, gradient: slope * self.irradiance + self.gradient * value }
+    }
+
+    /// Scattered once in all directions: adds `visible` times the coefficients and their gradients
+    /// to `expansion`, and returns the mean over directions, `E/(4π)`.
+    ///
+    /// ```text
+    /// L_lm = f_l Y_lm(u) E,   ∇L_lm = f_l (E ∇Y_lm + Y_lm ∇E),   u = −to_light
+    /// ```
+    ///
+    /// Source: Jarosz et al. 2008, Eq. 23–26; sheet § 1.6. The expansion is evaluated at `to_eye`.
+    pub fn scatter_directional(
+        &self,
+        moments: &[Spectrum],
+        weight: f32,
+        expansion: &mut [Coefficient],
+    ) -> Contribution {
+        if weight != 0.0 {
+            let known = moments.len().min(sh::degree_of(expansion.len()).map_or(0, |d| d + 1));
+            sh::zonal::coefficients_with_gradients(
+                &moments[..known],
+                -self.to_light,
+                self.distance,
+                |k, value, slope| {
+                    expansion[k].value += value * self.irradiance * weight;
+                    expansion[k].gradient += (slope * self.irradiance + self.gradient * value) * weight;
+                },
+            );
+        }
+        Contribution { radiance: self.irradiance, gradient: self.gradient } * crate::math::float::INV_FOUR_PI
+    }
+}
+
+/// Scatters `incoming` irradiance from the fixed direction `to_light` in all directions: as
+/// [`Arrival::scatter_directional`], but without a gradient of the phase function.
+pub fn scatter_directional(
+    to_light: Vec3,
+    incoming: &Contribution,
+    moments: &[Spectrum],
+    expansion: &mut [Coefficient],
+) -> Contribution {
+    let arrival =
+        Arrival { to_light, distance: f32::INFINITY, irradiance: incoming.radiance, gradient: incoming.gradient };
+    arrival.scatter_directional(moments, 1.0, expansion)
+}
+
+/// In-scattered radiance at `point` towards `to_eye` from one source, without shadows, and its
+/// gradient.
+///
+/// ```text
+/// L = w p T H,     ∇L = w [(∇p) T H + p (∇T) H + p T (∇H)]
+/// ```
+///
+/// `source` stays fixed. Nothing where no light arrives. Exact where the medium is constant along
+/// the connection, else as exact as `marching`. Source: Jarosz et al. 2008, Eq. 14–15; sheet § 1.5.
+///
+/// ```
+/// # use fogbow::{host::Empty, light::PointLight, math::Vec3, phase::Phase, spectrum::Spectrum};
+/// # use fogbow::{single_scatter::connect, transmittance::thickness::Marching};
+/// let lamp = PointLight::new(Vec3::new(0.0, 0.0, 2.0), Spectrum::ONE).unwrap().source();
+/// let l = connect(Vec3::ZERO, Vec3::X, &Phase::ISOTROPIC, &Empty, &lamp, Marching::midpoints(8));
+/// assert!((l.radiance[0] - 0.25 / (4.0 * 3.14159265)).abs() < 1e-8);
+/// ```
+#[must_use]
+pub fn connect(
+    point: Vec3,
+    to_eye: Vec3,
+    phase: &Phase,
+    medium: &(impl Medium + ?Sized),
+    source: &Source,
+    marching: Marching,
+) -> Contribution {
+    Arrival::from_source(point, medium, source, marching, 0.0)
+        .map_or(Contribution::ZERO, |arrival| arrival.scatter(to_eye, phase))
+}
+
+/// Legendre moments of `phase` up to `degree`, for the expansions of this layer; the rest is 0.
+/// Slices of the first `degree + 1` are what those take.
+///
+/// ```
+/// # use fogbow::{phase::{Lobe, Phase}, single_scatter::moments};
+/// let f = moments(&Phase::from(Lobe::HenyeyGreenstein { g: 0.5 }), 2);
+/// assert_eq!([f[0][0], f[1][0], f[2][0], f[3][0]], [1.0, 0.5, 0.25, 0.0]);
+/// ```
+#[must_use]
+pub fn moments(phase: &Phase, degree: usize) -> [Spectrum; MAX_DEGREE + 1] {
+    let mut moments = [Spectrum::ZERO; MAX_DEGREE + 1];
+    for (l, slot) in moments.iter_mut().enumerate().take(degree + 1) {
+        *slot = phase.moment(l);
+    }
+    moments
+}

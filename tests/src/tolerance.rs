@@ -1,0 +1,24 @@
+//! Every tolerance of the tests, with its reason.
+
+/// Relative, analytic gradient against [`crate::analytic::differences`]: extrapolated differences of
+/// `f32` functions over 1 % of the scale carry about 10⁻⁷/10⁻² of rounding, amplified by the
+/// extrapolation, and by as much again where factors multiply.
+pub const GRADIENT: f32 = 2e-3;
+
+/// Probability that a correct sampler fails a χ² test by chance, over *all* tests of a run: divided
+/// by their number (Bonferroni). Seeds are fixed, so a pass stays a pass.
+pub const CHI_SQUARE_FAMILY: f64 = 1e-3;
+
+/// Number of χ² tests by which [`CHI_SQUARE_FAMILY`] is divided; more than there are.
+pub const CHI_SQUARE_TESTS: f64 = 200.0;
+
+/// Expected count below which bins are pooled: under it the χ² law is a poor approximation.
+pub const CHI_SQUARE_LEAST: f64 = 8.0;
+
+/// Standard errors by which a Monte Carlo mean may miss a known value: 1 in 15 000 by chance, with
+/// fixed seeds.
+pub const STANDARD_ERRORS: f64 = 4.0;
+
+/// Relative, addition theorem and projections of spherical harmonics up to the maximum degree: the
+/// recurrences lose about one unit in the last place per degree.
+pub const SH: f32 = 2e-5;
