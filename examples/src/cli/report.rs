@@ -158,7 +158,7 @@ mod tests {
 
     #[test]
     fn times_read_well() {
-        assert_eq!(clock(3.14), "3.1 s");
+        assert_eq!(clock(3.25), "3.2 s");
         assert_eq!(clock(125.0), "2:05 min");
         assert_eq!(clock(7260.0), "2:01 h");
     }

@@ -206,10 +206,15 @@ impl<'a> Plugin<'a> {
         Ok(Some((transforms::read(&element)?, element)))
     }
 
-    /// Nested objects with one of the tags, or references, that have no name. They are taken
-    /// from the list.
+    /// The next nested object with the tag. Names that Mitsuba leaves to the author
+    /// (`<phase name="first">`, `<ref name="bsdf">`) do not matter; those with a meaning
+    /// (`interior`) are asked for by name.
     pub(super) fn nested(&self, tag: &str) -> Option<Element<'a>> {
-        let child = self.children.iter().find(|c| c.name.is_none() && !c.is_used.get() && c.element.tag() == tag)?;
+        let is_free = |name: &Option<String>| match tag {
+            "ref" => name.as_deref().is_none_or(|n| n == "bsdf"),
+            _ => true,
+        };
+        let child = self.children.iter().find(|c| !c.is_used.get() && c.element.tag() == tag && is_free(&c.name))?;
         child.is_used.set(true);
         Some(child.element)
     }

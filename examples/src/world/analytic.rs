@@ -127,19 +127,19 @@ struct FlatChunk {
 
 impl FlatChunk {
     fn of(primitives: &[Primitive]) -> Self {
-        let mut rows = Vec::new();
+        let (mut planes, mut us, mut vs) = (Vec::new(), Vec::new(), Vec::new());
         let mut is_any_disc = false;
         for primitive in primitives {
             let Primitive::Flat { normal, offset, u, v, is_disc } = primitive else { continue };
             let row = |a: Vec3, b: f32| [a.x, a.y, a.z, b];
-            rows.push((row(*normal, *offset), row(u.0, u.1), row(v.0, v.1)));
+            planes.push(row(*normal, *offset));
+            us.push(row(u.0, u.1));
+            vs.push(row(v.0, v.1));
             is_any_disc |= *is_disc;
         }
         // Unused lanes stay 0, which makes the distance 0/0: no comparison holds.
-        let column = |row: fn(&([f32; 4], [f32; 4], [f32; 4])) -> [f32; 4]| {
-            gather(&rows.iter().map(row).collect::<Vec<_>>(), [0.0; 4])
-        };
-        Self { plane: column(|r| r.0), u: column(|r| r.1), v: column(|r| r.2), is_disc: is_any_disc }
+        let unused = [0.0; 4];
+        Self { plane: gather(&planes, unused), u: gather(&us, unused), v: gather(&vs, unused), is_disc: is_any_disc }
     }
 
     #[inline(always)]

@@ -10,7 +10,7 @@ use obvhs::bvh2::builder::build_bvh2;
 use obvhs::ray::RayHit;
 
 use super::analytic::{Primitive, bounds};
-use super::triangles::{padded, tree_ray};
+use super::triangles::padded;
 
 /// Primitives in the order of the leaves.
 pub(super) struct Many {
@@ -35,6 +35,7 @@ impl Many {
         Self { tree, primitives, order }
     }
 
+    /// The nearest hit within `(0, length)`: distance and number of the primitive.
     pub(super) fn closest(&self, ray: &Ray, length: f32) -> Option<(f32, u32)> {
         let mut hit = RayHit::none();
         let is_hit = self.tree.ray_traverse(tree_ray(ray, length), &mut hit, |limit, index| {
@@ -49,4 +50,8 @@ impl Many {
             self.primitives.get(index).map_or(f32::INFINITY, |p| p.distance(ray, limit.tmax))
         })
     }
+}
+
+fn tree_ray(ray: &Ray, length: f32) -> obvhs::ray::Ray {
+    obvhs::ray::Ray::new(ray.origin.to_array().into(), ray.direction.to_array().into(), 0.0, length)
 }

@@ -1,0 +1,158 @@
+//! The program as users call it: exit codes, files, messages.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+const SCENE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/smoke-box-homogeneous-anisotropic.xml");
+
+/// A folder of its own, gone when dropped.
+struct Folder(PathBuf);
+
+impl Folder {
+    fn new(name: &str) -> Self {
+        let path = std::env::temp_dir().join(format!("fogbow-program-{name}-{}", std::process::id()));
+        std::fs::create_dir_all(&path).unwrap();
+        Self(path)
+    }
+
+    fn fogbow(&self) -> Command {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_fogbow"));
+        command.current_dir(&self.0);
+        command
+    }
+
+    fn run(&self, arguments: &[&str]) -> Output {
+        self.fogbow().args(arguments).output().unwrap()
+    }
+
+    fn names(&self) -> Vec<String> {
+        let mut names: Vec<String> = std::fs::read_dir(&self.0)
+            .unwrap()
+            .map(|e| e.unwrap().file_name().to_string_lossy().into_owned())
+            .collect();
+        names.sort();
+        names
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        let _ = std::fs::remove_dir_all(&self.0);
+    }
+}
+
+fn said(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+#[test]
+fn a_render_leaves_its_images_and_a_summary() {
+    let folder = Folder::new("render");
+    let output = folder.run(&["render", SCENE, "--size", "16x8", "--spp", "2"]);
+    assert_eq!(output.status.code(), Some(0), "{}", said(&output));
+    assert_eq!(folder.names(), ["smoke-box-homogeneous-anisotropic.exr", "smoke-box-homogeneous-anisotropic.png"]);
+    assert!(said(&output).contains("16 x 8 pixels, 2 samples per pixel"), "{}", said(&output));
+}
+
+#[test]
+fn every_scene_here_renders_with_layers_and_statistics() {
+    let folder = Folder::new("all");
+    let scenes = Path::new(SCENE).parent().unwrap();
+    let mut count = 0;
+    for entry in std::fs::read_dir(scenes).unwrap() {
+        let path = entry.unwrap().path();
+        if path.extension().is_none_or(|e| e != "xml") {
+            continue;
+        }
+        let scene = path.to_string_lossy();
+        let arguments = [
+            "render", &scene, "--size", "8x8", "--spp", "1", "--aov", "-o", "a.exr", "-o", "a.pfm", "--stats",
+            "s.json", "-q",
+        ];
+        let output = folder.run(&arguments);
+        assert_eq!(output.status.code(), Some(0), "{scene}: {}", said(&output));
+        assert!(output.stderr.is_empty(), "{}", said(&output));
+        let statistics = std::fs::read_to_string(folder.0.join("s.json")).unwrap();
+        for key in ["\"seconds\"", "\"rays\"", "\"cpu\"", "\"bytes\"", "\"ended\": \"done\""] {
+            assert!(statistics.contains(key), "{statistics}");
+        }
+        count += 1;
+    }
+    assert_eq!(count, 4);
+}
+
+#[test]
+fn the_same_bits_come_from_any_number_of_threads() {
+    let folder = Folder::new("threads");
+    let mut images = Vec::new();
+    for threads in ["1", "2", "7"] {
+        let output =
+            folder.run(&["render", SCENE, "--size", "24x24", "--spp", "4", "--threads", threads, "-q", "-o", "a.pfm"]);
+        assert_eq!(output.status.code(), Some(0), "{}", said(&output));
+        images.push(std::fs::read(folder.0.join("a.pfm")).unwrap());
+    }
+    assert!(images[0] == images[1] && images[1] == images[2]);
+}
+
+#[test]
+fn bad_input_is_exit_code_2_and_no_image() {
+    let folder = Folder::new("bad");
+    std::fs::write(folder.0.join("bad.xml"), "<scene version=\"3.0.0\"><bsdf type=\"magic\" id=\"x\"/></scene>")
+        .unwrap();
+    let cases: &[(&[&str], &str)] = &[
+        (&["render", "none.xml"], "none.xml: cannot be read"),
+        (&["render", "bad.xml"], "bad.xml:1: <bsdf type=\"magic\" id=\"x\">: attribute \"type\""),
+        (&["render", SCENE, "-o", "a.tiff"], "a.tiff: the extension"),
+        (&["render", SCENE, "-o", "none/a.png"], "cannot be written"),
+        (&["render", SCENE, "--aov", "-o", "a.png"], "--aov"),
+        (&["render", SCENE, "--size", "0x4"], "sides"),
+        (&["render", SCENE, "--size", "4"], "640x480"),
+        (&["render", SCENE, "--size", "65536x65536"], "pixels"),
+        (&["render", SCENE, "--spp", "0"], "--spp"),
+        (&["render", SCENE, "--time", "-3"], "--time"),
+        (&["render", SCENE, "--time", "nan"], "--time"),
+        (&["render", SCENE, "--max-depth", "0"], "--max-depth"),
+        (&["render", SCENE, "--method", "magic"], "magic"),
+        (&["render", SCENE, "--stats", "none/s.json"], "cannot be written"),
+        (&["compare", "a.png", "b.png"], "a.png: cannot be read"),
+        (&["compare", "a.gif", "b.png"], "kind of image"),
+    ];
+    for (arguments, word) in cases {
+        let output = folder.run(arguments);
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {}", said(&output));
+        assert!(said(&output).contains(word), "{arguments:?}: {}", said(&output));
+        assert!(!said(&output).contains("panicked"));
+    }
+    assert_eq!(folder.names(), ["bad.xml"]);
+}
+
+#[test]
+fn an_image_equals_itself_and_time_limits_hold() {
+    let folder = Folder::new("compare");
+    let output = folder.run(&["render", SCENE, "--size", "16x16", "--time", "0.5", "-q", "-o", "a.exr", "-o", "b.pfm"]);
+    assert_eq!(output.status.code(), Some(0), "{}", said(&output));
+    let output = folder.run(&["compare", "a.exr", "b.pfm", "-o", "d.png"]);
+    assert_eq!(output.status.code(), Some(0), "{}", said(&output));
+    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert!(text.contains("relRMSE      0.000000") && text.contains("worst block"), "{text}");
+    assert!(folder.names().contains(&"d.png".to_owned()));
+}
+
+#[cfg(unix)]
+#[test]
+fn ctrl_c_keeps_the_image_so_far() {
+    let folder = Folder::new("stop");
+    let child = folder
+        .fogbow()
+        .args(["render", SCENE, "--size", "32x32", "--spp", "1000000", "-o", "a.pfm"])
+        .stderr(std::process::Stdio::piped())
+        .spawn()
+        .unwrap();
+    std::thread::sleep(core::time::Duration::from_secs(2));
+    let killed = Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+    assert!(killed.success());
+    let output = child.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(1), "{}", said(&output));
+    assert!(said(&output).contains("stopped early"), "{}", said(&output));
+    assert_eq!(folder.names(), ["a.pfm"]);
+}
