@@ -109,7 +109,7 @@ fn bad_input_is_exit_code_2_and_no_image() {
         (&["render", SCENE, "--size", "4"], "640x480"),
         (&["render", SCENE, "--size", "65536x65536"], "pixels"),
         (&["render", SCENE, "--spp", "0"], "--spp"),
-        (&["render", SCENE, "--time", "-3"], "--time"),
+        (&["render", SCENE, "--time=-3"], "--time"),
         (&["render", SCENE, "--time", "nan"], "--time"),
         (&["render", SCENE, "--max-depth", "0"], "--max-depth"),
         (&["render", SCENE, "--method", "magic"], "magic"),
