@@ -1,37 +1,10 @@
-//! Flat pieces, spheres and boxes, eight at a time.
+//! Flat pieces, spheres and boxes, four at a time.
 
+use fogbow::glam::Vec4;
 use fogbow::math::{Bounds, Ray, Vec3};
-use wide::{CmpGe, CmpGt, CmpLe, CmpLt, f32x8};
 
-/// One register of x86-64-v3, two of the baseline's.
-type Lanes = f32x8;
-const LANES: usize = 8;
-
-/// One vector per axis: the same in every lane, or one primitive a lane.
-type Lanes3 = [Lanes; 3];
-
-#[inline(always)]
-fn broadcast(v: Vec3) -> Lanes3 {
-    [Lanes::splat(v.x), Lanes::splat(v.y), Lanes::splat(v.z)]
-}
-
-#[inline(always)]
-fn dot(a: &Lanes3, b: &Lanes3) -> Lanes {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-/// Distances where `is_hit`, infinity elsewhere.
-#[inline(always)]
-fn where_hit(is_hit: Lanes, distances: Lanes) -> Lanes {
-    is_hit.blend(distances, Lanes::splat(f32::INFINITY))
-}
-
-/// Lane by lane from a table of one array a primitive.
-fn gather<const N: usize>(rows: &[[f32; N]], unused: [f32; N]) -> [Lanes; N] {
-    core::array::from_fn(|column| {
-        Lanes::from(core::array::from_fn(|lane| rows.get(lane).map_or(unused[column], |row| row[column])))
-    })
-}
+/// How many primitives are tested at once: baseline x86-64 has registers of four.
+const LANES: usize = 4;
 
 /// By how much the unit square of a flat piece is enlarged, so that no ray slips between two that
 /// share an edge: rounding moves a hit point by a few 10⁻⁷ of the piece. Invisible at 4 × 10⁻⁶.
@@ -70,6 +43,7 @@ pub(super) enum Primitive {
 
 impl Primitive {
     /// The outward normal (unit) at a point of the surface.
+    #[inline]
     pub(super) fn normal(&self, point: Vec3) -> Vec3 {
         match self {
             Self::Flat { normal, .. } => *normal,
@@ -90,18 +64,12 @@ impl Primitive {
 
     /// Distance to the nearest hit within `(0, length)`, or infinity.
     pub(super) fn distance(&self, ray: &Ray, length: f32) -> f32 {
-        // One lane of eight carries the primitive: what is measured alone is what is measured in
+        // One lane of four carries the primitive: what is measured alone is what is measured in
         // company.
         match self {
-            Self::Flat { .. } => {
-                FlatChunk::of(core::slice::from_ref(self)).distances(ray, Lanes::splat(length)).to_array()[0]
-            }
-            Self::Sphere { .. } => {
-                SphereChunk::of(core::slice::from_ref(self)).distances(ray, Lanes::splat(length)).to_array()[0]
-            }
-            Self::Box { .. } => {
-                BoxChunk::of(core::slice::from_ref(self)).distances(ray, Lanes::splat(length)).to_array()[0]
-            }
+            Self::Flat { .. } => FlatChunk::of(core::slice::from_ref(self)).distances(ray, Vec4::splat(length))[0],
+            Self::Sphere { .. } => SphereChunk::of(core::slice::from_ref(self)).distances(ray, Vec4::splat(length))[0],
+            Self::Box { .. } => BoxChunk::of(core::slice::from_ref(self)).distances(ray, Vec4::splat(length))[0],
         }
     }
 
@@ -115,131 +83,140 @@ impl Primitive {
     }
 }
 
-/// Up to eight flat pieces.
-#[derive(Debug, Clone, Copy)]
+/// `distances` where `is_hit`, infinity elsewhere.
+macro_rules! only_where {
+    ($is_hit:expr, $distances:expr) => {
+        Vec4::select($is_hit, $distances, Vec4::INFINITY)
+    };
+}
+
+/// `x·a + y·b + z·c` in four lanes, for a vector that is the same in all.
+#[inline(always)]
+fn dot([a, b, c]: &[Vec4; 3], v: Vec3) -> Vec4 {
+    *a * v.x + *b * v.y + *c * v.z
+}
+
+/// Up to four flat pieces.
+#[derive(Debug, Clone, Copy, Default)]
 struct FlatChunk {
-    /// Normal and offset.
-    plane: [Lanes; 4],
-    u: [Lanes; 4],
-    v: [Lanes; 4],
+    normal: [Vec4; 3],
+    offset: Vec4,
+    u: ([Vec4; 3], Vec4),
+    v: ([Vec4; 3], Vec4),
     is_disc: bool,
 }
 
 impl FlatChunk {
     fn of(primitives: &[Primitive]) -> Self {
-        let (mut planes, mut us, mut vs) = (Vec::new(), Vec::new(), Vec::new());
-        let mut is_any_disc = false;
-        for primitive in primitives {
-            let Primitive::Flat { normal, offset, u, v, is_disc } = primitive else { continue };
-            let row = |a: Vec3, b: f32| [a.x, a.y, a.z, b];
-            planes.push(row(*normal, *offset));
-            us.push(row(u.0, u.1));
-            vs.push(row(v.0, v.1));
-            is_any_disc |= *is_disc;
-        }
         // Unused lanes stay 0, which makes the distance 0/0: no comparison holds.
-        let unused = [0.0; 4];
-        Self { plane: gather(&planes, unused), u: gather(&us, unused), v: gather(&vs, unused), is_disc: is_any_disc }
+        let mut chunk = Self::default();
+        for (lane, primitive) in primitives.iter().take(LANES).enumerate() {
+            let Primitive::Flat { normal, offset, u, v, is_disc } = primitive else { continue };
+            for axis in 0..3 {
+                chunk.normal[axis][lane] = normal[axis];
+                chunk.u.0[axis][lane] = u.0[axis];
+                chunk.v.0[axis][lane] = v.0[axis];
+            }
+            chunk.offset[lane] = *offset;
+            chunk.u.1[lane] = u.1;
+            chunk.v.1[lane] = v.1;
+            chunk.is_disc = *is_disc;
+        }
+        chunk
     }
 
     #[inline(always)]
-    fn distances(&self, ray: &Ray, limit: Lanes) -> Lanes {
-        let (o, d) = (broadcast(ray.origin), broadcast(ray.direction));
-        let [nx, ny, nz, offset] = self.plane;
-        let normal = [nx, ny, nz];
-        let t = (offset - dot(&normal, &o)) / dot(&normal, &d);
-        let p = [o[0] + t * d[0], o[1] + t * d[1], o[2] + t * d[2]];
-        let along = |[x, y, z, start]: [Lanes; 4]| dot(&[x, y, z], &p) + start;
-        let (u, v) = (along(self.u), along(self.v));
-        let is_inside = if self.is_disc {
-            (u * u + v * v).cmp_le(Lanes::ONE)
-        } else {
-            let edge = Lanes::splat(EDGE);
-            u.abs().cmp_le(edge) & v.abs().cmp_le(edge)
+    fn distances(&self, ray: &Ray, limit: Vec4) -> Vec4 {
+        let (o, d) = (ray.origin, ray.direction);
+        let t = (self.offset - dot(&self.normal, o)) / dot(&self.normal, d);
+        let point = [t * d.x + o.x, t * d.y + o.y, t * d.z + o.z];
+        let coordinate = |(gradient, start): &([Vec4; 3], Vec4)| {
+            gradient[0] * point[0] + gradient[1] * point[1] + gradient[2] * point[2] + *start
         };
-        where_hit(is_inside & t.cmp_gt(Lanes::ZERO) & t.cmp_lt(limit), t)
+        let (u, v) = (coordinate(&self.u), coordinate(&self.v));
+        let reach = if self.is_disc { u * u + v * v } else { u.abs().max(v.abs()) };
+        only_where!(reach.cmple(Vec4::splat(EDGE)) & t.cmpgt(Vec4::ZERO) & t.cmplt(limit), t)
     }
 }
 
-/// Up to eight spheres.
+/// Up to four spheres.
 #[derive(Debug, Clone, Copy)]
 struct SphereChunk {
-    /// Centre and squared radius.
-    ball: [Lanes; 4],
+    centre: [Vec4; 3],
+    radius2: Vec4,
 }
 
 impl SphereChunk {
     fn of(primitives: &[Primitive]) -> Self {
-        let rows: Vec<[f32; 4]> = primitives
-            .iter()
-            .filter_map(|primitive| match primitive {
-                Primitive::Sphere { centre, radius } => Some([centre.x, centre.y, centre.z, radius * radius]),
-                _ => None,
-            })
-            .collect();
         // A negative squared radius cannot be hit.
-        Self { ball: gather(&rows, [0.0, 0.0, 0.0, -1.0]) }
+        let mut chunk = Self { centre: [Vec4::ZERO; 3], radius2: Vec4::NEG_ONE };
+        for (lane, primitive) in primitives.iter().take(LANES).enumerate() {
+            let Primitive::Sphere { centre, radius } = primitive else { continue };
+            for axis in 0..3 {
+                chunk.centre[axis][lane] = centre[axis];
+            }
+            chunk.radius2[lane] = radius * radius;
+        }
+        chunk
     }
 
     /// The stable form: the discriminant from the perpendicular offset, the smaller root from the
     /// product of both (Haines et al. 2019, "Precision Improvements for Ray/Sphere Intersection").
     #[inline(always)]
-    fn distances(&self, ray: &Ray, limit: Lanes) -> Lanes {
-        let (o, d) = (broadcast(ray.origin), broadcast(ray.direction));
-        let [cx, cy, cz, radius2] = self.ball;
-        let f = [o[0] - cx, o[1] - cy, o[2] - cz];
-        let b = -dot(&f, &d);
-        let p = [f[0] + b * d[0], f[1] + b * d[1], f[2] + b * d[2]];
-        let discriminant = radius2 - dot(&p, &p);
-        let root = discriminant.fast_max(Lanes::ZERO).sqrt();
-        let q = b + b.cmp_lt(Lanes::ZERO).blend(-root, root);
-        let other = (dot(&f, &f) - radius2) / q;
-        let (near, far) = (other.fast_min(q), other.fast_max(q));
-        let t = near.cmp_gt(Lanes::ZERO).blend(near, far);
-        where_hit(discriminant.cmp_ge(Lanes::ZERO) & t.cmp_gt(Lanes::ZERO) & t.cmp_lt(limit), t)
+    fn distances(&self, ray: &Ray, limit: Vec4) -> Vec4 {
+        let (o, d) = (ray.origin, ray.direction);
+        let f = [o.x - self.centre[0], o.y - self.centre[1], o.z - self.centre[2]];
+        let b = -dot(&f, d);
+        let p = [f[0] + b * d.x, f[1] + b * d.y, f[2] + b * d.z];
+        let discriminant = self.radius2 - (p[0] * p[0] + p[1] * p[1] + p[2] * p[2]);
+        let is_met = discriminant.cmpge(Vec4::ZERO);
+        if !is_met.any() {
+            return Vec4::INFINITY;
+        }
+        let clamped = discriminant.max(Vec4::ZERO).to_array();
+        let root = Vec4::from_array(clamped.map(f32::sqrt));
+        let q = b + root.copysign(b);
+        let other = (f[0] * f[0] + f[1] * f[1] + f[2] * f[2] - self.radius2) / q;
+        let (near, far) = (other.min(q), other.max(q));
+        let t = Vec4::select(near.cmpgt(Vec4::ZERO), near, far);
+        only_where!(is_met & t.cmpgt(Vec4::ZERO) & t.cmplt(limit), t)
     }
 }
 
-/// Up to eight boxes.
+/// Up to four boxes.
 #[derive(Debug, Clone, Copy)]
 struct BoxChunk {
-    rows: [[Lanes; 4]; 3],
+    rows: [([Vec4; 3], Vec4); 3],
 }
 
 impl BoxChunk {
     fn of(primitives: &[Primitive]) -> Self {
-        let column = |axis: usize| {
-            let rows: Vec<[f32; 4]> = primitives
-                .iter()
-                .filter_map(|primitive| match primitive {
-                    Primitive::Box { rows } => {
-                        let (gradient, start) = rows[axis];
-                        Some([gradient.x, gradient.y, gradient.z, start])
-                    }
-                    _ => None,
-                })
-                .collect();
-            // Unused lanes: every point has the coordinates (2, 2, 2).
-            gather(&rows, [0.0, 0.0, 0.0, 2.0])
-        };
-        Self { rows: [column(0), column(1), column(2)] }
+        // Unused lanes: every point has the coordinates (2, 2, 2).
+        let mut chunk = Self { rows: [([Vec4::ZERO; 3], Vec4::splat(2.0)); 3] };
+        for (lane, primitive) in primitives.iter().take(LANES).enumerate() {
+            let Primitive::Box { rows } = primitive else { continue };
+            for ((slot, offset), (gradient, start)) in chunk.rows.iter_mut().zip(rows) {
+                for axis in 0..3 {
+                    slot[axis][lane] = gradient[axis];
+                }
+                offset[lane] = *start;
+            }
+        }
+        chunk
     }
 
     #[inline(always)]
-    fn distances(&self, ray: &Ray, limit: Lanes) -> Lanes {
-        let (o, d) = (broadcast(ray.origin), broadcast(ray.direction));
-        let (mut near, mut far) = (Lanes::splat(f32::NEG_INFINITY), Lanes::splat(f32::INFINITY));
-        for [x, y, z, start] in self.rows {
-            let row = [x, y, z];
-            let origin = dot(&row, &o) + start;
-            let inverse = Lanes::ONE / dot(&row, &d);
-            let (a, b) = ((-Lanes::ONE - origin) * inverse, (Lanes::ONE - origin) * inverse);
-            // The second operand wins where the first is NaN, so a ray in a face's plane keeps the bounds.
-            near = a.fast_min(b).fast_max(near);
-            far = a.fast_max(b).fast_min(far);
+    fn distances(&self, ray: &Ray, limit: Vec4) -> Vec4 {
+        let (mut near, mut far) = (Vec4::NEG_INFINITY, Vec4::INFINITY);
+        for (gradient, start) in &self.rows {
+            let origin = dot(gradient, ray.origin) + *start;
+            let inverse = 1.0 / dot(gradient, ray.direction);
+            let (a, b) = ((-1.0 - origin) * inverse, (1.0 - origin) * inverse);
+            near = near.max(a.min(b));
+            far = far.min(a.max(b));
         }
-        let t = near.cmp_gt(Lanes::ZERO).blend(near, far);
-        where_hit(near.cmp_le(far) & t.cmp_gt(Lanes::ZERO) & t.cmp_lt(limit), t)
+        let t = Vec4::select(near.cmpgt(Vec4::ZERO), near, far);
+        only_where!(near.cmple(far) & t.cmpgt(Vec4::ZERO) & t.cmplt(limit), t)
     }
 }
 
@@ -277,42 +254,38 @@ impl Few {
     /// The nearest hit within `(0, length)`: distance and number of the primitive.
     #[inline]
     pub(super) fn closest(&self, ray: &Ray, length: f32) -> Option<(f32, u32)> {
-        let mut best = Lanes::splat(length);
-        // Numbers of chunks, as floats: lanes of one kind blend in one instruction.
-        let mut chunk_of = Lanes::splat(-1.0);
-        let mut number = Lanes::ZERO;
-        let mut take = |distances: Lanes| {
-            let is_nearer = distances.cmp_lt(best);
-            best = is_nearer.blend(distances, best);
-            chunk_of = is_nearer.blend(number, chunk_of);
-            number += Lanes::ONE;
-            best
+        let mut best = Vec4::splat(length);
+        // Numbers of chunks as floats, so that they can be selected like distances.
+        let (mut chunk_of, mut number) = (Vec4::NEG_ONE, Vec4::ZERO);
+        let mut take = |distances: Vec4, best: &mut Vec4| {
+            let is_nearer = distances.cmplt(*best);
+            *best = best.min(distances);
+            chunk_of = Vec4::select(is_nearer, number, chunk_of);
+            number += 1.0;
         };
-        let mut limit = Lanes::splat(length);
         for chunk in &self.flats {
-            limit = take(chunk.distances(ray, limit));
+            take(chunk.distances(ray, best), &mut best);
         }
         for chunk in &self.spheres {
-            limit = take(chunk.distances(ray, limit));
+            take(chunk.distances(ray, best), &mut best);
         }
         for chunk in &self.boxes {
-            limit = take(chunk.distances(ray, limit));
+            take(chunk.distances(ray, best), &mut best);
         }
-        let best = best.to_array();
-        let nearest = (1..LANES).fold(0, |nearest, i| if best[i] < best[nearest] { i } else { nearest });
-        let chunk = chunk_of.to_array()[nearest];
-        if chunk < 0.0 {
+        let nearest = best.min_element();
+        if nearest >= length {
             return None;
         }
-        let index = self.order.get(chunk as usize * LANES + nearest)?;
-        Some((best[nearest], *index))
+        let lane = best.cmpeq(Vec4::splat(nearest)).bitmask().trailing_zeros() as usize;
+        let index = self.order.get(chunk_of[lane.min(LANES - 1)] as usize * LANES + lane)?;
+        Some((nearest, *index))
     }
 
     /// Whether anything is hit within `(0, length)`.
     #[inline]
     pub(super) fn is_hit(&self, ray: &Ray, length: f32) -> bool {
-        let limit = Lanes::splat(length);
-        let is_any = |distances: Lanes| distances.cmp_lt(Lanes::splat(f32::INFINITY)).any();
+        let limit = Vec4::splat(length);
+        let is_any = |distances: Vec4| distances.cmplt(Vec4::INFINITY).any();
         self.boxes.iter().any(|c| is_any(c.distances(ray, limit)))
             || self.flats.iter().any(|c| is_any(c.distances(ray, limit)))
             || self.spheres.iter().any(|c| is_any(c.distances(ray, limit)))
