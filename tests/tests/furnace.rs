@@ -310,6 +310,36 @@ fn a_light_seen_through_absorbing_fog_follows_beer_and_lambert() {
     assert_estimates(&seen, [0.1f64, 0.5, 2.0].map(|s| (-0.5 * s).exp()), ROUNDING, "half a metre of fog");
 }
 
+/// Seen from afar, points are far less exact than a lamp is close: a shadow ray that starts above
+/// the surface must not run into the lamp it goes to.
+#[test]
+fn a_surface_close_to_a_small_lamp_and_far_from_the_eye_gets_all_its_light() {
+    struct Shell;
+    impl Scene for Shell {
+        fn closest_hit(&self, ray: &Ray) -> Option<Hit> {
+            let wall = Surface::Lambert { reflectance: Spectrum::splat(0.5) };
+            let lamp = Sphere { radius: 0.04, surface: Surface::BLACK, light: Some(0) };
+            // A wall at z = −0.4, seen through nothing from z = 4.
+            let t = (-0.4 - ray.origin.z) / ray.direction.z;
+            let is_wall = t > 0.0 && t < ray.length;
+            let wall = is_wall.then_some(Hit { distance: t, normal: Vec3::Z, surface: wall, light: None });
+            let lamp = lamp.closest_hit(ray);
+            if lamp.is_some_and(|l| wall.is_none_or(|w| l.distance < w.distance)) { lamp } else { wall }
+        }
+    }
+    let lights = [Light::Sphere(SphereLight::new(Vec3::ZERO, 0.04, Spectrum::splat(400.0)).unwrap())];
+    let world = World { medium: &Empty, scene: &Shell, lights: &lights };
+    let target = Vec3::new(0.1, 0.05, -0.4);
+    let eye = Vec3::new(0.3, 0.2, 4.0);
+    let ray = Ray::new(eye, (target - eye).normalize());
+    let once = Settings { max_scatterings: 1, ..Settings::default() };
+    let seen = estimate(20_000, |rng| path::radiance(&ray, &world, &once, rng).total());
+    // Irradiance of a sphere wholly above the horizon: π L sin² cos.
+    let distance2 = f64::from(target.length_squared());
+    let truth = 0.5 * 400.0 * 0.0016 / distance2 * 0.4 / distance2.sqrt();
+    assert_estimates(&seen, [truth; 3], 1e-4, "wall behind a lamp");
+}
+
 #[test]
 fn the_components_of_radiance_hold_what_their_names_say() {
     let fog = Homogeneous::new(Spectrum::splat(0.1), Spectrum::splat(0.4), Lobe::Isotropic).unwrap();

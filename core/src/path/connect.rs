@@ -4,7 +4,7 @@ use glam::{Vec2, Vec3};
 
 use super::World;
 use crate::host::{Medium, Scene};
-use crate::light::{Incident, Light, LightSample};
+use crate::light::{Falloff, Incident, Light, LightSample, Source};
 use crate::math::Ray;
 use crate::phase::deflection;
 use crate::sampling::distance::Equiangular;
@@ -72,17 +72,25 @@ pub(super) fn choose(
     Some((light.sample(point, u)?, chosen.probability))
 }
 
-/// Transmittance times visibility between `origin` and a light, 0 or more per channel.
+/// The way from `origin` to a light. A surface point is moved off its surface before, so direction
+/// and length are taken anew: otherwise the ray would end as far behind the light's own surface.
+#[inline]
+fn way(origin: Vec3, point: Vec3, source: &Source, incident: &Incident) -> Ray {
+    if origin == point || source.falloff == Falloff::Distant {
+        return Ray { origin, direction: incident.to_light, length: incident.distance };
+    }
+    Ray::between(origin, source.position)
+}
+
+/// Transmittance times visibility on the way to a light, 0 or more per channel.
 #[inline]
 pub(super) fn reach<M: Medium + ?Sized, S: Scene + ?Sized>(
     world: &World<'_, M, S>,
-    origin: Vec3,
-    incident: &Incident,
+    way: &Ray,
     rng: &mut Generator,
 ) -> Spectrum {
-    let ray = Ray { origin, direction: incident.to_light, length: incident.distance };
-    let shadow = ray.with_length(incident.distance * (1.0 - SHADOW_MARGIN));
-    if world.scene.is_blocked(&shadow) { Spectrum::ZERO } else { transmittance(world.medium, &ray, rng) }
+    let shadow = way.with_length(way.length * (1.0 - SHADOW_MARGIN));
+    if world.scene.is_blocked(&shadow) { Spectrum::ZERO } else { transmittance(world.medium, way, rng) }
 }
 
 /// Next-event estimation: `value(to_light)` gives the scattering function (with the cosine, at a
@@ -106,7 +114,8 @@ pub(super) fn next_event<M: Medium + ?Sized, S: Scene + ?Sized>(
         return Spectrum::ZERO;
     }
     let weight = if sample.pdf > 0.0 { mis::power(sample.pdf * probability, walk_pdf) } else { 1.0 };
-    let arriving = reach(world, origin(incident.to_light), &incident, rng);
+    let way = way(origin(incident.to_light), point, &sample.source, &incident);
+    let arriving = reach(world, &way, rng);
     scattered * arriving * incident.irradiance * (weight / probability)
 }
 
@@ -160,7 +169,8 @@ pub(super) fn along<M: Medium + ?Sized, S: Scene + ?Sized>(
         return Spectrum::ZERO;
     }
     let weight = if pdf > 0.0 { mis::power(pdf, properties.phase.pdf(deflection)) } else { 1.0 };
-    let mut arriving = reach(world, point, &incident, rng);
+    let way = Ray { origin: point, direction: incident.to_light, length: incident.distance };
+    let mut arriving = reach(world, &way, rng);
     if arriving.is_black() {
         return Spectrum::ZERO;
     }
