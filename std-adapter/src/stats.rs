@@ -18,6 +18,8 @@ pub struct Counters {
     pub rays: u64,
     /// Visibility queries.
     pub shadow_rays: u64,
+    /// Collisions of paths with a medium, as the integrand reports them: see [`Tally::collide`].
+    pub collisions: u64,
     /// Queries of a medium at a point: properties, extinction, derivatives.
     pub lookups: u64,
     /// Queries of a medium's bounds along a ray.
@@ -33,6 +35,7 @@ impl Add for Counters {
             samples: self.samples + o.samples,
             rays: self.rays + o.rays,
             shadow_rays: self.shadow_rays + o.shadow_rays,
+            collisions: self.collisions + o.collisions,
             lookups: self.lookups + o.lookups,
             stretches: self.stretches + o.stretches,
             non_finite: self.non_finite + o.non_finite,
@@ -51,17 +54,25 @@ impl AddAssign for Counters {
 pub struct Tally {
     rays: Cell<u64>,
     shadow_rays: Cell<u64>,
+    collisions: Cell<u64>,
     lookups: Cell<u64>,
     stretches: Cell<u64>,
 }
 
 impl Tally {
+    /// Adds collisions: what only the integrand knows.
+    #[inline]
+    pub fn collide(&self, collisions: u32) {
+        self.collisions.set(self.collisions.get() + u64::from(collisions));
+    }
+
     /// What was counted so far.
     #[must_use]
     pub fn counters(&self) -> Counters {
         Counters {
             rays: self.rays.get(),
             shadow_rays: self.shadow_rays.get(),
+            collisions: self.collisions.get(),
             lookups: self.lookups.get(),
             stretches: self.stretches.get(),
             ..Counters::default()

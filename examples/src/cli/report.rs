@@ -116,7 +116,7 @@ impl Report<'_> {
             "{{\n  \"scene\": {},\n  \"method\": \"path\",\n  \"width\": {},\n  \"height\": {},\n  \
              \"samples_per_pixel\": {},\n  \"seed\": {},\n  \"ended\": \"{reason}\",\n  \
              \"seconds\": {{{phases}\n  }},\n  \"counts\": {{\"samples\": {}, \"rays\": {}, \"shadow_rays\": {}, \
-             \"medium_lookups\": {}, \"medium_stretches\": {}, \"non_finite\": {}}},\n  \"bytes\": {{{bytes}}}\n}}\n",
+             \"collisions\": {}, \"medium_lookups\": {}, \"medium_stretches\": {}, \"non_finite\": {}}},\n  \"bytes\": {{{bytes}}}\n}}\n",
             quoted(&self.arguments.scene.display().to_string()),
             self.size.0,
             self.size.1,
@@ -125,6 +125,7 @@ impl Report<'_> {
             counters.samples,
             counters.rays,
             counters.shadow_rays,
+            counters.collisions,
             counters.lookups,
             counters.stretches,
             counters.non_finite,
