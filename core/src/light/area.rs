@@ -248,11 +248,13 @@ impl SphereLight {
         4.0 * PI * self.radius * self.radius
     }
 
-    /// `1 − cos` of the half angle under which the sphere is seen; `None` from inside.
+    /// `1 − cos` of the half angle under which the sphere is seen; `None` from inside and from
+    /// where it is a point.
     #[inline]
     fn cone(&self, from: Vec3) -> Option<f32> {
         let sine2 = self.radius * self.radius / self.centre.distance_squared(from);
-        (sine2 < 1.0).then(|| sine2 / (1.0 + float::sqrt(1.0 - sine2)))
+        // So far away that a cone is no number any more, nothing arrives.
+        (sine2 < 1.0 && sine2 > 1e-36).then(|| sine2 / (1.0 + float::sqrt(1.0 - sine2)))
     }
 
     /// Samples the visible cap uniformly in solid angle.

@@ -60,7 +60,11 @@ impl Medium for Homogeneous {
     }
     #[inline]
     fn stretch(&self, _: &Ray, _: f32) -> Stretch {
-        let extinction = self.properties.extinction();
+        let mut extinction = self.properties.extinction();
+        if extinction.is_black() && self.is_emissive() {
+            // A bound of 0 would promise that nothing glows.
+            extinction = Spectrum::splat(f32::MIN_POSITIVE);
+        }
         Stretch { until: f32::INFINITY, minorant: extinction, majorant: extinction }
     }
     #[inline]

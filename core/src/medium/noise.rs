@@ -168,6 +168,8 @@ pub struct Noise {
     phase: Phase,
     /// Length of a stretch (m).
     step: f32,
+    /// Whether density is 0 everywhere.
+    is_void: bool,
 }
 
 impl Noise {
@@ -193,7 +195,7 @@ impl Noise {
         let thickest = ((absorption + scattering) * dense).max_element();
         let cell = 1.0 / shape.frequency;
         let step = (1.0 / thickest).clamp(cell / 16.0, cell / 2.0);
-        Ok(Self { shape, scattering, absorption, emission: Spectrum::ZERO, phase, step })
+        Ok(Self { shape, scattering, absorption, emission: Spectrum::ZERO, phase, step, is_void: dense == 0.0 })
     }
 
     /// The same medium, emitting `emission` (W·m⁻³·sr⁻¹) where density is 1, in proportion to it.
@@ -240,6 +242,9 @@ impl Medium for Noise {
         const MERGED: u32 = 8;
         // Seven roundings of 2⁻²⁴ lie between a distance and a lattice coordinate.
         const ROUNDING: f32 = 1e-6;
+        if self.is_void {
+            return Stretch::vacuum(f32::INFINITY);
+        }
         let mut t = from;
         for _ in 0..MERGED {
             // Where positions are coarser than a step, the least step there is.

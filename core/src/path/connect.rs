@@ -19,7 +19,8 @@ const SHADOW_MARGIN: f32 = 1e-4;
 /// field is left to [`along`].
 #[inline]
 fn importance(light: &Light<'_>, point: Vec3, in_medium: bool) -> f32 {
-    if in_medium && is_near(light, point) { 0.0 } else { light.importance(point) }
+    // Capped, so that a sum over all lights stays a number.
+    if in_medium && is_near(light, point) { 0.0 } else { light.importance(point).min(1e30) }
 }
 
 #[inline]

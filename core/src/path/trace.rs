@@ -161,12 +161,14 @@ pub fn radiance<M: Medium + ?Sized, S: Scene + ?Sized>(
         } else if let Some(hit) = hit {
             let point = segment.at(hit.distance);
             let hidden = path.scatterings == 0 && !settings.lights_visible && hit.light.is_some();
+            if !hidden {
+                emitted(&mut path, world, &ray, &hit, point);
+            }
             if hidden || hit.surface == Surface::Null {
                 let origin = leave(point, hit.normal, ray.direction, hit.distance);
                 ray = Ray { origin, direction: ray.direction, length: ray.length - hit.distance };
                 continue;
             }
-            emitted(&mut path, world, &ray, &hit, point);
             path.arrive(First::Surface);
             if path.scatterings > settings.max_scatterings {
                 break;

@@ -115,8 +115,12 @@ impl Phase {
         if mixed.count <= 1 {
             return Ok(if mixed.count == 1 { Self::from(mixed.lobes[0]) } else { Self::ISOTROPIC });
         }
+        // A channel in which nothing scatters takes the mean of the others: weights must sum to 1 in
+        // every channel, or the density of the mean is none.
+        let grey = total.mean();
         for weight in &mut mixed.weights[..mixed.count] {
-            *weight = weight.ratio(total);
+            let mean = weight.mean() / grey;
+            *weight = weight.zip(total, |w, t| if t > 0.0 { w / t } else { mean });
         }
         Ok(mixed)
     }

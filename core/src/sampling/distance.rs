@@ -68,13 +68,21 @@ pub struct Equiangular {
     closest: f32,
     /// Distance between light and ray (m), at least a tiny fraction of the interval.
     height: f32,
-    near_angle: f32,
+    /// Where angles are counted from: the end of the interval that is nearer to the light.
+    pivot: f32,
+    /// Tangent of the angle there, towards the interval; negative where the light is beside it.
+    tangent: f32,
+    /// Whether the interval leads from the pivot along the ray.
+    is_forward: bool,
     angle: f32,
 }
 
 impl Equiangular {
     /// For the part from `near` to `far` (m, may be infinite) of the ray `origin + t·direction`, and a light at
     /// `light`. `None` if the part has no length.
+    ///
+    /// The angle seen is computed as a difference of tangents, so that it keeps its digits where the
+    /// light is far away, or lies on the ray before or behind the interval.
     #[inline]
     #[must_use]
     pub fn new(origin: glam::Vec3, direction: glam::Vec3, light: glam::Vec3, near: f32, far: f32) -> Option<Self> {
@@ -86,25 +94,41 @@ impl Equiangular {
         let reach = if far.is_finite() { (far - closest).abs() } else { 0.0 };
         let floor = 1e-6 * reach.max((near - closest).abs()).max(1e-20);
         let height = (origin + direction * closest).distance(light).max(floor);
-        let near_angle = float::atan((near - closest) / height);
-        let angle = float::atan((far - closest) / height) - near_angle;
-        // Far from the light the angle may round to nothing.
-        (angle > 1e-7).then_some(Self { closest, height, near_angle, angle })
+        let is_forward = !(far < closest);
+        let (pivot, tangent) =
+            if is_forward { (near, (near - closest) / height) } else { (far, (closest - far) / height) };
+        let angle = if far.is_finite() {
+            let length = (far - near) / height;
+            float::atan2(length, 1.0 + tangent * (tangent + length))
+        } else {
+            float::atan2(1.0, tangent)
+        };
+        // Written so that NaN fails, too.
+        (angle > f32::MIN_POSITIVE).then_some(Self { closest, height, pivot, tangent, is_forward, angle })
     }
 
     /// The distance (m) for the uniform number `u`.
     #[inline]
     #[must_use]
     pub fn sample(&self, u: f32) -> f32 {
-        self.closest + self.height * float::tan(self.near_angle + u * self.angle)
+        if self.tangent < 0.0 {
+            // The light is beside the interval.
+            return self.closest + self.height * float::tan(float::atan(self.tangent) + u * self.angle);
+        }
+        // tan(α + φ) − tan α = tan φ (1 + tan² α)/(1 − tan α tan φ)
+        let u = if self.is_forward { u } else { 1.0 - u };
+        let step = float::tan(u * self.angle);
+        let along = self.height * step * (1.0 + self.tangent * self.tangent) / (1.0 - self.tangent * step).max(1e-7);
+        if self.is_forward { self.pivot + along } else { self.pivot - along }
     }
 
     /// Density (m⁻¹) of a distance inside the interval.
     #[inline]
     #[must_use]
     pub fn pdf(&self, distance: f32) -> f32 {
-        let offset = distance - self.closest;
-        self.height / (self.angle * (self.height * self.height + offset * offset))
+        // Squared only after the division: far away the square would leave the range of f32.
+        let tangent = (distance - self.closest) / self.height;
+        1.0 / (self.angle * self.height * (1.0 + tangent * tangent))
     }
 }
 

@@ -7,9 +7,10 @@
 
 use glam::Vec3;
 
+use super::tracking::most_stretches;
 use crate::host::Medium;
-use crate::math::Ray;
 use crate::math::quadrature::GAUSS_8;
+use crate::math::{Ray, float};
 use crate::spectrum::{Gradient, Spectrum};
 
 /// Smallest `|m·u|` in the term of a face: at grazing crossings it has no bound.
@@ -19,8 +20,9 @@ const MIN_FACE_COSINE: f32 = 1e-3;
 /// positions resolve, and a mistaken step length must not hang the host.
 const MAX_SAMPLES: u32 = 1 << 16;
 
-/// Most stretches visited along one ray; a medium that has more than this is a mistake.
-const MAX_STRETCHES: u32 = 1 << 20;
+/// Stretches after which a run is marched, so that an endless one can end where nothing is seen
+/// through it.
+const MAX_RUN: u32 = 256;
 
 /// How finely a run of changing extinction is sampled.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -146,16 +148,14 @@ enum Part {
     },
 }
 
-/// Splits a ray at the medium's constant stretches; what lies between two of them is one run.
+/// Splits a ray at the medium's constant stretches; what lies between two of them is one run, or
+/// several where it is long. On endless and very long rays stops as soon as `visit` says that nothing is seen
+/// beyond; what lies behind the most stretches a walk may visit counts as vacuum.
 #[inline]
-fn for_each_part(ray: &Ray, medium: &(impl Medium + ?Sized), mut visit: impl FnMut(Part)) {
-    let (mut at, mut run_from) = (0.0_f32, None);
-    let end_run = |run_from: &mut Option<f32>, until: f32, visit: &mut dyn FnMut(Part)| {
-        if let Some(from) = run_from.take() {
-            visit(Part::Changing { from, until });
-        }
-    };
-    for _ in 0..MAX_STRETCHES {
+fn for_each_part(ray: &Ray, medium: &(impl Medium + ?Sized), mut visit: impl FnMut(Part) -> bool) {
+    let (mut at, mut run_from, mut run_count) = (0.0_f32, None, 0);
+    for visited in 0..most_stretches(ray) {
+        let is_endless = ray.length.is_infinite() || visited > 16 * MAX_RUN;
         // Written so that NaN ends the loop, too.
         if !(at < ray.length) {
             break;
@@ -164,22 +164,40 @@ fn for_each_part(ray: &Ray, medium: &(impl Medium + ?Sized), mut visit: impl FnM
         // A host that does not advance must not hang us.
         let until = if stretch.until > at { stretch.until } else { at + medium.resolution().max(at * 1e-6) };
         let until = until.min(ray.length);
+        let is_changing = until.is_finite() && !stretch.is_constant();
+        if !is_changing || run_count >= MAX_RUN {
+            if let Some(from) = run_from.take()
+                && visit(Part::Changing { from, until: at })
+                && is_endless
+            {
+                return;
+            }
+            run_count = 0;
+        }
         if until.is_infinite() {
-            end_run(&mut run_from, at, &mut visit);
             visit(Part::Endless { extinction: stretch.majorant });
             return;
         }
-        if stretch.is_constant() {
-            end_run(&mut run_from, at, &mut visit);
-            if !stretch.majorant.is_black() {
-                visit(Part::Constant { extinction: stretch.majorant, from: at, until });
-            }
-        } else if run_from.is_none() {
-            run_from = Some(at);
+        if is_changing {
+            run_from = run_from.or(Some(at));
+            run_count += 1;
+        } else if !stretch.majorant.is_black()
+            && visit(Part::Constant { extinction: stretch.majorant, from: at, until })
+            && is_endless
+        {
+            return;
         }
         at = until;
     }
-    end_run(&mut run_from, at, &mut visit);
+    if let Some(from) = run_from {
+        visit(Part::Changing { from, until: at });
+    }
+}
+
+/// Whether nothing is seen through a thickness.
+#[inline]
+fn is_opaque(thickness: Spectrum) -> bool {
+    thickness.min_element() > float::OPAQUE
 }
 
 #[inline]
@@ -194,7 +212,9 @@ fn endless(extinction: Spectrum) -> Spectrum {
 /// ```
 ///
 /// Exact on constant stretches; elsewhere unbiased for a random offset. A ray that never leaves
-/// the medium is infinitely thick in the channels where its last stretch may be anything but vacuum.
+/// the medium is infinitely thick in the channels where its last stretch may be anything but vacuum;
+/// where bounds have no last stretch (noise), the sum ends once every channel exceeds
+/// [`OPAQUE`](crate::math::float::OPAQUE), or after 65536 stretches.
 /// 0 for a ray without length. Source: Jarosz et al. 2008, Eq. 16 and 21.
 ///
 /// ```
@@ -207,12 +227,15 @@ fn endless(extinction: Spectrum) -> Spectrum {
 #[must_use]
 pub fn optical_thickness(ray: &Ray, medium: &(impl Medium + ?Sized), marching: Marching) -> Spectrum {
     let mut value = Spectrum::ZERO;
-    for_each_part(ray, medium, |part| match part {
-        Part::Constant { extinction, from, until } => value += extinction * (until - from),
-        Part::Changing { from, until } => {
-            marching.samples(from, until, |t, weight| value += medium.extinction(ray.at(t)) * weight);
+    for_each_part(ray, medium, |part| {
+        match part {
+            Part::Constant { extinction, from, until } => value += extinction * (until - from),
+            Part::Changing { from, until } => {
+                marching.samples(from, until, |t, weight| value += medium.extinction(ray.at(t)) * weight);
+            }
+            Part::Endless { extinction } => value += endless(extinction),
         }
-        Part::Endless { extinction } => value += endless(extinction),
+        is_opaque(value)
     });
     value
 }
@@ -246,16 +269,19 @@ pub fn optical_thickness_with_gradients(ray: &Ray, medium: &(impl Medium + ?Size
     }
     // 0 for an infinite ray: then the far end moves along, as it were.
     let inverse = 1.0 / ray.length;
-    for_each_part(ray, medium, |part| match part {
-        Part::Constant { extinction, from, until } => sum.value += extinction * (until - from),
-        Part::Changing { from, until } => marching.samples(from, until, |t, weight| {
-            let point = ray.at(t);
-            sum.value += medium.extinction(point) * weight;
-            let slope = medium.gradients(point).extinction * weight;
-            sum.gradient_joint += slope;
-            sum.gradient_fixed += slope * (1.0 - t * inverse);
-        }),
-        Part::Endless { extinction } => sum.value += endless(extinction),
+    for_each_part(ray, medium, |part| {
+        match part {
+            Part::Constant { extinction, from, until } => sum.value += extinction * (until - from),
+            Part::Changing { from, until } => marching.samples(from, until, |t, weight| {
+                let point = ray.at(t);
+                sum.value += medium.extinction(point) * weight;
+                let slope = medium.gradients(point).extinction * weight;
+                sum.gradient_joint += slope;
+                sum.gradient_fixed += slope * (1.0 - t * inverse);
+            }),
+            Part::Endless { extinction } => sum.value += endless(extinction),
+        }
+        is_opaque(sum.value)
     });
     if inverse > 0.0 {
         // Scaled before the product, so that tiny lengths do not lose it.

@@ -10,6 +10,40 @@ use crate::math::{Ray, float};
 use crate::sampling::{Generator, uniform};
 use crate::spectrum::Spectrum;
 
+/// Most stretches a walk visits, on endless rays a fraction of it: a medium without end and mostly
+/// without matter must not hang the host. What lies beyond counts as vacuum.
+pub(super) const MAX_STRETCHES: u32 = 1 << 20;
+
+/// The same on a ray without end.
+pub(super) const MAX_STRETCHES_ENDLESS: u32 = 1 << 16;
+
+/// Most tentative collisions within one stretch: bounds so loose that a walk takes more move it less
+/// than `f32` positions resolve.
+const MAX_COLLISIONS: u32 = 1 << 22;
+
+/// Tentative collisions expected at least on a stretch of an emissive medium: where there is light
+/// but hardly extinction, collisions alone would never see it.
+const EMISSION_SAMPLES: f32 = 2.0;
+
+/// How many stretches of a ray a walk may visit.
+#[inline]
+pub(super) fn most_stretches(ray: &Ray) -> u32 {
+    if ray.length.is_finite() { MAX_STRETCHES } else { MAX_STRETCHES_ENDLESS }
+}
+
+/// Bounds (m⁻¹) down to this are vacuum: on stretches without end, all that is no extinction at all
+/// but marks emission, which would be infinitely bright there.
+#[inline]
+fn vacuum_bound(end: f32) -> f32 {
+    if end.is_finite() { 0.0 } else { 1e-30 }
+}
+
+/// Least bound (m⁻¹) for tentative collisions on a stretch.
+#[inline]
+fn floor_of(is_emissive: bool, length: f32) -> f32 {
+    if is_emissive { (EMISSION_SAMPLES / length).min(1e30) } else { 0.0 }
+}
+
 /// A flight through a medium up to its next collision.
 #[derive(Debug, Clone, Copy)]
 pub struct Flight {
@@ -76,17 +110,21 @@ fn grey(medium: &(impl Medium + ?Sized), ray: &Ray, u: f32, rng: &mut Generator)
     // Optical thickness up to the next tentative collision; what a stretch does not use up is
     // carried into the next.
     let mut thickness = step(u);
-    while t < ray.length {
+    for _ in 0..most_stretches(ray) {
+        // NaN ends the walk, too.
+        if !(t < ray.length) {
+            break;
+        }
         let stretch = medium.stretch(ray, t);
         let end = stretch.until.min(ray.length);
-        let bound = stretch.majorant[0];
-        if bound > 0.0 {
+        if stretch.majorant[0] > vacuum_bound(end) {
+            let bound = stretch.majorant[0].max(floor_of(emissive, end - t));
             let sure = stretch.minorant[0];
             let inverse = 1.0 / bound;
             let start = t;
-            loop {
+            for _ in 0..MAX_COLLISIONS {
                 let length = thickness * inverse;
-                if t + length >= end {
+                if !(t + length < end) {
                     thickness = (thickness - (end - t) * bound).max(0.0);
                     break;
                 }
@@ -135,18 +173,23 @@ fn coloured(medium: &(impl Medium + ?Sized), ray: &Ray, throughput: Spectrum, u:
     let mut span = Span(None);
     let mut t = 0.0;
     let mut thickness = step(u);
-    while t < ray.length {
+    for _ in 0..most_stretches(ray) {
+        if !(t < ray.length) {
+            break;
+        }
         let stretch = medium.stretch(ray, t);
         let end = stretch.until.min(ray.length);
-        let majorant = stretch.majorant;
         let start = t;
-        if majorant.max_element() > 0.0 {
+        if stretch.majorant.max_element() > vacuum_bound(end) {
+            let floor = floor_of(emissive, end - t);
+            let majorant = stretch.majorant.map(|c| c.max(floor));
+            let is_sure = stretch.is_constant() && majorant == stretch.majorant;
             let bound = majorant[channel];
-            loop {
+            for _ in 0..MAX_COLLISIONS {
                 let length = if bound > 0.0 { thickness / bound } else { f32::INFINITY };
                 let travelled = length.min(end - t);
                 relative = passed(relative, majorant, channel, travelled);
-                if t + length >= end {
+                if !(t + length < end) {
                     thickness = (thickness - (end - t) * bound).max(0.0);
                     break;
                 }
@@ -157,8 +200,8 @@ fn coloured(medium: &(impl Medium + ?Sized), ray: &Ray, throughput: Spectrum, u:
                     emission += properties.emission * relative / density;
                 }
                 let extinction = properties.extinction();
-                if stretch.is_constant() || uniform(rng) * bound < extinction[channel] {
-                    relative *= extinction / extinction[channel];
+                if is_sure || uniform(rng) * bound < extinction[channel] {
+                    relative = bounded(relative * (extinction / extinction[channel]));
                     span.extend(start, t);
                     return Flight {
                         distance: t,
@@ -169,7 +212,7 @@ fn coloured(medium: &(impl Medium + ?Sized), ray: &Ray, throughput: Spectrum, u:
                     };
                 }
                 let null = (majorant - extinction).max(Spectrum::ZERO);
-                relative *= null / null[channel];
+                relative = bounded(relative * (null / null[channel]));
                 thickness = step(uniform(rng));
             }
             span.extend(start, end);
@@ -180,6 +223,12 @@ fn coloured(medium: &(impl Medium + ?Sized), ray: &Ray, throughput: Spectrum, u:
     Flight { distance: ray.length, collision: None, weight, emission, span: span.finish(ray.length) }
 }
 
+/// A ratio of densities too large to matter: the mixture's weight then saturates at 1/share.
+#[inline]
+fn bounded(relative: Spectrum) -> Spectrum {
+    relative.map(|r| float::min(r, 1e30))
+}
+
 /// Densities after a step without tentative collision, relative to the chosen channel's.
 #[inline]
 fn passed(relative: Spectrum, majorant: Spectrum, channel: usize, distance: f32) -> Spectrum {
@@ -188,8 +237,8 @@ fn passed(relative: Spectrum, majorant: Spectrum, channel: usize, distance: f32)
         return relative.zip(majorant, |r, m| if m > majorant[channel] { 0.0 } else { r });
     }
     let difference = (majorant - Spectrum::splat(majorant[channel])) * distance;
-    // A ratio beyond e⁸⁰ overflows; the mixture's weight then saturates at 1/share.
-    relative.zip(difference, |r, d| (r * float::exp((-d).clamp(-80.0, 80.0))).min(1e30))
+    // A ratio beyond e⁸⁰ overflows.
+    bounded(relative.zip(difference, |r, d| r * float::exp((-d).clamp(-80.0, 80.0))))
 }
 
 /// Unbiased estimate of the transmittance along `ray`; exact where the medium is constant.
@@ -227,19 +276,25 @@ fn grey_transmittance(medium: &(impl Medium + ?Sized), ray: &Ray, rng: &mut (imp
     let mut closed = 0.0;
     let mut ratio = 1.0;
     let mut t = 0.0;
-    while t < ray.length {
+    for _ in 0..most_stretches(ray) {
+        if !(t < ray.length) {
+            break;
+        }
         let stretch = medium.stretch(ray, t);
         let end = stretch.until.min(ray.length);
         let (low, high) = (stretch.minorant[0], stretch.majorant[0]);
         if low > 0.0 {
             closed += low * (end - t);
+            if closed > float::OPAQUE {
+                return 0.0;
+            }
         }
         let range = high - low;
         if range > 0.0 {
             let inverse = 1.0 / range;
-            loop {
+            for _ in 0..MAX_COLLISIONS {
                 t += step(uniform(rng)) * inverse;
-                if t >= end {
+                if !(t < end) {
                     break;
                 }
                 ratio *= 1.0 - (medium.extinction(ray.at(t))[0] - low) * inverse;
@@ -251,9 +306,6 @@ fn grey_transmittance(medium: &(impl Medium + ?Sized), ray: &Ray, rng: &mut (imp
                 }
             }
         }
-        if closed > float::OPAQUE {
-            return 0.0;
-        }
         t = end;
     }
     if closed > 0.0 { ratio * float::exp(-closed) } else { ratio }
@@ -263,18 +315,24 @@ fn coloured_transmittance(medium: &(impl Medium + ?Sized), ray: &Ray, rng: &mut 
     let mut closed = Spectrum::ZERO;
     let mut ratio = Spectrum::ONE;
     let mut t = 0.0;
-    while t < ray.length {
+    for _ in 0..most_stretches(ray) {
+        if !(t < ray.length) {
+            break;
+        }
         let stretch = medium.stretch(ray, t);
         let end = stretch.until.min(ray.length);
         let (low, high) = (stretch.minorant, stretch.majorant);
         // 0 · ∞ in vacuum would be NaN.
         closed += low.map(|c| if c > 0.0 { c * (end - t) } else { 0.0 });
+        if closed.min_element() > float::OPAQUE {
+            return Spectrum::ZERO;
+        }
         let range = (high - low).max_element();
         if range > 0.0 {
             let inverse = 1.0 / range;
-            loop {
+            for _ in 0..MAX_COLLISIONS {
                 t += step(uniform(rng)) * inverse;
-                if t >= end {
+                if !(t < end) {
                     break;
                 }
                 ratio *= Spectrum::ONE - (medium.extinction(ray.at(t)) - low) * inverse;
@@ -285,9 +343,6 @@ fn coloured_transmittance(medium: &(impl Medium + ?Sized), ray: &Ray, rng: &mut 
                     ratio *= 2.0;
                 }
             }
-        }
-        if closed.min_element() > float::OPAQUE {
-            return Spectrum::ZERO;
         }
         t = end;
     }
