@@ -76,6 +76,8 @@ pub struct Radiance {
     pub medium_single: Spectrum,
     /// The medium lit by scattered light.
     pub medium_multiple: Spectrum,
+    /// How often the path collided with the medium: what it cost, not what is seen.
+    pub collisions: u32,
 }
 
 impl Radiance {

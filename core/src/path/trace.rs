@@ -133,6 +133,7 @@ pub fn radiance<M: Medium + ?Sized, S: Scene + ?Sized>(
 
         let next = if let Some(properties) = flown.collision {
             path.arrive(First::Medium);
+            path.radiance.collisions += 1;
             path.throughput *= properties.albedo();
             if path.scatterings > settings.max_scatterings || path.throughput.is_black() {
                 break;

@@ -204,6 +204,7 @@ impl WithMedium for Job<'_> {
             let jitter = uniform2(rng);
             let film = Vec2::new((sample.x as f32 + jitter.x) / width, (sample.y as f32 + jitter.y) / height);
             let seen = path::radiance(&self.camera.ray(film), &world, &self.paths, rng);
+            sample.tally.collide(seen.collisions);
             if has_layers {
                 let parts = [
                     seen.total(),
