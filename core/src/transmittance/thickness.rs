@@ -29,7 +29,8 @@ const MAX_RUN: u32 = 256;
 pub enum Steps {
     /// Steps of about this length (m): `N = max(1, ⌈run / length⌉)`.
     Length(f32),
-    /// This many steps per run, whatever its length: the choice for finite differences.
+    /// This many steps per run, whatever its length: the choice for finite differences. A run ends
+    /// after 256 stretches of the medium at the latest.
     Count(u32),
     /// This many panels of 8 Gauss–Legendre nodes per run; the offset is not used. For smooth media
     /// as good as exact.
