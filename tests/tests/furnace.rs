@@ -9,6 +9,7 @@ use fogbow::phase::{Lobe, Phase};
 use fogbow::sampling::{Generator, uniform2, warp};
 use fogbow::spectrum::Spectrum;
 use fogbow::surface::Surface;
+use fogbow_tests::estimate::estimate;
 
 /// A ball of fog around the origin whose density falls off towards its border, or not.
 struct Ball {
@@ -83,37 +84,6 @@ impl Scene for Sphere {
     }
 }
 
-/// Mean and standard error of each component over paths from `eye`.
-struct Estimate {
-    mean: [f64; 3],
-    error: [f64; 3],
-}
-
-fn estimate(samples: u32, mut sample: impl FnMut(&mut Generator) -> Spectrum) -> Estimate {
-    let (mut sum, mut squares) = ([0.0; 3], [0.0; 3]);
-    for i in 0..samples {
-        let value = sample(&mut Generator::new(u64::from(i) + 77));
-        assert!(value.is_finite(), "sample {i}: {value:?}");
-        for c in 0..3 {
-            sum[c] += f64::from(value[c]);
-            squares[c] += f64::from(value[c]).powi(2);
-        }
-    }
-    let n = f64::from(samples);
-    let mean = sum.map(|s| s / n);
-    let error = [0, 1, 2].map(|c| ((squares[c] / n - mean[c] * mean[c]).max(0.0) / n).sqrt());
-    Estimate { mean, error }
-}
-
-/// Within 4.5 standard errors (1 in 150 000 by chance), or `floor` where the estimator has no noise.
-#[track_caller]
-fn assert_estimates(estimate: &Estimate, truth: [f64; 3], floor: f64, what: &str) {
-    for (channel, ((mean, error), truth)) in estimate.mean.iter().zip(estimate.error).zip(truth).enumerate() {
-        let allowed = 4.5 * error + floor * truth.abs();
-        assert!((mean - truth).abs() <= allowed, "{what}, channel {channel}: {mean} ± {error} instead of {truth}");
-    }
-}
-
 const EYE: Vec3 = Vec3::new(0.2, -0.4, 3.0);
 
 /// f32 rounding accumulated over a path.
@@ -142,7 +112,7 @@ fn fog_that_only_scatters_vanishes_under_a_uniform_sky() {
                     path::radiance(&towards_ball(rng), &world, &Settings::default(), rng).total()
                 });
                 let what = format!("phase {i}, {scattering:?}, constant: {is_constant}");
-                assert_estimates(&seen, [1.0, 2.0, 3.0], ROUNDING, &what);
+                seen.assert_is([1.0, 2.0, 3.0], ROUNDING, &what);
             }
         }
     }
@@ -170,7 +140,7 @@ fn white_surfaces_vanish_under_a_uniform_sky_with_and_without_fog() {
             let world = World { medium: &fog, scene: &scene, lights: &sky };
             let seen =
                 estimate(40_000, |rng| path::radiance(&towards_ball(rng), &world, &Settings::default(), rng).total());
-            assert_estimates(&seen, [1.0; 3], ROUNDING, &format!("{surface:?}, density {density}"));
+            seen.assert_is([1.0; 3], ROUNDING, &format!("{surface:?}, density {density}"));
         }
     }
 }
@@ -184,7 +154,7 @@ fn an_isothermal_medium_looks_like_emission_over_absorption_whatever_it_scatters
         let world = World { medium: &fog, scene: &Empty, lights: &[] };
         let ray = Ray::new(Vec3::ZERO, Vec3::X);
         let seen = estimate(60_000, |rng| path::radiance(&ray, &world, &Settings::default(), rng).total());
-        assert_estimates(&seen, [1.0, 2.0, 3.0], ROUNDING, &format!("{scattering:?}"));
+        seen.assert_is([1.0, 2.0, 3.0], ROUNDING, &format!("{scattering:?}"));
     }
 }
 
@@ -289,7 +259,7 @@ fn single_scattering_of_every_kind_of_light_matches_quadrature() {
         let settings = Settings { max_scatterings: 1, ..Settings::default() };
         let seen = estimate(400_000, |rng| path::radiance(&ray, &world, &settings, rng).total());
         // The quadrature's own error: 24² strata on the light.
-        assert_estimates(&seen, [quadrature; 3], 2e-3, &format!("{light:?}"));
+        seen.assert_is([quadrature; 3], 2e-3, &format!("{light:?}"));
     }
 }
 
@@ -307,7 +277,7 @@ fn a_light_seen_through_absorbing_fog_follows_beer_and_lambert() {
     let world = World { medium: &fog, scene: &scene, lights: &lights };
     let ray = Ray::new(Vec3::new(0.0, 0.0, 3.0), Vec3::NEG_Z);
     let seen = estimate(200_000, |rng| path::radiance(&ray, &world, &Settings::default(), rng).total());
-    assert_estimates(&seen, [0.1f64, 0.5, 2.0].map(|s| (-0.5 * s).exp()), ROUNDING, "half a metre of fog");
+    seen.assert_is([0.1f64, 0.5, 2.0].map(|s| (-0.5 * s).exp()), ROUNDING, "half a metre of fog");
 }
 
 /// Seen from afar, points are far less exact than a lamp is close: a shadow ray that starts above
@@ -337,7 +307,7 @@ fn a_surface_close_to_a_small_lamp_and_far_from_the_eye_gets_all_its_light() {
     // Irradiance of a sphere wholly above the horizon: π L sin² cos.
     let distance2 = f64::from(target.length_squared());
     let truth = 0.5 * 400.0 * 0.0016 / distance2 * 0.4 / distance2.sqrt();
-    assert_estimates(&seen, [truth; 3], 1e-4, "wall behind a lamp");
+    seen.assert_is([truth; 3], 1e-4, "wall behind a lamp");
 }
 
 #[test]

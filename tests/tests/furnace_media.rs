@@ -11,31 +11,7 @@ use fogbow::spectrum::Spectrum;
 use fogbow::surface::Surface;
 use fogbow::transmittance::thickness::{Marching, optical_thickness};
 use fogbow::transmittance::{flight, transmittance};
-
-/// Mean and standard error per channel.
-fn estimate(samples: u32, mut sample: impl FnMut(&mut Generator) -> Spectrum) -> ([f64; 3], [f64; 3]) {
-    let (mut sum, mut squares) = ([0.0; 3], [0.0; 3]);
-    for i in 0..samples {
-        let value = sample(&mut Generator::new(u64::from(i) + 4711));
-        assert!(value.is_finite(), "sample {i}: {value:?}");
-        for c in 0..3 {
-            sum[c] += f64::from(value[c]);
-            squares[c] += f64::from(value[c]).powi(2);
-        }
-    }
-    let n = f64::from(samples);
-    let mean = sum.map(|s| s / n);
-    (mean, [0, 1, 2].map(|c| ((squares[c] / n - mean[c] * mean[c]).max(0.0) / n).sqrt()))
-}
-
-#[track_caller]
-fn assert_mean((mean, error): ([f64; 3], [f64; 3]), truth: [f64; 3], floor: f64, what: &str) {
-    for c in 0..3 {
-        let allowed = 4.5 * error[c] + floor * truth[c].abs();
-        let (m, e, t) = (mean[c], error[c], truth[c]);
-        assert!((m - t).abs() <= allowed, "{what}, channel {c}: {m} ± {e} instead of {t}");
-    }
-}
+use fogbow_tests::estimate::{Estimate, estimate};
 
 const SIZE: [u32; 3] = [12, 10, 9];
 const COLOURED: Spectrum = Spectrum::new(0.5, 3.0, 8.0);
@@ -76,7 +52,7 @@ fn assert_white_furnace(medium: &dyn Medium, what: &str) {
     let world = World { medium, scene: &Empty, lights: &sky };
     let seen =
         estimate(15_000, |rng| path::radiance(&through_the_middle(rng), &world, &Settings::default(), rng).total());
-    assert_mean(seen, [1.0, 2.0, 3.0], 2e-5, what);
+    seen.assert_is([1.0, 2.0, 3.0], 2e-5, what);
 }
 
 #[test]
@@ -187,12 +163,12 @@ fn transmittance_and_flights_agree_with_the_optical_thickness() {
                 let exact = exact.0.map(f64::from);
                 let what = format!("{name} {colour:?} ray {k}");
                 let ratio = estimate(20_000, |rng| transmittance(medium, &ray, rng));
-                assert_mean(ratio, exact, 1e-4, &format!("ratio tracking, {what}"));
+                ratio.assert_is(exact, 1e-4, &format!("ratio tracking, {what}"));
                 let escapes = estimate(40_000, |rng| {
                     let flown = flight(medium, &ray, Spectrum::new(1.0, 0.3, 2.0), uniform(rng), rng);
                     if flown.collision.is_none() { flown.weight } else { Spectrum::ZERO }
                 });
-                assert_mean(escapes, exact, 1e-4, &format!("delta tracking, {what}"));
+                escapes.assert_is(exact, 1e-4, &format!("delta tracking, {what}"));
             }
         }
     }
@@ -219,7 +195,7 @@ fn glowing_media_look_like_emission_over_absorption() {
         let world = World { medium: &grid, scene: &Empty, lights: &sky };
         let seen =
             estimate(20_000, |rng| path::radiance(&through_the_middle(rng), &world, &Settings::default(), rng).total());
-        assert_mean(seen, [1.0, 2.0, 3.0], 2e-5, &format!("{scattering:?}"));
+        seen.assert_is([1.0, 2.0, 3.0], 2e-5, &format!("{scattering:?}"));
     }
 }
 
@@ -251,14 +227,14 @@ fn what_glows_without_extinction_is_seen() {
         let world = World { medium, scene: &Empty, lights: &[] };
         let ray = Ray::new(Vec3::new(0.1, 0.2, 3.0), Vec3::NEG_Z);
         let seen = estimate(60_000, |rng| path::radiance(&ray, &world, &Settings::default(), rng).total());
-        assert_mean(seen, [first, 2.0, 3.0], 1e-4, &format!("medium {i}"));
+        seen.assert_is([first, 2.0, 3.0], 1e-4, &format!("medium {i}"));
         // A path that has lost a channel sees what glows in the others.
         let mut seen = estimate(60_000, |rng| {
             let u = uniform(rng);
             flight(medium, &ray, Spectrum::new(0.0, 1.0, 0.5), u, rng).emission
         });
-        seen.0[0] = first;
-        assert_mean(seen, [first, 2.0, 3.0], 1e-4, &format!("flight in medium {i}"));
+        seen.mean[0] = first;
+        seen.assert_is([first, 2.0, 3.0], 1e-4, &format!("flight in medium {i}"));
     }
 }
 
@@ -506,10 +482,11 @@ fn connections_and_hits_add_up_to_what_hits_alone_find() {
                 };
                 let settings = Settings { max_scatterings: limit, ..Settings::default() };
                 let seen = estimate(20_000, |rng| path::radiance(&eye(rng), &world, &settings, rng).total());
-                let (truth, error) = estimate(60_000, |rng| brute_force(&eye(rng), &world, limit, rng));
-                let both = [0, 1, 2].map(|c: usize| seen.1[c].hypot(error[c]));
+                let Estimate { mean: truth, error } =
+                    estimate(60_000, |rng| brute_force(&eye(rng), &world, limit, rng));
+                let both = [0, 1, 2].map(|c: usize| seen.error[c].hypot(error[c]));
                 let what = format!("{light_name}, {medium_name}, {limit} scatterings");
-                assert_mean((seen.0, both), truth, 1e-3, &what);
+                Estimate { mean: seen.mean, error: both }.assert_is(truth, 1e-3, &what);
             }
         }
     }
@@ -534,8 +511,8 @@ fn small_sphere_lights_become_points() {
         let radiance = Spectrum::splat(1.0 / (PI * radius * radius));
         let light = SphereLight::new(centre, radius, radiance).unwrap();
         let sphere = see(Light::Sphere(light), Some(Shape::Sphere(centre, radius)));
-        let both = [0, 1, 2].map(|c: usize| point.1[c].hypot(sphere.1[c]));
-        assert_mean((sphere.0, both), point.0, 2e-3, &format!("radius {radius}"));
+        let both = [0, 1, 2].map(|c: usize| point.error[c].hypot(sphere.error[c]));
+        Estimate { mean: sphere.mean, error: both }.assert_is(point.mean, 2e-3, &format!("radius {radius}"));
     }
 }
 
@@ -546,7 +523,7 @@ fn phong_reflects_no_more_than_it_gets_and_is_reciprocal() {
         let surface = Surface::Phong { diffuse: Spectrum::splat(0.4), specular: Spectrum::splat(0.6), exponent };
         for _ in 0..8 {
             let to_eye = warp::cosine_hemisphere(uniform2(&mut rng));
-            let (mean, error) = estimate(20_000, |rng| {
+            let Estimate { mean, error } = estimate(20_000, |rng| {
                 surface.sample(Vec3::Z, to_eye, uniform(rng), uniform2(rng)).map_or(Spectrum::ZERO, |s| s.weight)
             });
             assert!(mean[0] <= 1.0 + 4.5 * error[0] + 1e-5, "exponent {exponent}: {} ± {}", mean[0], error[0]);
