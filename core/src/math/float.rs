@@ -66,7 +66,7 @@ pub fn powf(x: f32, y: f32) -> f32 {
 #[inline]
 #[must_use]
 pub fn sin_cos(x: f32) -> (f32, f32) {
-    (libm::sinf(x), libm::cosf(x))
+    libm::sincosf(x)
 }
 
 /// Tangent of an angle (rad).
