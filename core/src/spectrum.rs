@@ -136,6 +136,13 @@ fn transmitted(thickness: f32) -> f32 {
     if thickness > float::OPAQUE { 0.0 } else { float::exp(-thickness) }
 }
 
+impl core::ops::IndexMut<usize> for Spectrum {
+    #[inline]
+    fn index_mut(&mut self, channel: usize) -> &mut f32 {
+        &mut self.0[channel]
+    }
+}
+
 impl Index<usize> for Spectrum {
     type Output = f32;
     #[inline]

@@ -2,8 +2,9 @@
 
 use glam::Vec3;
 
+use super::points::attenuated_length;
 use crate::host::{Medium, Properties};
-use crate::math::{Ray, float};
+use crate::math::Ray;
 use crate::sampling::distance::truncated_exponential;
 use crate::spectrum::Spectrum;
 
@@ -112,11 +113,4 @@ pub fn eye_ray(
         }
     }
     EyeRay { radiance, transmittance: thickness.transmitted() }
-}
-
-/// `∫₀ᵈ e^{−σt} dt = (1 − e^{−σd})/σ` (m).
-#[inline]
-fn attenuated_length(extinction: f32, length: f32) -> f32 {
-    let a = extinction * length;
-    if a < 1e-4 { length * (1.0 - 0.5 * a) } else { -float::exp_m1(-a) / extinction }
 }

@@ -100,14 +100,29 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Walk<'_, M, S> {
         &self,
         point: Vec3,
         first: Vec2,
-        mut outgoing: impl FnMut(&Ray, &Hit) -> Spectrum,
+        outgoing: impl FnMut(&Ray, &Hit) -> Spectrum,
         rng: &mut (impl Rng + ?Sized),
     ) -> Incoming {
-        let rng = &mut own(rng);
         let to_light = warp::uniform_sphere(first);
         let mut ray = Ray::new(point, to_light);
         ray.length = nearest_surface(&ray, self.scene).map_or(f32::INFINITY, |hit| hit.distance);
-        let mut kappa = Spectrum::splat(1.0 / warp::uniform_sphere_pdf());
+        Incoming { to_light, light: self.along(ray, warp::uniform_sphere_pdf(), outgoing, rng) }
+    }
+
+    /// Light scattered on a path whose first segment lies on `ray`, up to its end, over the density
+    /// `pdf` (sr⁻¹) of its direction: radiance at the ray's origin over `pdf`, and how it changes as
+    /// the whole path is translated.
+    ///
+    /// Other arguments as for [`Walk::path`].
+    pub fn along(
+        &self,
+        mut ray: Ray,
+        pdf: f32,
+        mut outgoing: impl FnMut(&Ray, &Hit) -> Spectrum,
+        rng: &mut (impl Rng + ?Sized),
+    ) -> Contribution {
+        let rng = &mut own(rng);
+        let mut kappa = Spectrum::splat(1.0 / pdf);
         let mut weight = Weight::ONE;
         let mut total = Contribution::ZERO;
         for vertex in 1..=self.settings.max_vertices {
@@ -150,7 +165,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Walk<'_, M, S> {
         if !(total.radiance.is_finite() && total.gradient.is_finite()) {
             total = Contribution::ZERO;
         }
-        Incoming { to_light, light: total }
+        total
     }
 
     #[inline]

@@ -20,7 +20,7 @@ const MAX_SEGMENTS: u32 = 100_000;
 
 /// `point` moved off its surface to the side of `direction`.
 #[inline]
-fn leave(point: Vec3, normal: Vec3, direction: Vec3, distance: f32) -> Vec3 {
+pub(crate) fn leave(point: Vec3, normal: Vec3, direction: Vec3, distance: f32) -> Vec3 {
     let size = point.abs().max_element().max(distance) * OFFSET;
     point + normal * size.copysign(normal.dot(direction))
 }

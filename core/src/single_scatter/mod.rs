@@ -20,6 +20,7 @@ mod sample;
 mod sums;
 
 pub use arrival::{Arrival, Contribution, connect, moments, scatter_directional};
+pub(crate) use sample::lattice;
 pub use sample::{
     Directional, nearest_surface, sample, sample_directional, sample_surfaces, sample_surfaces_directional, shadow_ray,
     visit_lights, visit_surfaces,

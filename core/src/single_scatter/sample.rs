@@ -65,7 +65,7 @@ pub fn nearest_surface(ray: &Ray, scene: &(impl Scene + ?Sized)) -> Option<Hit> 
 }
 
 /// A point of the lattice `(j/n, jφ)`, shifted: each is uniform by itself, together they are even.
-fn lattice(j: u32, count: u32, shift: Vec2) -> Vec2 {
+pub(crate) fn lattice(j: u32, count: u32, shift: Vec2) -> Vec2 {
     const GOLDEN: f64 = 0.618_033_988_749_894_9;
     let wrap = |x: f64| ((x - libm::floor(x)) as f32).min(ONE_MINUS_EPSILON);
     Vec2::new(

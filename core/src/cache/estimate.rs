@@ -1,0 +1,253 @@
+//! What the caches are filled with: the light at a point, with the sums that Eq. 34 needs.
+
+use glam::Vec3;
+
+use super::lookup::Reading;
+use super::record::Facing;
+use super::store::SurfaceCache;
+use crate::host::{Hit, Medium, Rng, Scene};
+use crate::math::{Frame, Ray, float};
+use crate::multiple_scatter::{self, Walk};
+use crate::path::connect::next_event;
+use crate::path::trace::leave;
+use crate::path::{self, World};
+use crate::phase::Phase;
+use crate::sampling::{Generator, uniform, uniform2, warp};
+use crate::sh::{Coefficient, MAX_DEGREE};
+use crate::single_scatter::{self, Arrival, Contribution, Directional, Sums, nearest_surface};
+use crate::spectrum::{Gradient, Spectrum};
+use crate::surface::{Surface, lambert};
+use crate::transmittance::thickness::Marching;
+
+/// Least cosine in the gradient of an irradiance sample: at grazing directions `1/cos` has a
+/// variance without bound.
+const MIN_COSINE: f32 = 0.05;
+
+/// Estimates the light that the caches hold.
+///
+/// Light from surfaces takes its direct part from one connection to the lights, its indirect part
+/// from the surface cache, where that has something, and from one traced path where not: so caches
+/// filled one after the other build on each other, and none needs another to be right.
+#[derive(Debug)]
+pub struct Estimator<'a, M: ?Sized, S: ?Sized> {
+    /// The world.
+    pub world: World<'a, M, S>,
+    /// Indirect irradiance known so far, and how it is read.
+    pub surfaces: Option<(&'a SurfaceCache<'a>, Reading)>,
+    /// How random walks are made, and light marched to.
+    pub walk: multiple_scatter::Settings,
+    /// How paths are traced where nothing is cached.
+    pub paths: path::Settings,
+    /// Samples of every light with extent at a point.
+    pub light_samples: u32,
+}
+
+impl<M: ?Sized, S: ?Sized> Clone for Estimator<'_, M, S> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+impl<M: ?Sized, S: ?Sized> Copy for Estimator<'_, M, S> {}
+
+impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
+    /// Light from the lights, scattered once at `point`: mean over directions (W·m⁻²·sr⁻¹), with
+    /// the expansion of `phase` of degree 1 and more added to `higher`.
+    pub fn single(&self, point: Vec3, phase: &Phase, higher: &mut [Coefficient], rng: &mut impl Rng) -> Sums {
+        self.expanded(phase, higher, |into| {
+            let World { medium, scene, lights } = self.world;
+            single_scatter::sample_directional(
+                point,
+                medium,
+                scene,
+                lights,
+                self.light_samples,
+                self.walk.steps,
+                rng,
+                into,
+            )
+        })
+    }
+
+    /// Light from surfaces, scattered once at `point`, from `directions` directions. As
+    /// [`Estimator::single`].
+    pub fn surface(
+        &self,
+        point: Vec3,
+        phase: &Phase,
+        directions: u32,
+        higher: &mut [Coefficient],
+        rng: &mut impl Rng,
+    ) -> Sums {
+        let mut child = Generator::child(rng);
+        self.expanded(phase, higher, |into| {
+            let World { medium, scene, .. } = self.world;
+            let outgoing = |ray: &Ray, hit: &Hit| self.outgoing(ray, hit, &mut child);
+            let steps = self.walk.steps;
+            single_scatter::sample_surfaces_directional(point, medium, scene, outgoing, directions, steps, rng, into)
+        })
+    }
+
+    /// Light scattered more than once, the last time at `point`, from `paths` random walks. As
+    /// [`Estimator::single`].
+    pub fn multiple(
+        &self,
+        point: Vec3,
+        phase: &Phase,
+        paths: u32,
+        higher: &mut [Coefficient],
+        rng: &mut impl Rng,
+    ) -> Sums {
+        let mut child = Generator::child(rng);
+        let walk = self.walker();
+        self.expanded(phase, higher, |into| {
+            let outgoing = |ray: &Ray, hit: &Hit| self.outgoing(ray, hit, &mut child);
+            multiple_scatter::sample_directional(&walk, point, outgoing, paths, rng, into)
+        })
+    }
+
+    /// Indirect irradiance (W·m⁻²) at `point` on a surface with `normal`, from `paths` directions:
+    /// light from other surfaces through the medium, and light scattered in the medium. Its gradient
+    /// is that of a move along the surface with the normal held.
+    ///
+    /// ```text
+    /// E = ∫ cos θ (T L_surface + ∫ T σₛ L_i dt) dω,   ∇E: light from a surface as an area light that
+    /// stays, ∇(cos θ) included; light from the medium by translating the path, cos θ frozen
+    /// ```
+    pub fn irradiance(&self, point: Vec3, normal: Vec3, paths: u32, rng: &mut impl Rng) -> (Sums, Facing) {
+        let (mut sums, mut turn) = (Sums::default(), Gradient::ZERO);
+        let mut child = Generator::child(rng);
+        let (frame, walk, shift) = (Frame::around(normal), self.walker(), uniform2(rng));
+        let share = 1.0 / paths.max(1) as f32;
+        for j in 0..paths {
+            let u = single_scatter::lattice(j, paths, shift);
+            let to_light = frame.to_world(warp::cosine_hemisphere(u));
+            let cosine = normal.dot(to_light).max(1e-6);
+            // cos θ over density: π.
+            let weight = share * float::PI;
+            let mut ray = Ray::new(leave(point, normal, to_light, 0.0), to_light);
+            let marching = Marching { steps: self.walk.steps, offset: uniform(rng) };
+            let mut total = Contribution::ZERO;
+            if let Some(hit) = nearest_surface(&ray, self.world.scene) {
+                ray.length = hit.distance;
+                let radiance = self.outgoing(&ray, &hit, &mut child);
+                let arrival = Arrival::from_surface(&ray, &hit, radiance, 1.0, self.world.medium, marching);
+                if let Some(arrival) = arrival {
+                    let tilt = (to_light * cosine - normal) / (hit.distance * cosine.max(MIN_COSINE));
+                    let gradient = arrival.gradient + Gradient::outer(arrival.irradiance, tilt);
+                    let light = Contribution { radiance: arrival.irradiance, gradient } * weight;
+                    sums.add(&light, true);
+                    total += light;
+                }
+            }
+            let outgoing = |ray: &Ray, hit: &Hit| self.outgoing(ray, hit, &mut child);
+            let light = walk.along(ray, 1.0, outgoing, rng) * weight;
+            sums.add(&light, true);
+            total += light;
+            turn += Gradient::outer(total.radiance, to_light / cosine.max(MIN_COSINE));
+        }
+        (sums, Facing { normal, turn })
+    }
+
+    /// Radiance (W·m⁻²·sr⁻¹) that a surface sends back along a ray, but for its own emission.
+    pub fn outgoing(&self, ray: &Ray, hit: &Hit, rng: &mut Generator) -> Spectrum {
+        let point = ray.at(hit.distance);
+        let Surface::Lambert { reflectance } = hit.surface else {
+            return self.traced(&Ray { origin: leave(point, hit.normal, -ray.direction, hit.distance), ..*ray }, rng);
+        };
+        // One-sided: black from behind.
+        if reflectance.is_black() || hit.normal.dot(ray.direction) >= 0.0 {
+            return Spectrum::ZERO;
+        }
+        let direct = self.direct(point, hit, rng);
+        let known = self.surfaces.and_then(|(cache, reading)| cache.lookup(point, hit.normal, &reading));
+        let indirect = known.unwrap_or_else(|| self.indirect(point, hit, rng));
+        lambert::value(reflectance) * (direct + indirect)
+    }
+
+    /// Irradiance (W·m⁻²) from the lights, by one connection.
+    pub fn direct(&self, point: Vec3, hit: &Hit, rng: &mut Generator) -> Spectrum {
+        let random = (uniform(rng), uniform2(rng));
+        self.direct_at(point, hit, random, rng)
+    }
+
+    /// [`Estimator::direct`] with given random numbers for the choice of light and the point on it.
+    pub fn direct_at(&self, point: Vec3, hit: &Hit, random: (f32, glam::Vec2), rng: &mut Generator) -> Spectrum {
+        let origin = |to_light: Vec3| leave(point, hit.normal, to_light, hit.distance);
+        let cosine = |to_light: Vec3| (Spectrum::splat(hit.normal.dot(to_light).max(0.0)), 0.0);
+        next_event(&self.world, point, false, origin, cosine, random, rng)
+    }
+
+    /// Irradiance (W·m⁻²) that is not straight from the lights, by one path.
+    pub fn indirect(&self, point: Vec3, hit: &Hit, rng: &mut Generator) -> Spectrum {
+        let to_light = Frame::around(hit.normal).to_world(warp::cosine_hemisphere(uniform2(rng)));
+        let origin = leave(point, hit.normal, to_light, hit.distance);
+        self.traced(&Ray::new(origin, to_light), rng) * float::PI
+    }
+
+    /// Radiance (W·m⁻²·sr⁻¹) that a surface of any kind sends `to_eye` from the lights, by one connection.
+    pub fn reflected(
+        &self,
+        point: Vec3,
+        hit: &Hit,
+        to_eye: Vec3,
+        surface: Surface,
+        random: (f32, glam::Vec2),
+        rng: &mut Generator,
+    ) -> Spectrum {
+        let origin = |to_light: Vec3| leave(point, hit.normal, to_light, hit.distance);
+        let value = |to_light: Vec3| {
+            (surface.value(hit.normal, to_eye, to_light) * hit.normal.dot(to_light).max(0.0), 0.0)
+        };
+        next_event(&self.world, point, false, origin, value, random, rng)
+    }
+
+    /// Light of all lights, scattered once at `point` towards `to_eye`: one sample of each.
+    pub fn towards(&self, point: Vec3, to_eye: Vec3, phase: &Phase, rng: &mut Generator) -> (Spectrum, Sums) {
+        let World { medium, scene, lights } = self.world;
+        let sums = single_scatter::sample(point, to_eye, phase, medium, scene, lights, 1, self.walk.steps, rng);
+        (sums.value, sums)
+    }
+
+    /// Light of surfaces, scattered once at `point` towards `to_eye`: one direction.
+    pub fn surface_towards(&self, point: Vec3, to_eye: Vec3, phase: &Phase, rng: &mut Generator) -> Spectrum {
+        let World { medium, scene, .. } = self.world;
+        let mut child = Generator::child(rng);
+        let outgoing = |ray: &Ray, hit: &Hit| self.outgoing(ray, hit, &mut child);
+        single_scatter::sample_surfaces(point, to_eye, phase, medium, scene, outgoing, 1, self.walk.steps, rng).value
+    }
+
+    /// Light scattered more than once, the last time at `point` towards `to_eye`: one walk.
+    pub fn multiple_towards(&self, point: Vec3, to_eye: Vec3, phase: &Phase, rng: &mut Generator) -> Spectrum {
+        let mut child = Generator::child(rng);
+        let outgoing = |ray: &Ray, hit: &Hit| self.outgoing(ray, hit, &mut child);
+        multiple_scatter::sample(&self.walker(), point, to_eye, phase, outgoing, 1, rng).value
+    }
+
+    /// Radiance at the origin of a ray but for emission seen directly, by one path.
+    fn traced(&self, ray: &Ray, rng: &mut Generator) -> Spectrum {
+        let seen = path::radiance(&Ray::new(ray.origin, ray.direction), &self.world, &self.paths, rng);
+        seen.total() - seen.emitted
+    }
+
+    fn walker(&self) -> Walk<'_, M, S> {
+        let World { medium, scene, lights } = self.world;
+        Walk { medium, scene, lights, settings: self.walk }
+    }
+
+    /// Runs a directional estimate and cuts off its degree 0, which the record itself holds.
+    fn expanded(
+        &self,
+        phase: &Phase,
+        higher: &mut [Coefficient],
+        estimate: impl FnOnce(&mut Directional<'_>) -> Sums,
+    ) -> Sums {
+        let degree = crate::sh::degree_of(higher.len() + 1).unwrap_or(0);
+        let moments = single_scatter::moments(phase, degree);
+        let mut all = [Coefficient::ZERO; crate::sh::MAX_COEFFICIENTS];
+        let count = crate::sh::coefficient_count(degree.min(MAX_DEGREE));
+        let mut into = Directional { moments: &moments[..=degree], coefficients: &mut all[..count] };
+        let sums = estimate(&mut into);
+        higher.copy_from_slice(&all[1..=higher.len()]);
+        sums
+    }
+}

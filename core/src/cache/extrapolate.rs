@@ -1,0 +1,113 @@
+//! What several records say about a point: Jarosz et al. 2008, Eq. 35; sheet § 1.10.
+
+use crate::math::float;
+use crate::spectrum::Spectrum;
+
+/// How a record is carried to another point.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Extrapolation {
+    /// `L e^{∇L·Δ/L}`, mixed by a weighted geometric mean: exact where light falls off
+    /// exponentially, never negative (Eq. 35).
+    #[default]
+    Exponential,
+    /// `L + ∇L·Δ`, mixed by a weighted mean.
+    Linear,
+    /// `L`, mixed by a weighted mean.
+    Constant,
+}
+
+/// Weight of a record at `1 − distance/radius`: `d² (3 − 2d)`, from 0 at the edge to 1.
+///
+/// ```
+/// # use fogbow::cache::weight;
+/// assert_eq!((weight(0.0), weight(0.5), weight(1.0)), (0.0, 0.5, 1.0));
+/// ```
+#[inline]
+#[must_use]
+pub fn weight(d: f32) -> f32 {
+    d * d * (3.0 - 2.0 * d)
+}
+
+/// The largest exponent a record may be carried by: `max(4ε, 4)` (sheet § 1.10). Within its radius
+/// it is at most `ε`, but for expansions that nearly vanish in the direction asked for.
+#[inline]
+#[must_use]
+pub fn exponent_limit(tolerance: f32) -> f32 {
+    (4.0 * tolerance).max(4.0)
+}
+
+/// A mixture of records.
+///
+/// ```text
+/// L = (W₊/W) exp(Σ_{L_k>0} w_k (ln L_k + ∇L_k·Δ_k/L_k) / W₊)
+/// ```
+///
+/// per channel, with `W = Σ w_k` and `W₊` the part of it from records with `L_k > 0`: Eq. 35 where
+/// all are positive, and no blackening of everything by one black record where not.
+///
+/// ```
+/// # use fogbow::{cache::{Blend, Extrapolation}, spectrum::Spectrum};
+/// let mut blend = Blend::new(Extrapolation::Exponential, 4.0);
+/// blend.add(0.5, Spectrum::splat(2.0), Spectrum::splat(0.0));
+/// blend.add(0.5, Spectrum::splat(8.0), Spectrum::splat(0.0));
+/// assert!((blend.value().unwrap()[0] - 4.0).abs() < 1e-6);   // the geometric mean
+/// ```
+#[derive(Debug, Clone, Copy)]
+pub struct Blend {
+    kind: Extrapolation,
+    limit: f32,
+    total: f32,
+    sum: Spectrum,
+    positive: Spectrum,
+}
+
+impl Blend {
+    /// Nothing yet; `limit` bounds exponents, see [`exponent_limit`].
+    #[inline]
+    #[must_use]
+    pub fn new(kind: Extrapolation, limit: f32) -> Self {
+        Self { kind, limit, total: 0.0, sum: Spectrum::ZERO, positive: Spectrum::ZERO }
+    }
+
+    /// Adds a record's value and its change `∇L·Δ` on the way to the point.
+    #[inline]
+    pub fn add(&mut self, weight: f32, value: Spectrum, change: Spectrum) {
+        self.total += weight;
+        match self.kind {
+            Extrapolation::Exponential => {
+                for channel in 0..3 {
+                    let l = value[channel];
+                    if l > 0.0 {
+                        let exponent = (change[channel] / l).clamp(-self.limit, self.limit);
+                        self.sum[channel] += weight * (float::ln(l) + exponent);
+                        self.positive[channel] += weight;
+                    }
+                }
+            }
+            Extrapolation::Linear => self.sum += (value + change) * weight,
+            Extrapolation::Constant => self.sum += value * weight,
+        }
+    }
+
+    /// Sum of the weights so far.
+    #[inline]
+    #[must_use]
+    pub fn weight(&self) -> f32 {
+        self.total
+    }
+
+    /// The mixture; `None` if nothing took part.
+    #[inline]
+    #[must_use]
+    pub fn value(&self) -> Option<Spectrum> {
+        if !(self.total > 0.0) {
+            return None;
+        }
+        Some(match self.kind {
+            Extrapolation::Exponential => self.sum.zip(self.positive, |sum, positive| {
+                if positive > 0.0 { positive / self.total * float::exp(sum / positive) } else { 0.0 }
+            }),
+            Extrapolation::Linear | Extrapolation::Constant => self.sum / self.total,
+        })
+    }
+}

@@ -1,0 +1,444 @@
+//! Eye rays: what they need of the caches, and what they see with them.
+
+use glam::{Vec2, Vec3};
+
+use super::estimate::Estimator;
+use super::lookup::{Basis, Reading};
+use super::store::{SurfaceCache, VolumeCache};
+use crate::host::{Hit, Medium, Properties, Rng, Scene};
+use crate::light::{Falloff, Light, Source};
+use crate::march::scattering_points;
+use crate::math::{Frame, Ray};
+use crate::path::World;
+use crate::path::connect::reach;
+use crate::path::trace::leave;
+use crate::phase::deflection;
+use crate::sampling::discrete::choose;
+use crate::sampling::distance::Equiangular;
+use crate::sampling::{Generator, uniform, uniform2, warp};
+use crate::single_scatter::shadow_ray;
+use crate::spectrum::Spectrum;
+use crate::surface::{Surface, lambert};
+use crate::transmittance::thickness::{Marching, transmittance};
+
+/// Mirrors and panes of glass an eye ray follows: a hall of mirrors must end.
+const MAX_BOUNCES: u32 = 32;
+
+/// The golden ratio and the plastic numbers: multiples of them, wrapped, fill the unit interval and square evenly.
+const STEPS: [f32; 3] = [0.618_034, 0.754_877_67, 0.569_840_3];
+
+/// How far rays are followed, and with how many points.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct EyeSettings {
+    /// Points per sample on a ray through opaque fog: see [`scattering_points`].
+    pub density: f32,
+    /// Whether eye rays see area lights and the environment.
+    pub lights_visible: bool,
+    /// Whether light is followed beyond its first scattering.
+    pub indirect: bool,
+}
+
+/// What a cache is for, and how it is read.
+#[derive(Debug)]
+pub struct Reader<'a, C> {
+    /// The cache.
+    pub cache: &'a C,
+    /// How it is read.
+    pub reading: Reading,
+}
+
+impl<C> Clone for Reader<'_, C> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+impl<C> Copy for Reader<'_, C> {}
+
+/// The caches an image is made from; what is `None` is estimated anew at every point.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Caches<'a> {
+    /// Light of the lights, scattered once.
+    pub single: Option<Reader<'a, VolumeCache<'a>>>,
+    /// Light of surfaces, scattered once.
+    pub surface: Option<Reader<'a, VolumeCache<'a>>>,
+    /// Light scattered more than once.
+    pub multiple: Option<Reader<'a, VolumeCache<'a>>>,
+    /// Indirect irradiance on surfaces.
+    pub irradiance: Option<Reader<'a, SurfaceCache<'a>>>,
+}
+
+/// Radiance (W·m⁻²·sr⁻¹) by where it comes from, and what it took.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Seen {
+    /// Lights, the environment and glowing media.
+    pub emitted: Spectrum,
+    /// Surfaces lit by the lights.
+    pub surface_direct: Spectrum,
+    /// Surfaces lit by anything else.
+    pub surface_indirect: Spectrum,
+    /// Light of the lights, scattered once in the medium.
+    pub medium_single: Spectrum,
+    /// Light of surfaces, scattered once in the medium.
+    pub medium_surface: Spectrum,
+    /// Light scattered more than once, the last time in the medium.
+    pub medium_multiple: Spectrum,
+    /// Questions asked of caches.
+    pub lookups: u32,
+    /// Of these, questions no record answered.
+    pub misses: u32,
+}
+
+impl Seen {
+    /// All light together.
+    #[must_use]
+    pub fn total(&self) -> Spectrum {
+        self.emitted
+            + self.surface_direct
+            + self.surface_indirect
+            + self.medium_single
+            + self.medium_surface
+            + self.medium_multiple
+    }
+}
+
+/// What an eye ray meets.
+trait Sight {
+    /// A segment of it, the throughput at its start, and a sample's random numbers for it.
+    fn segment(&mut self, _segment: &Ray, _throughput: Spectrum) {}
+    /// A point in the medium: in-scattered radiance counts by `weight`.
+    fn scatter(&mut self, point: Vec3, to_eye: Vec3, properties: &Properties, weight: Spectrum);
+    /// A surface that scatters light diffusely or in a lobe: its reflected radiance counts by `weight`.
+    fn surface(&mut self, ray: &Ray, hit: &Hit, weight: Spectrum);
+    /// Light seen directly.
+    fn emitted(&mut self, _light: Spectrum) {}
+}
+
+/// Follows an eye ray through the medium and past mirrors and glass.
+fn look<M: Medium + ?Sized, S: Scene + ?Sized>(
+    ray: &Ray,
+    world: &World<'_, M, S>,
+    settings: &EyeSettings,
+    rng: &mut (impl Rng + ?Sized),
+    sight: &mut impl Sight,
+) {
+    let mut throughput = Spectrum::ONE;
+    // Until the first real scattering lights may be hidden; after a lobe they were connected to.
+    let (mut lights_visible, mut lights_done) = (settings.lights_visible, false);
+    let mut ray = *ray;
+    for _ in 0..MAX_BOUNCES {
+        let hit = world.scene.closest_hit(&ray);
+        let segment = hit.map_or(ray, |hit| ray.with_length(hit.distance));
+        let (u, jitter, choice) = (uniform(rng), uniform(rng), uniform(rng));
+        let turn = uniform2(rng);
+        let to_eye = -ray.direction;
+        sight.segment(&segment, throughput);
+        let seen = scattering_points(&segment, world.medium, settings.density, u, jitter, |t, properties, weight| {
+            if !properties.scattering.is_black() {
+                sight.scatter(segment.at(t), to_eye, properties, throughput * weight * properties.scattering);
+            }
+        });
+        sight.emitted(throughput * seen.radiance);
+        throughput *= seen.transmittance;
+        if throughput.max_element() < 1e-5 {
+            return;
+        }
+        let Some(hit) = hit else {
+            if lights_visible && !lights_done {
+                let light = world.lights.iter().map(|light| light.background(ray.direction)).sum::<Spectrum>();
+                sight.emitted(throughput * light);
+            }
+            return;
+        };
+        let hidden = !lights_visible && hit.light.is_some();
+        let point = segment.at(hit.distance);
+        if hidden || hit.surface == Surface::Null {
+            let origin = leave(point, hit.normal, ray.direction, hit.distance);
+            ray = Ray { origin, direction: ray.direction, length: ray.length - hit.distance };
+            continue;
+        }
+        if !lights_done && let Some(light) = hit.light.and_then(|i| world.lights.get(i as usize)) {
+            sight.emitted(throughput * light.radiance(hit.normal, to_eye));
+        }
+        if !hit.surface.is_discrete() {
+            sight.surface(&segment, &hit, throughput);
+        }
+        if matches!(hit.surface, Surface::Lambert { .. }) || !settings.indirect && !hit.surface.is_discrete() {
+            return;
+        }
+        let Some(sample) = hit.surface.sample(hit.normal, to_eye, choice, turn) else { return };
+        lights_visible = true;
+        lights_done = !hit.surface.is_discrete();
+        throughput *= sample.weight;
+        ray = Ray::new(leave(point, hit.normal, sample.to_light, hit.distance), sample.to_light);
+    }
+}
+
+/// A place where an eye ray asks a cache.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Place {
+    /// Where (m).
+    pub point: Vec3,
+    /// The surface's normal; `None` in the medium.
+    pub normal: Option<Vec3>,
+}
+
+/// Calls `visit` for every place where the light along `ray` would be looked up: where records are
+/// needed. For every place it also asks one random direction for the surface there, which lights it.
+pub fn places<M: Medium + ?Sized, S: Scene + ?Sized>(
+    ray: &Ray,
+    world: &World<'_, M, S>,
+    settings: &EyeSettings,
+    rng: &mut (impl Rng + ?Sized),
+    visit: impl FnMut(Place),
+) {
+    let mut wanted = Wanted { world, rng: Generator::child(rng), visit };
+    look(ray, world, settings, rng, &mut wanted);
+}
+
+struct Wanted<'a, M: ?Sized, S: ?Sized, F> {
+    world: &'a World<'a, M, S>,
+    rng: Generator,
+    visit: F,
+}
+
+impl<M: Medium + ?Sized, S: Scene + ?Sized, F: FnMut(Place)> Wanted<'_, M, S, F> {
+    fn beyond(&mut self, ray: &Ray) {
+        if let Some(hit) = crate::single_scatter::nearest_surface(ray, self.world.scene) {
+            self.on_surface(ray, &hit);
+        }
+    }
+
+    fn on_surface(&mut self, ray: &Ray, hit: &Hit) {
+        if let Surface::Lambert { reflectance } = hit.surface
+            && !reflectance.is_black()
+            && hit.normal.dot(ray.direction) < 0.0
+        {
+            (self.visit)(Place { point: ray.at(hit.distance), normal: Some(hit.normal) });
+        }
+    }
+}
+
+impl<M: Medium + ?Sized, S: Scene + ?Sized, F: FnMut(Place)> Sight for Wanted<'_, M, S, F> {
+    fn scatter(&mut self, point: Vec3, _: Vec3, _: &Properties, _: Spectrum) {
+        (self.visit)(Place { point, normal: None });
+        let direction = warp::uniform_sphere(uniform2(&mut self.rng));
+        self.beyond(&Ray::new(point, direction));
+    }
+
+    fn surface(&mut self, ray: &Ray, hit: &Hit, _: Spectrum) {
+        self.on_surface(ray, hit);
+        let point = ray.at(hit.distance);
+        let direction = Frame::around(hit.normal).to_world(warp::cosine_hemisphere(uniform2(&mut self.rng)));
+        let origin = leave(point, hit.normal, direction, hit.distance);
+        self.beyond(&Ray::new(origin, direction));
+    }
+}
+
+/// Radiance that arrives at the origin of `ray`, read from caches.
+///
+/// Light of the lights is connected to at the points of the ray unless [`Caches::single`] is there: to
+/// lights without extent and to spheres within their near field by an equiangular connection per segment.
+/// Where a cache has no record at a point, one sample of what it would hold takes its place, so that
+/// gaps make noise and no holes. `estimator` brings the world; its surface cache is what such
+/// samples use.
+pub fn radiance<M: Medium + ?Sized, S: Scene + ?Sized>(
+    ray: &Ray,
+    estimator: &Estimator<'_, M, S>,
+    caches: &Caches<'_>,
+    settings: &EyeSettings,
+    rng: &mut (impl Rng + ?Sized),
+) -> Seen {
+    let along = [uniform(rng), uniform(rng)];
+    let light = [uniform(rng), uniform(rng), uniform(rng)];
+    let surface = (uniform(rng), uniform2(rng));
+    let mut gather = Gather {
+        estimator,
+        caches,
+        settings,
+        seen: Seen::default(),
+        along,
+        light,
+        surface,
+        points: 0,
+        basis: None,
+        rng: Generator::child(rng),
+    };
+    look(ray, &estimator.world, settings, rng, &mut gather);
+    gather.seen
+}
+
+struct Gather<'a, M: ?Sized, S: ?Sized> {
+    estimator: &'a Estimator<'a, M, S>,
+    caches: &'a Caches<'a>,
+    settings: &'a EyeSettings,
+    seen: Seen,
+    /// Random numbers of the sample: for connections along segments, from points, from surfaces.
+    along: [f32; 2],
+    light: [f32; 3],
+    surface: (f32, Vec2),
+    /// Points so far.
+    points: u32,
+    /// Basis functions towards the eye, for the direction they belong to.
+    basis: Option<(Vec3, Basis)>,
+    rng: Generator,
+}
+
+/// Whether a light is joined to a point sampled around it rather than to the points of a ray.
+fn near_field(light: &Light<'_>) -> Option<crate::light::NearField> {
+    // The solid angle of a flat light, by which it is sampled, has a bound: it needs no near field.
+    if matches!(light, Light::Quad(_)) { None } else { light.near_field() }
+}
+
+impl<M: Medium + ?Sized, S: Scene + ?Sized> Gather<'_, M, S> {
+    /// Single scattering at a point of the ray of one light, in whose near field it does not lie.
+    fn connected(&mut self, point: Vec3, to_eye: Vec3, properties: &Properties, k: u32) -> Spectrum {
+        let world = &self.estimator.world;
+        let [choice, u, v] = [0, 1, 2].map(|i| {
+            let x = self.light[i] + STEPS[i] * k as f32;
+            (x - libm::floorf(x)).min(1.0 - f32::EPSILON)
+        });
+        let weighted = world.lights.iter().map(|light| {
+            let is_near = near_field(light).is_some_and(|field| field.contains(point));
+            (if is_near { 0.0 } else { light.importance(point).min(1e30) }, light)
+        });
+        let Some((light, chosen)) = choose(weighted, choice) else { return Spectrum::ZERO };
+        let Some(sample) = light.sample(point, Vec2::new(u, v)) else { return Spectrum::ZERO };
+        let value = properties.phase.value(deflection(sample.incident.to_light, to_eye));
+        let way = Ray { origin: point, direction: sample.incident.to_light, length: sample.incident.distance };
+        value * sample.incident.irradiance * reach(world, &way, &mut self.rng) / chosen.probability
+    }
+
+    /// Single scattering along a segment of one light within its near field.
+    fn near(&mut self, segment: &Ray) -> Option<Spectrum> {
+        let world = &self.estimator.world;
+        let reached = world.lights.iter().filter_map(|light| {
+            let centre = near_field(light)?.centre();
+            let interval = light.near_interval(segment, 0.0, segment.length)?;
+            let along = segment.direction.dot(centre - segment.origin).clamp(interval.0, interval.1);
+            let height = segment.at(along).distance(centre).max(1e-6);
+            Some((light.intensity() / height, (light, interval)))
+        });
+        let ((light, interval), chosen) = choose(reached, self.along[0])?;
+        let (pivot, source) = light.anchor(uniform2(&mut self.rng))?;
+        let law = Equiangular::new(segment.origin, segment.direction, pivot, interval.0, interval.1)?;
+        let distance = law.sample(self.along[1]).clamp(interval.0, interval.1);
+        let point = segment.at(distance);
+        let properties = world.medium.properties(point);
+        if properties.scattering.is_black() {
+            return None;
+        }
+        let source: Source = match source {
+            Some(source) => source,
+            None => light.sample(point, uniform2(&mut self.rng))?.source,
+        };
+        let incident = source.incident(point)?;
+        let value = properties.phase.value(deflection(incident.to_light, -segment.direction));
+        let shadow = shadow_ray(point, &source);
+        if world.scene.is_blocked(&shadow) {
+            return None;
+        }
+        let marching = Marching { steps: self.estimator.walk.steps, offset: uniform(&mut self.rng) };
+        let way = Ray { length: if source.falloff == Falloff::Distant { f32::INFINITY } else { incident.distance }, ..shadow };
+        let through = transmittance(&segment.with_length(distance), world.medium, marching)
+            * transmittance(&way, world.medium, marching);
+        let pdf = law.pdf(distance) * chosen.probability;
+        let light = properties.scattering * value * through * incident.irradiance / pdf;
+        light.is_finite().then_some(light)
+    }
+
+    /// Looks up one cache; where it has nothing, one sample.
+    fn cached(
+        &mut self,
+        reader: Option<&Reader<'_, VolumeCache<'_>>>,
+        point: Vec3,
+        to_eye: Vec3,
+        sample: impl FnOnce(&mut Self) -> Spectrum,
+    ) -> Spectrum {
+        let Some(reader) = reader else { return sample(self) };
+        let degree = reader.cache.degree();
+        let basis = match &self.basis {
+            Some((towards, basis)) if *towards == to_eye && basis.covers(degree) => basis,
+            _ => &self.basis.insert((to_eye, Basis::new(to_eye, degree))).1,
+        };
+        self.seen.lookups += 1;
+        if let Some(light) = reader.cache.lookup(point, basis, &reader.reading) {
+            return light;
+        }
+        self.seen.misses += 1;
+        sample(self)
+    }
+}
+
+impl<M: Medium + ?Sized, S: Scene + ?Sized> Sight for Gather<'_, M, S> {
+    fn segment(&mut self, segment: &Ray, throughput: Spectrum) {
+        if self.caches.single.is_none()
+            && let Some(light) = self.near(segment)
+        {
+            self.seen.medium_single += throughput * light;
+        }
+    }
+
+    #[inline]
+    fn scatter(&mut self, point: Vec3, to_eye: Vec3, properties: &Properties, weight: Spectrum) {
+        let k = self.points;
+        self.points += 1;
+        let (caches, estimator) = (self.caches, self.estimator);
+        let phase = &properties.phase;
+        let single = match &caches.single {
+            None => self.connected(point, to_eye, properties, k),
+            Some(_) => self.cached(caches.single.as_ref(), point, to_eye, |gather| {
+                estimator.towards(point, to_eye, phase, &mut gather.rng).0
+            }),
+        };
+        self.seen.medium_single += weight * single;
+        if !self.settings.indirect {
+            return;
+        }
+        let surface = self.cached(caches.surface.as_ref(), point, to_eye, |gather| {
+            estimator.surface_towards(point, to_eye, phase, &mut gather.rng)
+        });
+        self.seen.medium_surface += weight * surface;
+        let multiple = self.cached(caches.multiple.as_ref(), point, to_eye, |gather| {
+            estimator.multiple_towards(point, to_eye, phase, &mut gather.rng)
+        });
+        self.seen.medium_multiple += weight * multiple;
+    }
+
+    fn surface(&mut self, ray: &Ray, hit: &Hit, weight: Spectrum) {
+        let point = ray.at(hit.distance);
+        let to_eye = -ray.direction;
+        let value = match hit.surface {
+            Surface::Lambert { reflectance } => {
+                if reflectance.is_black() || hit.normal.dot(ray.direction) >= 0.0 {
+                    return;
+                }
+                lambert::value(reflectance)
+            }
+            surface => {
+                let light = self.estimator.reflected(point, hit, to_eye, surface, self.surface, &mut self.rng);
+                self.seen.surface_direct += weight * light;
+                return;
+            }
+        };
+        let direct = self.estimator.direct_at(point, hit, self.surface, &mut self.rng);
+        self.seen.surface_direct += weight * value * direct;
+        if !self.settings.indirect {
+            return;
+        }
+        let indirect = match &self.caches.irradiance {
+            None => None,
+            Some(reader) => {
+                self.seen.lookups += 1;
+                let known = reader.cache.lookup(point, hit.normal, &reader.reading);
+                self.seen.misses += u32::from(known.is_none());
+                known
+            }
+        };
+        let indirect = indirect.unwrap_or_else(|| self.estimator.indirect(point, hit, &mut self.rng));
+        self.seen.surface_indirect += weight * value * indirect;
+    }
+
+    fn emitted(&mut self, light: Spectrum) {
+        self.seen.emitted += light;
+    }
+}

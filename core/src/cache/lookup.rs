@@ -1,0 +1,179 @@
+//! What a cache says of a point.
+
+use glam::Vec3;
+
+use super::extrapolate::{Blend, Extrapolation, exponent_limit, weight};
+use super::store::{SurfaceCache, VolumeCache};
+use crate::math::float;
+use crate::sh::{self, MAX_COEFFICIENTS};
+use crate::spectrum::{Gradient, Spectrum};
+
+/// How sharply records on surfaces stop where the normal turns: at an angle of about `1/TURN` rad.
+const TURN: f32 = 2.0;
+
+/// How sharply they stop off their plane: at `1/OFFSET` of their radius.
+const OFFSET: f32 = 4.0;
+
+/// How a cache is read.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Reading {
+    /// How records are carried.
+    pub extrapolation: Extrapolation,
+    /// The tolerance they were made with.
+    pub tolerance: f32,
+    /// Share of every radius at its border that does not count, in [0, 1): above 0 while filling, so
+    /// that spheres overlap and the eye rays of the picture find no gaps.
+    pub margin: f32,
+}
+
+impl Reading {
+    /// Records made with `tolerance`, carried exponentially.
+    #[must_use]
+    pub fn new(tolerance: f32) -> Self {
+        Self { extrapolation: Extrapolation::Exponential, tolerance, margin: 0.0 }
+    }
+
+    fn blend(&self) -> Blend {
+        Blend::new(self.extrapolation, exponent_limit(self.tolerance))
+    }
+}
+
+/// Basis functions in the direction to the eye: evaluated once per eye ray.
+#[derive(Debug, Clone, Copy)]
+pub struct Basis {
+    values: [f32; MAX_COEFFICIENTS],
+    count: usize,
+}
+
+impl Basis {
+    /// Up to `degree`, towards `to_eye` (unit).
+    #[must_use]
+    pub fn new(to_eye: Vec3, degree: usize) -> Self {
+        let mut values = [0.0; MAX_COEFFICIENTS];
+        let count = sh::coefficient_count(degree.min(sh::MAX_DEGREE));
+        sh::evaluate(to_eye, degree.min(sh::MAX_DEGREE), &mut values[..count]);
+        Self { values, count }
+    }
+
+    /// Whether it reaches up to `degree`.
+    #[inline]
+    #[must_use]
+    pub fn covers(&self, degree: usize) -> bool {
+        self.count >= sh::coefficient_count(degree)
+    }
+}
+
+impl VolumeCache<'_> {
+    /// Highest degree of the expansions held; 0 in isotropic media.
+    #[must_use]
+    pub fn degree(&self) -> usize {
+        sh::degree_of(self.stride() + 1).unwrap_or(0)
+    }
+
+    /// In-scattered radiance (W·m⁻²·sr⁻¹) at `point` in the direction of `basis`; `None` where no
+    /// record reaches.
+    ///
+    /// An expansion is evaluated with its gradient first and then extrapolated, because coefficients
+    /// are signed. Source: Jarosz et al. 2008, Eq. 35; sheet § 1.10.
+    #[inline]
+    #[must_use]
+    pub fn lookup(&self, point: Vec3, basis: &Basis, reading: &Reading) -> Option<Spectrum> {
+        let mut blend = reading.blend();
+        let higher = basis.values.get(1..basis.count).unwrap_or(&[]);
+        self.visit(point, |i, record, share| {
+            let d = 1.0 - share - reading.margin;
+            if d <= 0.0 {
+                return;
+            }
+            let (mut value, mut gradient) = (record.value, record.gradient);
+            for (c, &y) in self.attached(i).iter().zip(higher) {
+                value += c.value * y;
+                gradient += c.gradient * y;
+            }
+            blend.add(weight(d), value, gradient.along(point - record.position));
+        });
+        blend.value()
+    }
+
+    /// Whether a record reaches `point`.
+    #[must_use]
+    pub fn covers(&self, point: Vec3, reading: &Reading) -> bool {
+        let mut covered = false;
+        self.visit(point, |_, _, share| covered |= share < 1.0 - reading.margin);
+        covered
+    }
+
+    /// About how large the radius of a record at `point` would be, going by those around: `None` if
+    /// there are none.
+    #[must_use]
+    pub fn radius_near(&self, point: Vec3) -> Option<f32> {
+        nearest(self.records(), point)
+    }
+}
+
+fn nearest(records: &[super::Record], point: Vec3) -> Option<f32> {
+    let apart = |r: &super::Record| r.position.distance_squared(point);
+    records.iter().min_by(|a, b| apart(a).total_cmp(&apart(b))).map(|r| r.radius)
+}
+
+impl SurfaceCache<'_> {
+    /// Indirect irradiance (W·m⁻²) at `point` on a surface with `normal`; `None` where no record
+    /// reaches.
+    ///
+    /// A record counts less the farther it is, the more its normal differs and the more the point
+    /// lies off its plane; its value changes with position and with the normal (vector irradiance).
+    #[inline]
+    #[must_use]
+    pub fn lookup(&self, point: Vec3, normal: Vec3, reading: &Reading) -> Option<Spectrum> {
+        let mut blend = reading.blend();
+        self.visit_facing(point, normal, reading.margin, |record, facing, d| {
+            let turned = facing.turn.along(normal - facing.normal);
+            blend.add(weight(d), record.value, record.change(point) + turned);
+        });
+        blend.value()
+    }
+
+    /// Whether a record reaches `point` on a surface with `normal`.
+    #[must_use]
+    pub fn covers(&self, point: Vec3, normal: Vec3, reading: &Reading) -> bool {
+        let mut covered = false;
+        self.visit_facing(point, normal, reading.margin, |_, _, _| covered = true);
+        covered
+    }
+
+    /// As [`VolumeCache::radius_near`].
+    #[must_use]
+    pub fn radius_near(&self, point: Vec3) -> Option<f32> {
+        nearest(self.records(), point)
+    }
+
+    #[inline]
+    fn visit_facing(
+        &self,
+        point: Vec3,
+        normal: Vec3,
+        margin: f32,
+        mut visit: impl FnMut(&super::Record, &super::Facing, f32),
+    ) {
+        self.visit(point, |i, record, share| {
+            let Some(facing) = self.attached(i).first() else { return };
+            let turn = float::safe_sqrt(2.0 - 2.0 * normal.dot(facing.normal));
+            let offset = facing.normal.dot(point - record.position).abs() / record.radius;
+            let d = 1.0 - share - TURN * turn - OFFSET * offset - margin;
+            if d > 0.0 {
+                visit(record, facing, d);
+            }
+        });
+    }
+}
+
+/// The gradient of an expansion's value is the expansion of the gradients; here for tests and
+/// figures.
+#[must_use]
+pub fn gradient_towards(cache: &VolumeCache<'_>, record: u32, basis: &Basis) -> (Spectrum, Gradient) {
+    let Some(r) = cache.records().get(record as usize) else { return (Spectrum::ZERO, Gradient::ZERO) };
+    let higher = basis.values.get(1..basis.count).unwrap_or(&[]);
+    cache.attached(record).iter().zip(higher).fold((r.value, r.gradient), |(value, gradient), (c, &y)| {
+        (value + c.value * y, gradient + c.gradient * y)
+    })
+}

@@ -1,0 +1,44 @@
+//! Layer 7: volumetric radiance caching (Jarosz et al. 2008), with a cache on surfaces besides.
+//!
+//! ```text
+//! L(x, ω) = ∫ T σₛ (L_single + L_surface + L_multiple) dt + T(s) L_behind
+//! ```
+//!
+//! Light scattered in a medium is smooth: it is computed with its gradient at few points
+//! ([`Record`]s) and carried to all others within a radius that the gradients themselves give.
+//! Every part has a cache of its own with its own tolerance and effort. The host orders the steps,
+//! and nothing here waits or locks:
+//!
+//! 1. [`places`] along eye rays: where is something asked for?
+//! 2. where no record reaches ([`VolumeCache::covers`]), an [`Estimator`] computes one against the frozen caches;
+//! 3. [`Cache::insert`]; back to 1 with other rays;
+//! 4. [`Cache::rebuild`], then [`radiance`] for every sample of the image.
+//!
+//! | file | holds |
+//! |---|---|
+//! | `record` | [`Record`], [`Facing`]: what is stored |
+//! | `radius` | Eq. 34, limits, clamping of gradients and neighbours |
+//! | `extrapolate` | Eq. 35: [`Blend`] |
+//! | `index` | [`Index`]: which spheres contain this point |
+//! | `store` | [`Cache`]: records, attachments, index |
+//! | `lookup` | look-ups in the medium and on surfaces |
+//! | `estimate` | [`Estimator`]: what records are made of |
+//! | `eye` | [`places`] and [`radiance`] of eye rays |
+
+mod estimate;
+mod extrapolate;
+mod eye;
+mod index;
+mod lookup;
+mod radius;
+mod record;
+mod store;
+
+pub use estimate::Estimator;
+pub use extrapolate::{Blend, Extrapolation, exponent_limit, weight};
+pub use eye::{Caches, EyeSettings, Place, Reader, Seen, places, radiance};
+pub use index::{Index, Node};
+pub use lookup::{Basis, Reading, gradient_towards};
+pub use radius::{Limits, clamp_gradient, log_gradient_radius, neighbour_clamped, valid_radius};
+pub use record::{Facing, Record};
+pub use store::{Cache, SurfaceCache, VolumeCache};

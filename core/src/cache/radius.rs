@@ -1,0 +1,97 @@
+//! How far a record may be used: Jarosz et al. 2008, Eq. 31–34; sheet § 1.9.
+
+use glam::Vec3;
+
+use crate::single_scatter::Sums;
+use crate::spectrum::{Gradient, Spectrum};
+
+/// Bounds of radii (m), in the world.
+///
+/// Bounds on the screen become bounds in the world at the record's distance from the eye:
+///
+/// ```
+/// # use fogbow::cache::Limits;
+/// // 0.01 m to 2 m; 1 to 100 pixels, pixels being 0.001 rad wide, at 50 m.
+/// let limits = Limits { min: 0.01, max: 2.0 }.on_screen(1.0, 100.0, 0.001, 50.0);
+/// assert_eq!((limits.min, limits.max), (0.05, 2.0));
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Limits {
+    /// Least radius: smaller, and borders of shadows swallow all records.
+    pub min: f32,
+    /// Greatest radius: larger, and a record may reach behind what it knows nothing of.
+    pub max: f32,
+}
+
+impl Limits {
+    /// Narrowed to between `least` and `most` pixels of angular width `pixel` (rad), seen from
+    /// `distance` (m). The world's bounds win.
+    #[must_use]
+    pub fn on_screen(self, least: f32, most: f32, pixel: f32, distance: f32) -> Self {
+        let footprint = pixel * distance;
+        let max = (most * footprint).clamp(self.min, self.max);
+        Self { min: (least * footprint).clamp(self.min, max), max }
+    }
+
+    /// A radius within the bounds; the greatest where none is defined.
+    #[must_use]
+    pub fn clamp(&self, raw: Option<f32>) -> f32 {
+        raw.map_or(self.max, |r| r.max(self.min).min(self.max))
+    }
+}
+
+/// `R = ε Σ L_j / Σ ‖∇L_j‖` (m), least over channels and over the sums with and without shadows.
+///
+/// `None` where no channel has a gradient: nothing bounds the radius then. 0 where a channel is
+/// black but could change. Source: Jarosz et al. 2008, Eq. 34 (its Eq. 31 is a relative L1 error,
+/// not L2); undefined cases: sheet § 1.9.
+///
+/// ```
+/// # use fogbow::{cache::valid_radius, math::Vec3, single_scatter::{Contribution, Sums}};
+/// # use fogbow::spectrum::{Gradient, Spectrum};
+/// let slope = |axis| Contribution { radiance: Spectrum::ONE, gradient: Gradient::outer(Spectrum::ONE, axis) };
+/// let mut sums = Sums::default();
+/// assert_eq!(valid_radius(&sums, 0.5), None);
+/// sums.add(&slope(Vec3::X), true);
+/// sums.add(&slope(Vec3::NEG_X), true);   // a saddle: the log-gradient vanishes, the radius does not diverge
+/// assert_eq!(valid_radius(&sums, 0.5), Some(0.5));
+/// ```
+#[must_use]
+pub fn valid_radius(sums: &Sums, tolerance: f32) -> Option<f32> {
+    let mut least: Option<f32> = None;
+    let variants =
+        [(sums.value, sums.gradient_norms), (sums.unshadowed, sums.unshadowed_gradient_norms)];
+    for (value, norms) in variants {
+        for channel in 0..3 {
+            if norms[channel] > 0.0 {
+                let radius = tolerance * (value[channel].max(0.0) / norms[channel]);
+                least = Some(least.map_or(radius, |l| l.min(radius)));
+            }
+        }
+    }
+    least
+}
+
+/// The radius that the plain logarithmic gradient would give, `ε L/‖∇L‖` (m): infinite at saddle
+/// points, which is why Eq. 34 adds norms. For comparison only (Jarosz et al. 2008, Fig. 4).
+#[must_use]
+pub fn log_gradient_radius(value: Spectrum, gradient: &Gradient, tolerance: f32) -> f32 {
+    value.zip(gradient.norm(), |l, g| if g > 0.0 { tolerance * (l / g) } else { f32::INFINITY }).min_element()
+}
+
+/// A gradient no steeper than `L/radius` in every channel: what was widened to the least radius
+/// must not explode within it (Křivánek et al. 2006).
+#[must_use]
+pub fn clamp_gradient(gradient: &Gradient, value: Spectrum, radius: f32) -> Gradient {
+    let norm = gradient.norm();
+    let scale = value.zip(norm, |l, g| if g * radius > l { l / (g * radius) } else { 1.0 });
+    *gradient * scale
+}
+
+/// The radius that neighbours allow: `R ≤ R_j + ‖x − x_j‖` for each of them (Křivánek et al. 2006,
+/// neighbour clamping). A small radius beside a large one tells of something the large one missed.
+#[inline]
+#[must_use]
+pub fn neighbour_clamped(radius: f32, position: Vec3, other: (Vec3, f32)) -> f32 {
+    radius.min(other.1 + position.distance(other.0))
+}

@@ -1,0 +1,78 @@
+//! What is stored at a point.
+
+use bytemuck::{Pod, Zeroable};
+use glam::Vec3;
+
+use super::radius::{self, Limits};
+use crate::single_scatter::Sums;
+use crate::spectrum::{Gradient, Spectrum};
+
+/// A cached value with its gradient, and how far it may be carried: 16 floats, 64 bytes.
+///
+/// In isotropic media `value` is in-scattered radiance (W·m⁻²·sr⁻¹); in others its mean over
+/// directions, the expansion's `L₀₀ Y₀₀`, with the higher degrees in the cache's pool; on surfaces
+/// irradiance (W·m⁻²). Source: sheet § 1.8 (Jarosz et al. 2008 print 48 bytes; 16 floats are 64).
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct Record {
+    /// Where (m).
+    pub position: Vec3,
+    /// How far it may be used (m).
+    pub radius: f32,
+    /// The value.
+    pub value: Spectrum,
+    /// Its gradient (per metre).
+    pub gradient: Gradient,
+}
+
+impl Record {
+    /// Of an estimate at `position`: the radius of J's Eq. 34 for `tolerance` within `limits`, the
+    /// gradient no steeper than the radius lets it be used. `None` where the estimate is no number.
+    ///
+    /// ```
+    /// # use fogbow::{cache::{Limits, Record}, math::Vec3, single_scatter::{Contribution, Sums}};
+    /// # use fogbow::spectrum::{Gradient, Spectrum};
+    /// let mut sums = Sums::default();
+    /// let slope = Gradient::outer(Spectrum::splat(2.0), Vec3::X);
+    /// sums.add(&Contribution { radiance: Spectrum::ONE, gradient: slope }, true);
+    /// let record = Record::new(Vec3::ZERO, &sums, 0.1, Limits { min: 0.0, max: 1.0 }).unwrap();
+    /// assert_eq!(record.radius, 0.05);
+    /// ```
+    #[must_use]
+    pub fn new(position: Vec3, sums: &Sums, tolerance: f32, limits: Limits) -> Option<Self> {
+        let raw = radius::valid_radius(sums, tolerance);
+        let gradient = match raw {
+            Some(raw) if raw < limits.min => radius::clamp_gradient(&sums.gradient, sums.value, limits.min),
+            _ => sums.gradient,
+        };
+        let record = Self { position, radius: limits.clamp(raw), value: sums.value, gradient };
+        record.is_valid().then_some(record)
+    }
+
+    /// Whether all numbers are finite, the radius positive, the value not negative.
+    #[must_use]
+    pub fn is_valid(&self) -> bool {
+        self.position.is_finite()
+            && self.radius > 0.0
+            && self.radius.is_finite()
+            && self.value.is_valid()
+            && self.gradient.is_finite()
+    }
+
+    /// `∇L · (point − position)`.
+    #[inline]
+    #[must_use]
+    pub fn change(&self, point: Vec3) -> Spectrum {
+        self.gradient.along(point - self.position)
+    }
+}
+
+/// What a record on a surface has besides: 12 floats, 48 bytes.
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct Facing {
+    /// The surface's normal (unit).
+    pub normal: Vec3,
+    /// Vector irradiance `∫ L ω dω` (W·m⁻²): how irradiance changes as the normal turns.
+    pub turn: Gradient,
+}

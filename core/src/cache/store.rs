@@ -1,0 +1,154 @@
+//! Records, what is attached to each, and the index over them.
+
+use bytemuck::Pod;
+use glam::Vec3;
+
+use super::index::{Index, Node};
+use super::radius::neighbour_clamped;
+use super::{Facing, Record};
+use crate::sh::Coefficient;
+use crate::storage::{Full, List};
+
+/// Records not yet in the index: looked at one by one, so only few; but every rebuild costs as much as
+/// a few hundred records.
+const LOOSE: u32 = 32;
+
+/// Records with `stride` attachments each, found by position.
+///
+/// In the medium the attachments are an expansion's coefficients of degree 1 and more
+/// ([`VolumeCache`]); on surfaces what an irradiance record has besides ([`SurfaceCache`]).
+/// Insertion looks at neighbours and rebuilds the index now and then; nothing else changes, so that
+/// any number of threads may read.
+#[derive(Debug)]
+pub struct Cache<'s, E> {
+    records: List<'s, Record>,
+    attached: List<'s, E>,
+    index: Index<'s>,
+    stride: usize,
+}
+
+/// In-scattered radiance in a medium.
+pub type VolumeCache<'s> = Cache<'s, Coefficient>;
+
+/// Indirect irradiance on surfaces.
+pub type SurfaceCache<'s> = Cache<'s, Facing>;
+
+impl<'s, E: Pod> Cache<'s, E> {
+    /// An empty cache in lent or growing storage, with `stride` attachments per record.
+    #[must_use]
+    pub fn new(
+        records: impl Into<List<'s, Record>>,
+        attached: impl Into<List<'s, E>>,
+        index: Index<'s>,
+        stride: usize,
+    ) -> Self {
+        let mut cache = Self { records: records.into(), attached: attached.into(), index, stride };
+        cache.records.clear();
+        cache.attached.clear();
+        cache
+    }
+
+    /// All records, in the order of their insertion.
+    #[must_use]
+    pub fn records(&self) -> &[Record] {
+        self.records.as_slice()
+    }
+
+    /// Number of records.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.records().len()
+    }
+
+    /// Whether there is no record.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.records().is_empty()
+    }
+
+    /// All attachments, [`Cache::stride`] per record.
+    #[must_use]
+    pub fn attachments(&self) -> &[E] {
+        self.attached.as_slice()
+    }
+
+    /// Attachments per record.
+    #[must_use]
+    pub fn stride(&self) -> usize {
+        self.stride
+    }
+
+    /// Attachments of one record; empty where there is no such record.
+    #[inline]
+    #[must_use]
+    pub fn attached(&self, record: u32) -> &[E] {
+        self.attached.as_slice().get(record as usize * self.stride..).and_then(|rest| rest.get(..self.stride)).unwrap_or(&[])
+    }
+
+    /// Bytes held by records, attachments and index.
+    #[must_use]
+    pub fn bytes(&self) -> usize {
+        size_of_val(self.records()) + size_of_val(self.attachments()) + self.index.bytes()
+    }
+
+    /// Adds a record with its attachments, after clamping its radius and its neighbours' against each
+    /// other. What is not valid or has not `stride` attachments is left out: `Ok(false)`.
+    ///
+    /// # Errors
+    /// [`Full`] when lent storage has no room left; the cache is then as before but for the index.
+    pub fn insert(&mut self, mut record: Record, attached: &[E]) -> Result<bool, Full> {
+        if !record.is_valid() || attached.len() != self.stride {
+            return Ok(false);
+        }
+        for other in self.records.as_mut_slice() {
+            let apart = record.position.distance(other.position);
+            if apart < record.radius.max(other.radius) {
+                record.radius = neighbour_clamped(record.radius, record.position, (other.position, other.radius));
+                other.radius = other.radius.min(record.radius + apart);
+            }
+        }
+        for element in attached {
+            self.attached.push(*element)?;
+        }
+        self.records.push(record)?;
+        let loose = self.len() as u32 - self.index.len();
+        if loose > LOOSE.max(self.index.len() / 16) { self.rebuild().map(|()| true) } else { Ok(true) }
+    }
+
+    /// Brings all records into the index: once after filling, before many look-ups.
+    ///
+    /// # Errors
+    /// [`Full`] when the index's lent storage has no room left.
+    pub fn rebuild(&mut self) -> Result<(), Full> {
+        let records = self.records.as_slice();
+        self.index.rebuild(records.len() as u32, |i| {
+            let record = &records[i as usize];
+            (record.position, record.radius)
+        })
+    }
+
+    /// Calls `visit(number, record, distance/radius)` for every record whose sphere contains `point`.
+    #[inline]
+    pub fn visit(&self, point: Vec3, mut visit: impl FnMut(u32, &Record, f32)) {
+        let records = self.records();
+        self.index.visit(point, |i, share| visit(i, &records[i as usize], share));
+        let indexed = self.index.len() as usize;
+        for (i, record) in records.iter().enumerate().skip(indexed) {
+            let share = record.position.distance(point) / record.radius;
+            if share < 1.0 {
+                visit(i as u32, record, share);
+            }
+        }
+    }
+}
+
+#[cfg(feature = "alloc")]
+impl<E: Pod> Cache<'_, E> {
+    /// An empty cache that grows as needed.
+    #[must_use]
+    pub fn growing(stride: usize) -> Self {
+        use alloc::vec::Vec;
+        let index = Index::new(Vec::<Node>::new(), Vec::new());
+        Self::new(Vec::new(), Vec::new(), index, stride)
+    }
+}
