@@ -37,6 +37,7 @@
 pub mod film;
 pub mod image;
 pub mod progress;
+pub mod radiance_cache;
 pub mod seed;
 pub mod stats;
 pub mod tiles;

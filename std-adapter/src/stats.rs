@@ -24,6 +24,10 @@ pub struct Counters {
     pub lookups: u64,
     /// Queries of a medium's bounds along a ray.
     pub stretches: u64,
+    /// Questions asked of caches: see [`Tally::look_up`].
+    pub cache_lookups: u64,
+    /// Of these, questions no record answered.
+    pub cache_misses: u64,
     /// Samples that were no finite numbers and were taken for black: 0 unless something is wrong.
     pub non_finite: u64,
 }
@@ -38,6 +42,8 @@ impl Add for Counters {
             collisions: self.collisions + o.collisions,
             lookups: self.lookups + o.lookups,
             stretches: self.stretches + o.stretches,
+            cache_lookups: self.cache_lookups + o.cache_lookups,
+            cache_misses: self.cache_misses + o.cache_misses,
             non_finite: self.non_finite + o.non_finite,
         }
     }
@@ -57,6 +63,8 @@ pub struct Tally {
     collisions: Cell<u64>,
     lookups: Cell<u64>,
     stretches: Cell<u64>,
+    cache_lookups: Cell<u64>,
+    cache_misses: Cell<u64>,
 }
 
 impl Tally {
@@ -64,6 +72,13 @@ impl Tally {
     #[inline]
     pub fn collide(&self, collisions: u32) {
         self.collisions.set(self.collisions.get() + u64::from(collisions));
+    }
+
+    /// Adds questions asked of caches, and those of them that no record answered.
+    #[inline]
+    pub fn look_up(&self, lookups: u32, misses: u32) {
+        self.cache_lookups.set(self.cache_lookups.get() + u64::from(lookups));
+        self.cache_misses.set(self.cache_misses.get() + u64::from(misses));
     }
 
     /// What was counted so far.
@@ -75,6 +90,8 @@ impl Tally {
             collisions: self.collisions.get(),
             lookups: self.lookups.get(),
             stretches: self.stretches.get(),
+            cache_lookups: self.cache_lookups.get(),
+            cache_misses: self.cache_misses.get(),
             ..Counters::default()
         }
     }
@@ -242,6 +259,8 @@ pub struct Statistics {
     pub counters: Counters,
     /// Bytes held by named things: film, grids, trees.
     pub bytes: Vec<(String, u64)>,
+    /// Records of caches.
+    pub records: Vec<(String, u64)>,
 }
 
 impl Statistics {

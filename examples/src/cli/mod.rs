@@ -4,6 +4,7 @@
 
 mod compare;
 mod output;
+mod radiance_cache;
 mod render;
 mod report;
 
@@ -12,6 +13,7 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 
 pub use compare::CompareArguments;
+pub use radiance_cache::{CacheArguments, Kind, Single};
 pub use render::{Method, RenderArguments};
 
 /// Light in fog, smoke and clouds.

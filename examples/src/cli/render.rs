@@ -13,9 +13,11 @@ use fogbow::sampling::uniform2;
 use fogbow_std::film::Film;
 use fogbow_std::image::write_film;
 use fogbow_std::progress::{Control, Progress};
+use fogbow_std::radiance_cache::NAMES;
 use fogbow_std::stats::{CountingMedium, CountingScene, Statistics};
 use fogbow_std::tiles::{self, Outcome, Reason, RenderError};
 
+use super::radiance_cache::{CacheArguments, CacheJob};
 use super::report::{Bar, Report};
 use super::{Ending, Failure, output};
 use crate::camera::Camera;
@@ -63,6 +65,9 @@ pub struct RenderArguments {
     /// No progress bar and no summary.
     #[arg(short, long)]
     pub quiet: bool,
+    /// Of radiance caching.
+    #[command(flatten)]
+    pub cache: CacheArguments,
 }
 
 /// How light is computed.
@@ -70,11 +75,20 @@ pub struct RenderArguments {
 pub enum Method {
     /// Volumetric path tracing: unbiased.
     Path,
+    /// Volumetric radiance caching: smooth light computed at few points and carried to all others.
+    RadianceCache,
 }
 
 /// Names of the layers; the first is the image.
 const LAYERS: [&str; 6] =
     ["total", "emitted", "surface_direct", "surface_indirect", "medium_single", "medium_multiple"];
+
+/// The same for radiance caching, which knows light from surfaces apart.
+const CACHE_LAYERS: [&str; 7] =
+    ["total", "emitted", "surface_direct", "surface_indirect", "medium_single", "medium_surface", "medium_multiple"];
+
+/// Samples per pixel of radiance caching: what is left for them to even out are edges and direct light.
+const CACHE_SAMPLES: u32 = 32;
 
 /// Set by Ctrl-C.
 static STOP: AtomicBool = AtomicBool::new(false);
@@ -86,7 +100,11 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<Ending, Failure> {
     let mut storage = Storage::new(&scene);
     let world = statistics.time("build", || World::new(&scene, &mut storage))?;
     let (width, height) = arguments.size.unwrap_or((scene.sensor.width, scene.sensor.height));
-    let layers: &[&str] = if arguments.aov { &LAYERS } else { &["total"] };
+    let layers: &[&str] = match (arguments.aov, arguments.method) {
+        (false, _) => &["total"],
+        (true, Method::Path) => &LAYERS,
+        (true, Method::RadianceCache) => &CACHE_LAYERS,
+    };
     let mut film = Film::new(width, height, layers)?;
     statistics.bytes.push(("film".to_owned(), film.bytes() as u64));
     statistics.bytes.push(("volumes".to_owned(), scene.media.iter().map(|m| m.bytes() as u64).sum()));
@@ -104,6 +122,7 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<Ending, Failure> {
     let samples = match (arguments.spp, arguments.time) {
         (Some(spp), _) => spp,
         (None, Some(_)) => u32::MAX,
+        (None, None) if arguments.method == Method::RadianceCache => CACHE_SAMPLES,
         (None, None) => scene.sensor.samples,
     };
     let settings = tiles::Settings {
@@ -114,18 +133,45 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<Ending, Failure> {
         ..tiles::Settings::default()
     };
     let lights = world.lights();
-    let job = Job {
-        world: &world,
-        lights: &lights,
-        camera: world.camera_for(width, height),
-        paths: path_settings(&scene, arguments.max_depth),
-        film: &mut film,
-        settings: &settings,
-        control: &control,
+    let camera = world.camera_for(width, height);
+    let paths = path_settings(&scene, arguments.max_depth);
+    let (film_of, settings_of, control_of) = (&mut film, &settings, &control);
+    let mut cached = None;
+    let outcome = match arguments.method {
+        Method::Path => world.media().with(Job {
+            world: &world,
+            lights: &lights,
+            camera,
+            paths,
+            film: film_of,
+            settings: settings_of,
+            control: control_of,
+        })?,
+        Method::RadianceCache => {
+            let done = world.media().with(CacheJob {
+                world: &world,
+                lights: &lights,
+                camera,
+                paths,
+                film: film_of,
+                settings: settings_of,
+                control: control_of,
+                arguments: &arguments.cache,
+            })?;
+            let outcome = done.render;
+            cached = Some(done);
+            outcome
+        }
     };
-    let outcome = world.media().with(job);
     bar.finish();
-    let outcome = outcome?;
+    if let Some(cached) = &cached {
+        for (i, name) in NAMES.iter().enumerate() {
+            statistics.add(&format!("fill {name}"), cached.filled.seconds[i]);
+            statistics.bytes.push((format!("cache {name}"), cached.caches.counts()[i].1 as u64));
+            statistics.records.push(((*name).to_owned(), cached.caches.counts()[i].0 as u64));
+        }
+        statistics.records.push(("computed".to_owned(), cached.filled.computed.iter().sum()));
+    }
     statistics.add("render", outcome.seconds);
     statistics.counters = outcome.counters;
     statistics.time("write", || outputs.iter().try_for_each(|file| write_film(file, &film, arguments.exposure)))?;

@@ -8,7 +8,7 @@ use fogbow_std::stats::{Seconds, Statistics};
 use fogbow_std::tiles::{Outcome, Reason};
 use indicatif::{ProgressBar, ProgressStyle};
 
-use super::RenderArguments;
+use super::{Method, RenderArguments};
 
 /// Steps of the progress bar.
 const STEPS: u64 = 1000;
@@ -107,17 +107,22 @@ impl Report<'_> {
             // Writing to a string cannot fail.
             let _ = write!(phases, "{comma}\n    {}: {{\"wall\": {:.6}, \"cpu\": {cpu}}}", quoted(name), seconds.wall);
         }
-        let mut bytes = String::new();
-        for (index, (name, count)) in self.statistics.bytes.iter().enumerate() {
-            let comma = if index == 0 { "" } else { ", " };
-            let _ = write!(bytes, "{comma}{}: {count}", quoted(name));
-        }
+        let listed = |counts: &[(String, u64)]| {
+            let entries: Vec<String> = counts.iter().map(|(name, count)| format!("{}: {count}", quoted(name))).collect();
+            entries.join(", ")
+        };
+        let (bytes, records) = (listed(&self.statistics.bytes), listed(&self.statistics.records));
         format!(
-            "{{\n  \"scene\": {},\n  \"method\": \"path\",\n  \"width\": {},\n  \"height\": {},\n  \
+            "{{\n  \"scene\": {},\n  \"method\": \"{}\",\n  \"width\": {},\n  \"height\": {},\n  \
              \"samples_per_pixel\": {},\n  \"seed\": {},\n  \"ended\": \"{reason}\",\n  \
              \"seconds\": {{{phases}\n  }},\n  \"counts\": {{\"samples\": {}, \"rays\": {}, \"shadow_rays\": {}, \
-             \"collisions\": {}, \"medium_lookups\": {}, \"medium_stretches\": {}, \"non_finite\": {}}},\n  \"bytes\": {{{bytes}}}\n}}\n",
+             \"collisions\": {}, \"medium_lookups\": {}, \"medium_stretches\": {}, \"cache_lookups\": {}, \"cache_misses\": {}, \"non_finite\": {}}},\n  \
+             \"records\": {{{records}}},\n  \"bytes\": {{{bytes}}}\n}}\n",
             quoted(&self.arguments.scene.display().to_string()),
+            match self.arguments.method {
+                Method::Path => "path",
+                Method::RadianceCache => "radiance-cache",
+            },
             self.size.0,
             self.size.1,
             self.outcome.samples,
@@ -128,6 +133,8 @@ impl Report<'_> {
             counters.collisions,
             counters.lookups,
             counters.stretches,
+            counters.cache_lookups,
+            counters.cache_misses,
             counters.non_finite,
         )
     }

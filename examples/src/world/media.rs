@@ -4,6 +4,8 @@ use fogbow::host::{Empty, Medium};
 use fogbow::math::Affine3;
 use fogbow::medium::{AnyMedium, Density, Grid, Homogeneous, MediumError, MinMax, Overlap, Placed, Region};
 
+use fogbow::phase::Phase;
+
 use crate::error::SceneError;
 use crate::scene_file::{Container, Matter, MediumDescription, Place, SceneFile};
 use crate::transform::{Transform, to_vec3};
@@ -90,6 +92,17 @@ impl<'a> Media<'a> {
             },
             _ => Self::Several(placed),
         })
+    }
+
+    /// The phase functions there are.
+    #[must_use]
+    pub fn phases(&self) -> Vec<Phase> {
+        match self {
+            Self::None => Vec::new(),
+            Self::Homogeneous(fog) => vec![fog.medium().phase()],
+            Self::Grid(grid) => vec![grid.medium().phase()],
+            Self::Several(media) => media.iter().map(|p| p.medium().phase()).collect(),
+        }
     }
 
     /// Does `work` with the medium.

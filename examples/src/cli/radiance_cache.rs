@@ -1,0 +1,218 @@
+//! `fogbow render --method radiance-cache`.
+
+use clap::{Args, ValueEnum};
+use fogbow::cache::{Estimator, EyeSettings, Limits, radiance};
+use fogbow::host::Medium;
+use fogbow::light::Light;
+use fogbow::math::{Ray, Vec2};
+use fogbow::multiple_scatter;
+use fogbow::path::{self, World as PathWorld};
+use fogbow::phase::Phase;
+use fogbow::sampling::uniform2;
+use fogbow::transmittance::thickness::Steps;
+use fogbow_std::film::Film;
+use fogbow_std::progress::Control;
+use fogbow_std::radiance_cache::{self as cache, Effort, RadianceCaches};
+use fogbow_std::stats::{CountingMedium, CountingScene};
+use fogbow_std::tiles::{self, Outcome};
+
+use super::{Failure, output};
+use crate::camera::Camera;
+use crate::world::{WithMedium, World};
+
+/// Of `--method radiance-cache`.
+#[derive(Debug, Clone, Args)]
+#[command(next_help_heading = "Radiance caching")]
+pub struct CacheArguments {
+    /// Error tolerance of all caches: smaller is finer and slower.
+    #[arg(long, value_name = "E", value_parser = output::positive)]
+    pub tolerance: Option<f64>,
+    /// Error tolerance of one cache, as CACHE=E; may be repeated.
+    #[arg(long, value_name = "CACHE=E", value_parser = named)]
+    pub tolerance_of: Vec<(Kind, f64)>,
+    /// Random walks per record of multiple scattering; the other caches in proportion.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    pub paths: Option<u32>,
+    /// Degree of expansions in anisotropic media [default: from the phase function and the tolerance].
+    #[arg(long, value_name = "L", value_parser = clap::value_parser!(u32).range(0..=16))]
+    pub degree: Option<u32>,
+    /// Caches not to use: their light is estimated anew at every point; may be repeated.
+    #[arg(long, value_name = "CACHE", value_enum)]
+    pub uncached: Vec<Kind>,
+    /// How light straight from the lights is scattered once.
+    #[arg(long, value_enum, default_value_t = Single::Auto)]
+    pub single: Single,
+}
+
+/// A cache.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Kind {
+    /// Light of the lights, scattered once.
+    Single,
+    /// Light of surfaces, scattered once.
+    Surface,
+    /// Light scattered more than once.
+    Multiple,
+    /// Indirect light on surfaces.
+    Irradiance,
+}
+
+/// What becomes of single scattering.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Single {
+    /// Cached where there are many lights.
+    Auto,
+    /// Connections to the lights from every point: sharp shadows and peaked phase functions.
+    Direct,
+    /// Cached.
+    Cached,
+}
+
+/// `CACHE=E`.
+fn named(text: &str) -> Result<(Kind, f64), String> {
+    let (kind, value) = text.split_once('=').ok_or("must look like multiple=0.2")?;
+    Ok((Kind::from_str(kind, false)?, output::positive(value)?))
+}
+
+/// Number of lights from which on single scattering is cached.
+const MANY_LIGHTS: usize = 12;
+
+/// A render by radiance caching, to be done with a medium of any type.
+pub(super) struct CacheJob<'a> {
+    pub(super) world: &'a World<'a>,
+    pub(super) lights: &'a [Light<'a>],
+    pub(super) camera: Camera,
+    pub(super) paths: path::Settings,
+    pub(super) film: &'a mut Film,
+    pub(super) settings: &'a tiles::Settings,
+    pub(super) control: &'a Control<'a>,
+    pub(super) arguments: &'a CacheArguments,
+}
+
+/// What caching did besides the picture.
+#[derive(Debug)]
+pub(super) struct Cached {
+    pub(super) caches: RadianceCaches,
+    pub(super) filled: cache::Outcome,
+    pub(super) render: Outcome,
+}
+
+impl CacheJob<'_> {
+    fn efforts(&self, phase: &Phase) -> cache::Settings {
+        let size = self.world.bounds().size().max_element();
+        let arguments = self.arguments;
+        let scale = f64::from(arguments.paths.unwrap_or(512)) / 512.0;
+        let effort = |kind: Kind, tolerance: f64, samples: f64, degree: usize, most: f32| {
+            let named = arguments.tolerance_of.iter().rev().find(|(k, _)| *k == kind).map(|(_, e)| *e);
+            let effort = Effort {
+                tolerance: named.or(arguments.tolerance).unwrap_or(tolerance) as f32,
+                samples: ((samples * scale) as u32).max(1),
+                degree: arguments.degree.map_or(degree, |d| d as usize),
+                limits: Limits { min: 1e-3 * size, max: most * size },
+            };
+            (!arguments.uncached.contains(&kind) && self.paths.max_scatterings > 1).then_some(effort)
+        };
+        let degree = |power: i32, damping: f32| degree_for(phase, power, damping);
+        let cached = match arguments.single {
+            Single::Auto => self.lights.len() >= MANY_LIGHTS,
+            Single::Direct => false,
+            Single::Cached => true,
+        };
+        cache::Settings {
+            single: if cached { effort(Kind::Single, 0.2, 16.0, degree(1, 0.0), 0.1) } else { None },
+            surface: effort(Kind::Surface, 0.3, 256.0, degree(1, 1.0), 0.1),
+            multiple: effort(Kind::Multiple, 0.3, 512.0, degree(2, 0.0), 0.1),
+            irradiance: effort(Kind::Irradiance, 0.3, 256.0, 0, 0.1),
+            rays: 16384,
+            margin: 0.15,
+            pixels: (1.5, 64.0),
+            round: 64,
+            threads: self.settings.threads,
+            seed: self.settings.seed,
+        }
+    }
+}
+
+/// The least degree beyond which an expansion holds less than a twentieth of the phase function, applied
+/// `power` times, to light whose own expansion falls off like `1/(l + 1)^damping`.
+fn degree_for(phase: &Phase, power: i32, damping: f32) -> usize {
+    let energy = |l: usize| {
+        let moment = phase.moment(l).max_element().abs().powi(power) / (l as f32 + 1.0).powf(damping);
+        (2 * l + 1) as f32 * moment * moment
+    };
+    let total: f32 = (0..=fogbow::sh::MAX_DEGREE).map(energy).sum();
+    let mut rest = total;
+    for l in 0..=fogbow::sh::MAX_DEGREE {
+        rest -= energy(l);
+        if rest <= 0.0025 * total {
+            return l;
+        }
+    }
+    fogbow::sh::MAX_DEGREE
+}
+
+impl WithMedium for CacheJob<'_> {
+    type Output = Result<Cached, Failure>;
+
+    fn with<M: Medium + Sync>(self, medium: &M) -> Self::Output {
+        let phases = self.world.media().phases();
+        let sharpest = phases.iter().copied().max_by(|a, b| {
+            let mean = |p: &Phase| p.moment(1).max_element().abs();
+            mean(a).total_cmp(&mean(b))
+        });
+        let settings = self.efforts(&sharpest.unwrap_or(Phase::ISOTROPIC));
+        let eye = EyeSettings {
+            density: 8.0,
+            lights_visible: self.paths.lights_visible,
+            indirect: self.paths.max_scatterings > 1,
+        };
+        let steps = Steps::Length(medium.resolution());
+        let estimator = Estimator {
+            world: PathWorld { medium, scene: self.world, lights: self.lights },
+            surfaces: None,
+            walk: multiple_scatter::Settings { one_light: self.lights.len() > 1, ..multiple_scatter::Settings::new(steps) },
+            paths: self.paths,
+            light_samples: 16,
+        };
+        let (width, height) = (self.film.width() as f32, self.film.height() as f32);
+        let ray = |at: [f32; 2]| -> Ray { self.camera.ray(Vec2::from(at)) };
+        let apart = ray([0.5, 0.5]).direction.angle_between(ray([0.5 + 1.0 / width, 0.5]).direction);
+        let mut caches = RadianceCaches::new(settings);
+        let filled = cache::fill(&mut caches, &estimator, &eye, apart, self.control, ray)?;
+        let has_layers = self.film.layers().len() > 1;
+        let reader = caches.reader();
+        let render = tiles::render(self.film, self.settings, self.control, |sample, rng, layers| {
+            let world = PathWorld {
+                medium: &CountingMedium { medium, tally: sample.tally },
+                scene: &CountingScene { scene: self.world, tally: sample.tally },
+                lights: self.lights,
+            };
+            let estimator = Estimator {
+                world,
+                surfaces: reader.irradiance.map(|r| (r.cache, r.reading)),
+                walk: estimator.walk,
+                paths: estimator.paths,
+                light_samples: 1,
+            };
+            let jitter = uniform2(rng);
+            let film = Vec2::new((sample.x as f32 + jitter.x) / width, (sample.y as f32 + jitter.y) / height);
+            let seen = radiance(&self.camera.ray(film), &estimator, &reader, &eye, rng);
+            sample.tally.look_up(seen.lookups, seen.misses);
+            if has_layers {
+                let parts = [
+                    seen.total(),
+                    seen.emitted,
+                    seen.surface_direct,
+                    seen.surface_indirect,
+                    seen.medium_single,
+                    seen.medium_surface,
+                    seen.medium_multiple,
+                ];
+                layers.copy_from_slice(&parts);
+            } else if let Some(total) = layers.first_mut() {
+                *total = seen.total();
+            }
+        })?;
+        Ok(Cached { caches, filled, render })
+    }
+}
