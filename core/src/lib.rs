@@ -8,6 +8,7 @@ pub use bytemuck;
 pub use glam;
 pub use rand_core;
 
+pub mod cache;
 pub mod host;
 pub mod light;
 pub mod march;
