@@ -3,7 +3,7 @@
 use bytemuck::Pod;
 use glam::Vec3;
 
-use super::index::{Index, Node};
+use super::index::Index;
 use super::radius::neighbour_clamped;
 use super::{Facing, Record};
 use crate::sh::Coefficient;
@@ -148,7 +148,7 @@ impl<E: Pod> Cache<'_, E> {
     #[must_use]
     pub fn growing(stride: usize) -> Self {
         use alloc::vec::Vec;
-        let index = Index::new(Vec::<Node>::new(), Vec::new());
+        let index = Index::new(Vec::new(), Vec::new(), Vec::new(), Vec::new());
         Self::new(Vec::new(), Vec::new(), index, stride)
     }
 }
