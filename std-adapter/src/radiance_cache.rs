@@ -35,6 +35,13 @@ pub struct Effort {
     pub limits: Limits,
 }
 
+impl Effort {
+    /// For records that serve the making of others: twice the tolerance, samples divided.
+    fn coarser(self, fewer: u32) -> Self {
+        Self { tolerance: 1.5 * self.tolerance, samples: (self.samples / fewer).max(16), ..self }
+    }
+}
+
 /// How to fill.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Settings {
@@ -143,6 +150,9 @@ impl fmt::Display for FillError {
 
 impl core::error::Error for FillError {}
 
+/// By how much fewer samples the records have that only light other records.
+const FIRST_SAMPLES: u32 = 4;
+
 /// Rays of the first batch; each next one has twice as many, up to [`LAST_BATCH`].
 const FIRST_BATCH: u32 = 64;
 
@@ -193,7 +203,6 @@ struct Wanted {
 trait Fill: Sync {
     /// What a record has besides.
     type Attached: Send;
-    fn is_for(place: &Place) -> bool;
     fn is_covered(&self, place: &Place, reading: &Reading) -> bool;
     fn guess(&self, place: &Place) -> Option<f32>;
     fn add(&mut self, record: Record, attached: Self::Attached) -> bool;
@@ -202,9 +211,6 @@ trait Fill: Sync {
 
 impl Fill for VolumeCache<'_> {
     type Attached = Vec<Coefficient>;
-    fn is_for(place: &Place) -> bool {
-        place.normal.is_none()
-    }
     fn is_covered(&self, place: &Place, reading: &Reading) -> bool {
         self.covers(place.point, reading)
     }
@@ -222,9 +228,6 @@ impl Fill for VolumeCache<'_> {
 
 impl Fill for SurfaceCache<'_> {
     type Attached = Facing;
-    fn is_for(place: &Place) -> bool {
-        place.normal.is_some()
-    }
     fn is_covered(&self, place: &Place, reading: &Reading) -> bool {
         place.normal.is_none_or(|normal| self.covers(place.point, normal, reading))
     }
@@ -249,42 +252,96 @@ where
         let mut outcome = Outcome::default();
         let all = self.all_places();
         let settings = self.settings;
+        let everywhere = |place: &Place| place.normal.is_some();
+        let in_medium = |place: &Place| place.normal.is_none();
+        let in_sight = |place: &Place| place.normal.is_some() && place.is_seen;
+
+        // What lights everything else: coarse, because whoever asks sees many records at once.
+        let coarse = settings.irradiance.map(|effort| {
+            let effort = effort.coarser(FIRST_SAMPLES);
+            let mut cache: SurfaceCache<'static> = Cache::growing(1);
+            let clock = Stopwatch::start();
+            outcome.computed[3] += self.irradiance(&mut cache, &effort, 4, &all, everywhere, self.estimator);
+            outcome.seconds[3] = clock.elapsed();
+            (cache, Reading::new(effort.tolerance))
+        });
+        let surfaces = coarse.as_ref().map(|(cache, reading)| (cache, *reading));
+        let estimator = Estimator { surfaces, ..*self.estimator };
+        if let (Some(cache), Some(effort)) = (&mut caches.single, settings.single) {
+            let clock = Stopwatch::start();
+            outcome.computed[0] = self.rounds(cache, &effort, 0, &all, in_medium, |cache, place, rng| {
+                let mut higher = vec![Coefficient::ZERO; cache.stride()];
+                (estimator.single(place.point, &estimator.phase(place.point), &mut higher, rng), higher)
+            });
+            outcome.seconds[0] = clock.elapsed();
+        }
+        if let (Some(cache), Some(effort)) = (&mut caches.surface, settings.surface) {
+            let clock = Stopwatch::start();
+            outcome.computed[1] = self.rounds(cache, &effort, 1, &all, in_medium, |cache, place, rng| {
+                let mut higher = vec![Coefficient::ZERO; cache.stride()];
+                let phase = estimator.phase(place.point);
+                (estimator.surface(place.point, &phase, effort.samples, &mut higher, rng), higher)
+            });
+            outcome.seconds[1] = clock.elapsed();
+        }
+        let surface = caches.surface.as_ref().zip(settings.surface).map(|(c, e)| (c, Reading::new(e.tolerance)));
+        if let (Some(cache), Some(effort)) = (&mut caches.multiple, settings.multiple) {
+            let clock = Stopwatch::start();
+            // The first records come from whole walks. The final ones end theirs at those.
+            let mut first: VolumeCache<'static> = Cache::growing(cache.stride());
+            let rough = effort.coarser(1);
+            outcome.computed[2] = self.multiple(&mut first, &rough, 5, &all, surface, None, &estimator);
+            let known = Some((&first, Reading::new(rough.tolerance)));
+            outcome.computed[2] += self.multiple(cache, &effort, 2, &all, surface, known, &estimator);
+            outcome.seconds[2] = clock.elapsed();
+        }
+        let multiple = caches.multiple.as_ref().zip(settings.multiple).map(|(c, e)| (c, Reading::new(e.tolerance)));
         if let (Some(cache), Some(effort)) = (&mut caches.irradiance, settings.irradiance) {
             let clock = Stopwatch::start();
-            outcome.computed[3] = self.rounds(cache, &effort, 3, &all, |cache, estimator, place, rng| {
-                let normal = place.normal.unwrap_or(Vec3::Z);
-                let surfaces = Some((cache, Reading::new(effort.tolerance)));
-                let estimator = Estimator { surfaces, ..*estimator };
-                estimator.irradiance(place.point, normal, effort.samples, rng)
-            });
-            outcome.seconds[3] = clock.elapsed();
-        }
-        let surfaces = caches.irradiance.as_ref().zip(settings.irradiance);
-        let surfaces = surfaces.map(|(cache, effort)| (cache, Reading::new(effort.tolerance)));
-        let estimator = Estimator { surfaces, ..*self.estimator };
-        let kinds = [
-            (0, &mut caches.single, settings.single),
-            (1, &mut caches.surface, settings.surface),
-            (2, &mut caches.multiple, settings.multiple),
-        ];
-        for (kind, cache, effort) in kinds {
-            let (Some(cache), Some(effort)) = (cache, effort) else { continue };
-            let clock = Stopwatch::start();
-            let stride = cache.stride();
-            outcome.computed[kind] = self.rounds(cache, &effort, kind, &all, |_, _, place, rng| {
-                let phase = estimator.world.medium.properties(place.point).phase;
-                let mut higher = vec![Coefficient::ZERO; stride];
-                let sums = match kind {
-                    0 => estimator.single(place.point, &phase, &mut higher, rng),
-                    1 => estimator.surface(place.point, &phase, effort.samples, &mut higher, rng),
-                    _ => estimator.multiple(place.point, &phase, effort.samples, &mut higher, rng),
-                };
-                (sums, higher)
-            });
-            outcome.seconds[kind] = clock.elapsed();
+            let scattered = surface.zip(multiple).map(|(surface, multiple)| [surface, multiple]);
+            let estimator = Estimator { scattered, ..estimator };
+            outcome.computed[3] += self.irradiance(cache, &effort, 3, &all, in_sight, &estimator);
+            outcome.seconds[3] = outcome.seconds[3] + clock.elapsed();
         }
         outcome.cancelled = self.control.is_cancelled();
         outcome
+    }
+
+    fn irradiance(
+        &self,
+        cache: &mut SurfaceCache<'_>,
+        effort: &Effort,
+        stream: u64,
+        all: &[Vec<Wanted>],
+        is_for: impl Fn(&Place) -> bool,
+        estimator: &Estimator<'_, M, S>,
+    ) -> u64 {
+        self.rounds(cache, effort, stream, all, is_for, |cache, place, rng| {
+            let own = Some((cache, Reading::new(effort.tolerance)));
+            let estimator = Estimator { surfaces: estimator.surfaces.or(own), ..*estimator };
+            estimator.irradiance(place.point, place.normal.unwrap_or(Vec3::Z), effort.samples, rng)
+        })
+    }
+
+    fn multiple(
+        &self,
+        cache: &mut VolumeCache<'_>,
+        effort: &Effort,
+        stream: u64,
+        all: &[Vec<Wanted>],
+        surface: Option<(&VolumeCache<'_>, Reading)>,
+        known: Option<(&VolumeCache<'_>, Reading)>,
+        estimator: &Estimator<'_, M, S>,
+    ) -> u64 {
+        let is_for = |place: &Place| place.normal.is_none();
+        self.rounds(cache, effort, stream, all, is_for, |cache, place, rng| {
+            let own = (cache, Reading::new(effort.tolerance));
+            let scattered = surface.map(|surface| [surface, known.unwrap_or(own)]);
+            let estimator = Estimator { scattered, ..*estimator };
+            let mut higher = vec![Coefficient::ZERO; cache.stride()];
+            let phase = estimator.phase(place.point);
+            (estimator.multiple(place.point, &phase, effort.samples, &mut higher, rng), higher)
+        })
     }
 
     /// Every place that eye rays ask for, in batches from coarse to fine.
@@ -320,14 +377,15 @@ where
         &self,
         cache: &mut C,
         effort: &Effort,
-        kind: usize,
+        stream: u64,
         batches: &[Vec<Wanted>],
-        compute: impl Fn(&C, &Estimator<'_, M, S>, &Place, &mut Generator) -> (Sums, C::Attached) + Sync,
+        is_for: impl Fn(&Place) -> bool,
+        compute: impl Fn(&C, &Place, &mut Generator) -> (Sums, C::Attached) + Sync,
     ) -> u64 {
         let reading = Reading { margin: self.settings.margin, ..Reading::new(effort.tolerance) };
         let mut computed = 0_u64;
         for batch in batches {
-            let mut open: Vec<Wanted> = batch.iter().filter(|wanted| C::is_for(&wanted.place)).copied().collect();
+            let mut open: Vec<Wanted> = batch.iter().filter(|wanted| is_for(&wanted.place)).copied().collect();
             loop {
                 let frozen = &*cache;
                 open = open.into_par_iter().filter(|wanted| !frozen.is_covered(&wanted.place, &reading)).collect();
@@ -341,8 +399,8 @@ where
                 let records: Vec<(Place, Option<Record>, C::Attached)> = numbered
                     .par_iter()
                     .map(|(number, Wanted { place, distance })| {
-                        let seed = mix(self.settings.seed ^ mix(kind as u64 + 1)) ^ number;
-                        let (sums, attached) = compute(frozen, self.estimator, place, &mut Generator::new(seed));
+                        let seed = mix(self.settings.seed ^ mix(stream + 1)) ^ number;
+                        let (sums, attached) = compute(frozen, place, &mut Generator::new(seed));
                         let (least, most) = self.settings.pixels;
                         let limits = effort.limits.on_screen(least, most, self.pixel, *distance);
                         (*place, Record::new(place.point, &sums, effort.tolerance, limits), attached)

@@ -2,12 +2,12 @@
 
 use glam::Vec3;
 
-use super::lookup::Reading;
+use super::lookup::{Basis, Reading};
 use super::record::Facing;
-use super::store::SurfaceCache;
-use crate::host::{Hit, Medium, Rng, Scene};
+use super::store::{SurfaceCache, VolumeCache};
+use crate::host::{Hit, Medium, Properties, Rng, Scene};
 use crate::math::{Frame, Ray, float};
-use crate::multiple_scatter::{self, Walk};
+use crate::multiple_scatter::{self, Cones, Incoming, Walk};
 use crate::path::connect::next_event;
 use crate::path::trace::leave;
 use crate::path::{self, World};
@@ -23,6 +23,9 @@ use crate::transmittance::thickness::Marching;
 /// variance without bound.
 const MIN_COSINE: f32 = 0.05;
 
+/// A number whose multiples, wrapped, are even beside a golden-ratio lattice: the third coordinate.
+const THIRD: f32 = 0.414_213_56;
+
 /// Estimates the light that the caches hold.
 ///
 /// Light from surfaces takes its direct part from one connection to the lights, its indirect part
@@ -34,6 +37,9 @@ pub struct Estimator<'a, M: ?Sized, S: ?Sized> {
     pub world: World<'a, M, S>,
     /// Indirect irradiance known so far, and how it is read.
     pub surfaces: Option<(&'a SurfaceCache<'a>, Reading)>,
+    /// Light of surfaces scattered once, and light scattered more than once, known so far: walks end where
+    /// both are.
+    pub scattered: Option<[(&'a VolumeCache<'a>, Reading); 2]>,
     /// How random walks are made, and light marched to.
     pub walk: multiple_scatter::Settings,
     /// How paths are traced where nothing is cached.
@@ -50,6 +56,12 @@ impl<M: ?Sized, S: ?Sized> Clone for Estimator<'_, M, S> {
 impl<M: ?Sized, S: ?Sized> Copy for Estimator<'_, M, S> {}
 
 impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
+    /// The phase function at `point`.
+    #[must_use]
+    pub fn phase(&self, point: Vec3) -> Phase {
+        self.world.medium.properties(point).phase
+    }
+
     /// Light from the lights, scattered once at `point`: mean over directions (W·m⁻²·sr⁻¹), with
     /// the expansion of `phase` of degree 1 and more added to `higher`.
     pub fn single(&self, point: Vec3, phase: &Phase, higher: &mut [Coefficient], rng: &mut impl Rng) -> Sums {
@@ -97,12 +109,35 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
         higher: &mut [Coefficient],
         rng: &mut impl Rng,
     ) -> Sums {
-        let mut child = Generator::child(rng);
-        let walk = self.walker();
+        let (walk, shift, third) = (self.walker(), uniform2(rng), uniform(rng));
+        let share = 1.0 / paths.max(1) as f32;
         self.expanded(phase, higher, |into| {
-            let outgoing = |ray: &Ray, hit: &Hit| self.outgoing(ray, hit, &mut child);
-            multiple_scatter::sample_directional(&walk, point, outgoing, paths, rng, into)
+            let mut cones = Cones::default();
+            for j in 0..paths {
+                let to_light = warp::uniform_sphere(single_scatter::lattice(j, paths, shift));
+                let mut ray = Ray::new(point, to_light);
+                ray.length = nearest_surface(&ray, self.world.scene).map_or(f32::INFINITY, |hit| hit.distance);
+                let u = third + THIRD * j as f32;
+                let light = self.walked(&walk, ray, warp::uniform_sphere_pdf(), u - libm::floorf(u), rng) * share;
+                let incoming = Incoming { to_light, light };
+                cones.add(to_light, &incoming.scatter_directional(into.moments, into.coefficients));
+            }
+            cones.sums()
         })
+    }
+
+    /// Light scattered in the medium along a ray, by one walk that ends where caches know the rest.
+    fn walked(&self, walk: &Walk<'_, M, S>, ray: Ray, pdf: f32, u: f32, rng: &mut impl Rng) -> Contribution {
+        let mut child = Generator::child(rng);
+        let outgoing = |ray: &Ray, hit: &Hit| self.outgoing(ray, hit, &mut child);
+        let known = |point: Vec3, to_eye: Vec3, _: &Properties| {
+            let [surface, multiple] = self.scattered.as_ref()?;
+            let basis = Basis::new(to_eye, surface.0.degree().max(multiple.0.degree()));
+            let mut light = multiple.0.lookup_with_gradient(point, &basis, &multiple.1)?;
+            light += surface.0.lookup_with_gradient(point, &basis, &surface.1)?;
+            Some(light)
+        };
+        walk.along(ray, pdf, u, outgoing, known, rng)
     }
 
     /// Indirect irradiance (W·m⁻²) at `point` on a surface with `normal`, from `paths` directions:
@@ -114,9 +149,9 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
     /// stays, ∇(cos θ) included; light from the medium by translating the path, cos θ frozen
     /// ```
     pub fn irradiance(&self, point: Vec3, normal: Vec3, paths: u32, rng: &mut impl Rng) -> (Sums, Facing) {
-        let (mut sums, mut turn) = (Sums::default(), Gradient::ZERO);
+        let (mut sums, mut scattered, mut turn) = (Sums::default(), Cones::default(), Gradient::ZERO);
         let mut child = Generator::child(rng);
-        let (frame, walk, shift) = (Frame::around(normal), self.walker(), uniform2(rng));
+        let (frame, walk, shift, third) = (Frame::around(normal), self.walker(), uniform2(rng), uniform(rng));
         let share = 1.0 / paths.max(1) as f32;
         for j in 0..paths {
             let u = single_scatter::lattice(j, paths, shift);
@@ -139,12 +174,13 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
                     total += light;
                 }
             }
-            let outgoing = |ray: &Ray, hit: &Hit| self.outgoing(ray, hit, &mut child);
-            let light = walk.along(ray, 1.0, outgoing, rng) * weight;
-            sums.add(&light, true);
+            let u = third + THIRD * j as f32;
+            let light = self.walked(&walk, ray, 1.0, u - libm::floorf(u), rng) * weight;
+            scattered.add(to_light, &light);
             total += light;
             turn += Gradient::outer(total.radiance, to_light / cosine.max(MIN_COSINE));
         }
+        sums.merge(&scattered.sums());
         (sums, Facing { normal, turn })
     }
 

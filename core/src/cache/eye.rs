@@ -180,10 +180,12 @@ pub struct Place {
     pub point: Vec3,
     /// The surface's normal; `None` in the medium.
     pub normal: Option<Vec3>,
+    /// Whether the eye ray itself comes here; if not, a ray from one of its points.
+    pub is_seen: bool,
 }
 
 /// Calls `visit` for every place where the light along `ray` would be looked up: where records are
-/// needed. For every place it also asks one random direction for the surface there, which lights it.
+/// needed. From every one of them it also follows a random direction to a surface, which lights it.
 pub fn places<M: Medium + ?Sized, S: Scene + ?Sized>(
     ray: &Ray,
     world: &World<'_, M, S>,
@@ -204,29 +206,29 @@ struct Wanted<'a, M: ?Sized, S: ?Sized, F> {
 impl<M: Medium + ?Sized, S: Scene + ?Sized, F: FnMut(Place)> Wanted<'_, M, S, F> {
     fn beyond(&mut self, ray: &Ray) {
         if let Some(hit) = crate::single_scatter::nearest_surface(ray, self.world.scene) {
-            self.on_surface(ray, &hit);
+            self.on_surface(ray, &hit, false);
         }
     }
 
-    fn on_surface(&mut self, ray: &Ray, hit: &Hit) {
+    fn on_surface(&mut self, ray: &Ray, hit: &Hit, is_seen: bool) {
         if let Surface::Lambert { reflectance } = hit.surface
             && !reflectance.is_black()
             && hit.normal.dot(ray.direction) < 0.0
         {
-            (self.visit)(Place { point: ray.at(hit.distance), normal: Some(hit.normal) });
+            (self.visit)(Place { point: ray.at(hit.distance), normal: Some(hit.normal), is_seen });
         }
     }
 }
 
 impl<M: Medium + ?Sized, S: Scene + ?Sized, F: FnMut(Place)> Sight for Wanted<'_, M, S, F> {
     fn scatter(&mut self, point: Vec3, _: Vec3, _: &Properties, _: Spectrum) {
-        (self.visit)(Place { point, normal: None });
+        (self.visit)(Place { point, normal: None, is_seen: true });
         let direction = warp::uniform_sphere(uniform2(&mut self.rng));
         self.beyond(&Ray::new(point, direction));
     }
 
     fn surface(&mut self, ray: &Ray, hit: &Hit, _: Spectrum) {
-        self.on_surface(ray, hit);
+        self.on_surface(ray, hit, true);
         let point = ray.at(hit.distance);
         let direction = Frame::around(hit.normal).to_world(warp::cosine_hemisphere(uniform2(&mut self.rng)));
         let origin = leave(point, hit.normal, direction, hit.distance);

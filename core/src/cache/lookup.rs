@@ -6,6 +6,7 @@ use super::extrapolate::{Blend, Extrapolation, exponent_limit, weight};
 use super::store::{SurfaceCache, VolumeCache};
 use crate::math::float;
 use crate::sh::{self, MAX_COEFFICIENTS};
+use crate::single_scatter::Contribution;
 use crate::spectrum::{Gradient, Spectrum};
 
 /// How sharply records on surfaces stop where the normal turns: at an angle of about `1/TURN` rad.
@@ -30,7 +31,7 @@ impl Reading {
     /// Records made with `tolerance`, carried exponentially.
     #[must_use]
     pub fn new(tolerance: f32) -> Self {
-        Self { extrapolation: Extrapolation::Exponential, tolerance, margin: 0.0 }
+        Self { extrapolation: Extrapolation::ExponentialMean, tolerance, margin: 0.0 }
     }
 
     fn blend(&self) -> Blend {
@@ -93,6 +94,31 @@ impl VolumeCache<'_> {
             blend.add(weight(d), value, gradient.along(point - record.position));
         });
         blend.value()
+    }
+
+    /// [`VolumeCache::lookup`] with the gradient of the mixture, weights held: what random walks that end
+    /// at a record carry to their start.
+    #[must_use]
+    pub fn lookup_with_gradient(&self, point: Vec3, basis: &Basis, reading: &Reading) -> Option<Contribution> {
+        let mut blend = reading.blend();
+        let mut slope = Gradient::ZERO;
+        let higher = basis.values.get(1..basis.count).unwrap_or(&[]);
+        self.visit(point, |i, record, share| {
+            let d = 1.0 - share - reading.margin;
+            if d <= 0.0 {
+                return;
+            }
+            let (mut value, mut gradient) = (record.value, record.gradient);
+            for (c, &y) in self.attached(i).iter().zip(higher) {
+                value += c.value * y;
+                gradient += c.gradient * y;
+            }
+            let weight = weight(d);
+            blend.add(weight, value, gradient.along(point - record.position));
+            slope += gradient * weight;
+        });
+        let radiance = blend.value()?;
+        Some(Contribution { radiance, gradient: slope * (1.0 / blend.weight()) })
     }
 
     /// Whether a record reaches `point`.

@@ -35,7 +35,9 @@ fn for_each_path<M: Medium + ?Sized, S: Scene + ?Sized>(
 }
 
 /// Multiply scattered radiance at `point` towards `to_eye` (unit), with its gradient and the sums of
-/// J's Eq. 34: each path is one summand, its vertices' gradients added as vectors.
+/// J's Eq. 34. There, each path is one summand, its vertices' gradients added as vectors; here all paths
+/// that start into the same twenty-fourth of the sphere are: the norms of single walks would
+/// measure their noise, and radii shrink as if light changed where it does not.
 ///
 /// Unbiased but for the marching of transmittance towards lights, the cut at
 /// [`Settings::max_vertices`](super::Settings) and [`Settings::closest`](super::Settings). The
@@ -63,9 +65,11 @@ pub fn sample<M: Medium + ?Sized, S: Scene + ?Sized>(
     paths: u32,
     rng: &mut (impl Rng + ?Sized),
 ) -> Sums {
-    let mut sums = Sums::default();
-    for_each_path(walk, point, outgoing, paths, rng, |incoming| sums.add(&incoming.scatter(to_eye, phase), true));
-    sums
+    let mut cones = Cones::default();
+    for_each_path(walk, point, outgoing, paths, rng, |incoming| {
+        cones.add(incoming.to_light, &incoming.scatter(to_eye, phase));
+    });
+    cones.sums()
 }
 
 /// [`sample`] for all directions at once: adds to the expansion's coefficients; the sums returned
@@ -78,10 +82,37 @@ pub fn sample_directional<M: Medium + ?Sized, S: Scene + ?Sized>(
     rng: &mut (impl Rng + ?Sized),
     into: &mut Directional<'_>,
 ) -> Sums {
-    let mut sums = Sums::default();
+    let mut cones = Cones::default();
     for_each_path(walk, point, outgoing, paths, rng, |incoming| {
-        let mean: Contribution = incoming.scatter_directional(into.moments, into.coefficients);
-        sums.add(&mean, true);
+        cones.add(incoming.to_light, &incoming.scatter_directional(into.moments, into.coefficients));
     });
-    sums
+    cones.sums()
+}
+
+/// Contributions by where they come from: octants, each in three.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Cones([Contribution; 24]);
+
+impl Cones {
+    #[inline]
+    pub(crate) fn add(&mut self, to_light: Vec3, contribution: &Contribution) {
+        let size = to_light.abs();
+        let third = if size.x >= size.y && size.x >= size.z {
+            0
+        } else if size.y >= size.z {
+            1
+        } else {
+            2
+        };
+        let octant =
+            usize::from(to_light.x < 0.0) | usize::from(to_light.y < 0.0) << 1 | usize::from(to_light.z < 0.0) << 2;
+        self.0[octant * 3 + third] += *contribution;
+    }
+
+    /// The sums with every cone as one summand.
+    pub(crate) fn sums(&self) -> Sums {
+        let mut sums = Sums::default();
+        self.0.iter().for_each(|cone| sums.add(cone, true));
+        sums
+    }
 }

@@ -2,7 +2,7 @@
 
 use crate::host::{Medium, Properties, Rng};
 use crate::math::{Ray, float};
-use crate::sampling::{Generator, distance::exponential, uniform};
+use crate::sampling::{Generator, distance::exponential};
 use crate::spectrum::Spectrum;
 use crate::transmittance::thickness::{Marching, transmittance};
 use crate::transmittance::tracking;
@@ -32,7 +32,7 @@ pub(super) struct Collision {
     pub factor: Spectrum,
 }
 
-/// The next collision on `ray`; `None` if light gets through. `throughput` weighs the channels.
+/// The next collision on `ray`, decided by `u`; `None` if light gets through. `throughput` weighs the channels.
 #[inline]
 pub(super) fn fly(
     ray: &Ray,
@@ -40,6 +40,7 @@ pub(super) fn fly(
     lengths: Lengths,
     throughput: Spectrum,
     marching: Marching,
+    u: f32,
     rng: &mut Generator,
 ) -> Option<Collision> {
     if let Lengths::Exponential { floor } = lengths {
@@ -47,7 +48,7 @@ pub(super) fn fly(
         let rate = medium.extinction(ray.origin).mean().max(floor * bound);
         // From vacuum there is no rate to go by; tracking crosses it.
         if rate > 0.0 {
-            let distance = exponential(uniform(rng), rate);
+            let distance = exponential(u, rate);
             if !(distance < ray.length) {
                 return None;
             }
@@ -57,7 +58,6 @@ pub(super) fn fly(
             return factor.is_finite().then_some(Collision { distance, properties, factor });
         }
     }
-    let u = uniform(rng);
     let flown = tracking::flight(medium, ray, throughput, u, rng);
     let properties = flown.collision?;
     Some(Collision { distance: flown.distance, properties, factor: flown.weight.ratio(properties.extinction()) })

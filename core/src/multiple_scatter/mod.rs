@@ -31,6 +31,7 @@ mod flight;
 mod walk;
 mod weight;
 
+pub(crate) use estimate::Cones;
 pub use estimate::{sample, sample_directional};
 pub use flight::Lengths;
 pub use walk::{Incoming, Settings, Walk};

@@ -106,19 +106,24 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Walk<'_, M, S> {
         let to_light = warp::uniform_sphere(first);
         let mut ray = Ray::new(point, to_light);
         ray.length = nearest_surface(&ray, self.scene).map_or(f32::INFINITY, |hit| hit.distance);
-        Incoming { to_light, light: self.along(ray, warp::uniform_sphere_pdf(), outgoing, rng) }
+        let u = uniform(rng);
+        Incoming { to_light, light: self.along(ray, warp::uniform_sphere_pdf(), u, outgoing, |_, _, _| None, rng) }
     }
 
     /// Light scattered on a path whose first segment lies on `ray`, up to its end, over the density
     /// `pdf` (sr⁻¹) of its direction: radiance at the ray's origin over `pdf`, and how it changes as
-    /// the whole path is translated.
+    /// the whole path is translated. `u`, in [0, 1), decides the first length.
     ///
-    /// Other arguments as for [`Walk::path`].
+    /// `known(point, to_eye, properties)` may answer for all light but that straight from the lights
+    /// that is scattered towards `to_eye` at a collision (W·m⁻²·sr⁻¹), with its gradient: then the
+    /// path ends there. Other arguments as for [`Walk::path`].
     pub fn along(
         &self,
         mut ray: Ray,
         pdf: f32,
+        mut u: f32,
         mut outgoing: impl FnMut(&Ray, &Hit) -> Spectrum,
+        mut known: impl FnMut(Vec3, Vec3, &Properties) -> Option<Contribution>,
         rng: &mut (impl Rng + ?Sized),
     ) -> Contribution {
         let rng = &mut own(rng);
@@ -128,7 +133,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Walk<'_, M, S> {
         for vertex in 1..=self.settings.max_vertices {
             total += self.near_lights(&ray, &weight, kappa, rng);
             let marching = self.marching(rng);
-            let hit = fly(&ray, self.medium, self.settings.lengths, weight.value * kappa, marching, rng);
+            let hit = fly(&ray, self.medium, self.settings.lengths, weight.value * kappa, marching, u, rng);
             let Some(Collision { distance, properties, factor }) = hit else { break };
             let (segment, at) = (ray.with_length(distance), ray.at(distance));
             let step = kappa * factor * properties.scattering;
@@ -147,7 +152,12 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Walk<'_, M, S> {
             }
             let to_eye = -ray.direction;
             total += weight.carry(&self.lights_at(at, to_eye, &properties, rng));
+            if let Some(light) = known(at, to_eye, &properties) {
+                total += weight.carry(&light);
+                break;
+            }
 
+            u = uniform(rng);
             let turn = properties.phase.sample(to_eye, uniform2(rng));
             kappa = turn.weight;
             ray = Ray { origin: at, direction: turn.to_light, length: f32::INFINITY };

@@ -120,9 +120,9 @@ impl CacheJob<'_> {
         };
         cache::Settings {
             single: if cached { effort(Kind::Single, 0.2, 16.0, degree(1, 0.0), 0.1) } else { None },
-            surface: effort(Kind::Surface, 0.3, 256.0, degree(1, 1.0), 0.1),
-            multiple: effort(Kind::Multiple, 0.3, 512.0, degree(2, 0.0), 0.1),
-            irradiance: effort(Kind::Irradiance, 0.3, 256.0, 0, 0.1),
+            surface: effort(Kind::Surface, 1.0, 256.0, degree(1, 1.0), 0.1),
+            multiple: effort(Kind::Multiple, 1.0, 512.0, degree(2, 0.0), 0.1),
+            irradiance: effort(Kind::Irradiance, 1.0, 256.0, 0, 0.1),
             rays: 16384,
             margin: 0.15,
             pixels: (1.5, 64.0),
@@ -170,6 +170,7 @@ impl WithMedium for CacheJob<'_> {
         let estimator = Estimator {
             world: PathWorld { medium, scene: self.world, lights: self.lights },
             surfaces: None,
+            scattered: None,
             walk: multiple_scatter::Settings { one_light: self.lights.len() > 1, ..multiple_scatter::Settings::new(steps) },
             paths: self.paths,
             light_samples: 16,
@@ -190,6 +191,7 @@ impl WithMedium for CacheJob<'_> {
             let estimator = Estimator {
                 world,
                 surfaces: reader.irradiance.map(|r| (r.cache, r.reading)),
+                scattered: None,
                 walk: estimator.walk,
                 paths: estimator.paths,
                 light_samples: 1,
