@@ -222,7 +222,7 @@ impl Fill for VolumeCache<'_> {
         self.insert(record, &higher) == Ok(true)
     }
     fn finish(&mut self) {
-        let _ = self.rebuild();
+        let _ = Cache::finish(self);
     }
 }
 
@@ -238,7 +238,7 @@ impl Fill for SurfaceCache<'_> {
         self.insert(record, &[facing]) == Ok(true)
     }
     fn finish(&mut self) {
-        let _ = self.rebuild();
+        let _ = Cache::finish(self);
     }
 }
 

@@ -3,6 +3,7 @@
 use glam::Vec3;
 
 use super::extrapolate::{Blend, Extrapolation, exponent_limit, weight};
+use super::record::{Facing, Record};
 use super::store::{SurfaceCache, VolumeCache};
 use crate::math::float;
 use crate::sh::{self, MAX_COEFFICIENTS};
@@ -81,7 +82,7 @@ impl VolumeCache<'_> {
     pub fn lookup(&self, point: Vec3, basis: &Basis, reading: &Reading) -> Option<Spectrum> {
         let mut blend = reading.blend();
         let higher = basis.values.get(1..basis.count).unwrap_or(&[]);
-        self.visit(point, |i, record, share| {
+        let mut add = |i, record: &Record, share| {
             let d = 1.0 - share - reading.margin;
             if d <= 0.0 {
                 return;
@@ -92,6 +93,23 @@ impl VolumeCache<'_> {
                 gradient += c.gradient * y;
             }
             blend.add(weight(d), value, gradient.along(point - record.position));
+        };
+        self.visit(point, &mut add);
+        blend.value().or_else(|| self.gap(point, basis, reading))
+    }
+
+    /// Between the spheres, the nearest count.
+    #[cold]
+    fn gap(&self, point: Vec3, basis: &Basis, reading: &Reading) -> Option<Spectrum> {
+        let mut blend = reading.blend();
+        let higher = basis.values.get(1..basis.count).unwrap_or(&[]);
+        self.visit_wide(point, |i, record, share| {
+            let (mut value, mut gradient) = (record.value, record.gradient);
+            for (c, &y) in self.attached(i).iter().zip(higher) {
+                value += c.value * y;
+                gradient += c.gradient * y;
+            }
+            blend.add(weight(1.0 - share), value, gradient.along(point - record.position));
         });
         blend.value()
     }
@@ -137,8 +155,8 @@ impl VolumeCache<'_> {
     }
 }
 
-fn nearest(records: &[super::Record], point: Vec3) -> Option<f32> {
-    let apart = |r: &super::Record| r.position.distance_squared(point);
+fn nearest(records: &[Record], point: Vec3) -> Option<f32> {
+    let apart = |r: &Record| r.position.distance_squared(point);
     records.iter().min_by(|a, b| apart(a).total_cmp(&apart(b))).map(|r| r.radius)
 }
 
@@ -155,6 +173,21 @@ impl SurfaceCache<'_> {
         self.visit_facing(point, normal, reading.margin, |record, facing, d| {
             let turned = facing.turn.along(normal - facing.normal);
             blend.add(weight(d), record.value, record.change(point) + turned);
+        });
+        blend.value().or_else(|| self.gap(point, normal, reading))
+    }
+
+    /// Between the spheres, the nearest count.
+    #[cold]
+    fn gap(&self, point: Vec3, normal: Vec3, reading: &Reading) -> Option<Spectrum> {
+        let mut blend = reading.blend();
+        self.visit_wide(point, |i, record, share| {
+            let Some(facing) = self.attached(i).first() else { return };
+            let d = 1.0 - facing_distance(point, normal, record, facing, share);
+            if d > 0.0 {
+                let turned = facing.turn.along(normal - facing.normal);
+                blend.add(weight(d), record.value, record.change(point) + turned);
+            }
         });
         blend.value()
     }
@@ -179,18 +212,24 @@ impl SurfaceCache<'_> {
         point: Vec3,
         normal: Vec3,
         margin: f32,
-        mut visit: impl FnMut(&super::Record, &super::Facing, f32),
+        mut visit: impl FnMut(&Record, &Facing, f32),
     ) {
         self.visit(point, |i, record, share| {
             let Some(facing) = self.attached(i).first() else { return };
-            let turn = float::safe_sqrt(2.0 - 2.0 * normal.dot(facing.normal));
-            let offset = facing.normal.dot(point - record.position).abs() / record.radius;
-            let d = 1.0 - share - TURN * turn - OFFSET * offset - margin;
+            let d = 1.0 - facing_distance(point, normal, record, facing, share) - margin;
             if d > 0.0 {
                 visit(record, facing, d);
             }
         });
     }
+}
+
+/// A surface record's distance over its radius, with what normals and planes differ by.
+#[inline]
+fn facing_distance(point: Vec3, normal: Vec3, record: &Record, facing: &Facing, share: f32) -> f32 {
+    let turn = float::safe_sqrt(2.0 - 2.0 * normal.dot(facing.normal));
+    let offset = facing.normal.dot(point - record.position).abs() / record.radius;
+    share + TURN * turn + OFFSET * offset
 }
 
 /// The gradient of an expansion's value is the expansion of the gradients; here for tests and

@@ -12,7 +12,7 @@
 //! 1. [`places`] along eye rays: where is something asked for?
 //! 2. where no record reaches ([`VolumeCache::covers`]), an [`Estimator`] computes one against the frozen caches;
 //! 3. [`Cache::insert`]; back to 1 with other rays;
-//! 4. [`Cache::rebuild`], then [`radiance`] for every sample of the image.
+//! 4. [`Cache::finish`], then [`radiance`] for every sample of the image.
 //!
 //! | file | holds |
 //! |---|---|

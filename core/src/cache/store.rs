@@ -24,8 +24,12 @@ pub struct Cache<'s, E> {
     records: List<'s, Record>,
     attached: List<'s, E>,
     index: Index<'s>,
+    wide: Index<'s>,
     stride: usize,
 }
+
+/// By how much spheres are widened for points that none contains.
+const WIDE: f32 = 2.0;
 
 /// In-scattered radiance in a medium.
 pub type VolumeCache<'s> = Cache<'s, Coefficient>;
@@ -34,15 +38,17 @@ pub type VolumeCache<'s> = Cache<'s, Coefficient>;
 pub type SurfaceCache<'s> = Cache<'s, Facing>;
 
 impl<'s, E: Pod> Cache<'s, E> {
-    /// An empty cache in lent or growing storage, with `stride` attachments per record.
+    /// An empty cache in lent or growing storage, with `stride` attachments per record. `wide` is the
+    /// index that [`Cache::finish`] makes for gaps; it needs two to three times the room of `index`.
     #[must_use]
     pub fn new(
         records: impl Into<List<'s, Record>>,
         attached: impl Into<List<'s, E>>,
         index: Index<'s>,
+        wide: Index<'s>,
         stride: usize,
     ) -> Self {
-        let mut cache = Self { records: records.into(), attached: attached.into(), index, stride };
+        let mut cache = Self { records: records.into(), attached: attached.into(), index, wide, stride };
         cache.records.clear();
         cache.attached.clear();
         cache
@@ -88,7 +94,7 @@ impl<'s, E: Pod> Cache<'s, E> {
     /// Bytes held by records, attachments and index.
     #[must_use]
     pub fn bytes(&self) -> usize {
-        size_of_val(self.records()) + size_of_val(self.attachments()) + self.index.bytes()
+        size_of_val(self.records()) + size_of_val(self.attachments()) + self.index.bytes() + self.wide.bytes()
     }
 
     /// Adds a record with its attachments, after clamping its radius and its neighbours' against each
@@ -115,16 +121,27 @@ impl<'s, E: Pod> Cache<'s, E> {
         if loose > LOOSE.max(self.index.len() / 16) { self.rebuild().map(|()| true) } else { Ok(true) }
     }
 
-    /// Brings all records into the index: once after filling, before many look-ups.
+    /// After filling, before many look-ups: brings all records into the index, and prepares for points in
+    /// the gaps between them. Until then those are misses.
     ///
     /// # Errors
-    /// [`Full`] when the index's lent storage has no room left.
-    pub fn rebuild(&mut self) -> Result<(), Full> {
+    /// [`Full`] when an index's lent storage has no room left.
+    pub fn finish(&mut self) -> Result<(), Full> {
+        self.rebuild()?;
         let records = self.records.as_slice();
-        self.index.rebuild(records.len() as u32, |i| {
-            let record = &records[i as usize];
-            (record.position, record.radius)
-        })
+        self.wide.rebuild(records.len() as u32, |i| (records[i as usize].position, WIDE * records[i as usize].radius))
+    }
+
+    fn rebuild(&mut self) -> Result<(), Full> {
+        let records = self.records.as_slice();
+        self.index.rebuild(records.len() as u32, |i| (records[i as usize].position, records[i as usize].radius))
+    }
+
+    /// As [`Cache::visit`], with every sphere twice as large: for points that no sphere contains.
+    #[inline]
+    pub fn visit_wide(&self, point: Vec3, mut visit: impl FnMut(u32, &Record, f32)) {
+        let records = self.records();
+        self.wide.visit(point, |i, share| visit(i, &records[i as usize], share));
     }
 
     /// Calls `visit(number, record, distance/radius)` for every record whose sphere contains `point`.
@@ -148,7 +165,7 @@ impl<E: Pod> Cache<'_, E> {
     #[must_use]
     pub fn growing(stride: usize) -> Self {
         use alloc::vec::Vec;
-        let index = Index::new(Vec::new(), Vec::new(), Vec::new(), Vec::new());
-        Self::new(Vec::new(), Vec::new(), index, stride)
+        let index = || Index::new(Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        Self::new(Vec::new(), Vec::new(), index(), index(), stride)
     }
 }

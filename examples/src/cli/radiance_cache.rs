@@ -120,9 +120,9 @@ impl CacheJob<'_> {
         };
         cache::Settings {
             single: if cached { effort(Kind::Single, 0.2, 16.0, degree(1, 0.0), 0.1) } else { None },
-            surface: effort(Kind::Surface, 1.0, 256.0, degree(1, 1.0), 0.1),
+            surface: effort(Kind::Surface, 2.0, 256.0, degree(1, 1.0), 0.1),
             multiple: effort(Kind::Multiple, 1.0, 512.0, degree(2, 0.0), 0.1),
-            irradiance: effort(Kind::Irradiance, 1.0, 256.0, 0, 0.1),
+            irradiance: effort(Kind::Irradiance, 0.35, 256.0, 0, 0.1),
             rays: 16384,
             margin: 0.15,
             pixels: (1.5, 64.0),
