@@ -27,6 +27,9 @@ const DEPTH: u32 = 16;
 /// Spheres of a [`Block`]: what one 256-bit register holds.
 const LANES: usize = 8;
 
+/// Blocks whose hits fit one word.
+const RUN: usize = 8;
+
 /// How many times as many blocks as the spheres would fill without repetition may be written.
 ///
 /// Twice as many make queries a fifth faster and the build twice as slow.
@@ -230,16 +233,23 @@ impl<'s> Index<'s> {
     /// of their numbers.
     #[inline]
     pub fn visit(&self, point: Vec3, mut visit: impl FnMut(u32, f32)) {
-        for block in self.leaf(point) {
-            let squared = block.squared(point);
-            let mut mask = 0_u32;
-            for (lane, square) in squared.iter().enumerate() {
-                mask |= u32::from(*square < 1.0) << lane;
+        for run in self.leaf(point).chunks(RUN) {
+            // All distances before the first decision: the loads of a run then wait for memory together
+            // and not each for the branch before it.
+            let mut squared = [[0.0; LANES]; RUN];
+            let mut masks = [0_u8; RUN];
+            for ((block, squared), mask) in run.iter().zip(&mut squared).zip(&mut masks) {
+                *squared = block.squared(point);
+                for (lane, square) in squared.iter().enumerate() {
+                    *mask |= u8::from(*square < 1.0) << lane;
+                }
             }
-            while mask != 0 {
-                let lane = mask.trailing_zeros() as usize % LANES;
-                mask &= mask - 1;
-                visit(block.index[lane], float::sqrt(squared[lane]));
+            let mut hits = u64::from_le_bytes(masks);
+            while hits != 0 {
+                let hit = hits.trailing_zeros() as usize;
+                hits &= hits - 1;
+                let (block, lane) = (hit / LANES % RUN, hit % LANES);
+                visit(run[block].index[lane], float::sqrt(squared[block][lane]));
             }
         }
     }
