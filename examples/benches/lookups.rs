@@ -100,13 +100,12 @@ fn crowded(random: &mut Random) -> Vec3 {
 }
 
 fn spheres(count: usize, in_crowds: bool, random: &mut Random) -> Vec<Sphere> {
-    let mut centres: Vec<Vec3> =
-        (0..count).map(|_| if in_crowds { crowded(random) } else { random.point() }).collect();
+    let mut centres: Vec<Vec3> = (0..count).map(|_| if in_crowds { crowded(random) } else { random.point() }).collect();
     let radii: Vec<f32> = if in_crowds {
         let tree = RTree::bulk_load(centres.iter().map(|c| c.to_array()).collect());
         let tenth = |c: &Vec3| {
             let neighbour = tree.nearest_neighbor_iter(c.to_array()).nth(10);
-            neighbour.map_or(1.0, |n| Vec3::from(*n).distance(*c)).clamp(1e-3, 1.0)
+            neighbour.map_or(1.0, |n| Vec3::from(*n).distance(*c))
         };
         centres.iter().map(tenth).collect()
     } else {
@@ -226,7 +225,7 @@ fn main() {
                 (0..count).map(|_| if in_crowds { crowded(&mut random) } else { random.point() }).collect();
             for (name, points) in [("apart", apart), ("rays", along_rays(count))] {
                 for _ in 0..8 {
-                    let sample: Vec<Vec3> = points.iter().step_by(37).copied().collect();
+                    let sample: Vec<Vec3> = points.iter().step_by(7).copied().collect();
                     let hits = ask_index(&index(&spheres), &sample).0 as f64 / sample.len() as f64;
                     let factor = (HITS / hits).powf(1.0 / 3.0) as f32;
                     spheres.iter_mut().for_each(|s| s.radius *= factor);
