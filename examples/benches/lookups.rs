@@ -88,7 +88,7 @@ fn crowded(random: &mut Random) -> Vec3 {
         let mut point = random.point();
         let wall = (random.unit() * 6.0) as usize;
         let away = 0.3 * random.unit().powi(3);
-        point[wall / 2 % 3] = if wall % 2 == 0 { away } else { 1.0 - away };
+        point[wall / 2 % 3] = if wall.is_multiple_of(2) { away } else { 1.0 - away };
         return point;
     }
     if kind < 0.8 {

@@ -8,7 +8,7 @@
 //!   distances are computed together. A query reads one run of memory and nothing else, and large
 //!   leaves are cheap: the 40 spheres that miss cost as much as the 10 that are hit.
 //! - How often a sphere may be repeated is bounded by a share that is passed down the tree
-//!   ([`REPEATS`]), so memory is linear in the number of spheres whatever their radii.
+//!   (`REPEATS`), so memory is linear in the number of spheres whatever their radii.
 //! - It is built as a whole, which takes well under a microsecond a sphere, and not by insertion.
 //!
 //! A leaf keeps the spheres in the order of their numbers.
@@ -301,7 +301,7 @@ impl<'s> Index<'s> {
     ///
     /// Left out are spheres that are not finite, whose radius is not positive (or below 10⁻³⁸ m), or
     /// that reach farther than 10³⁸ m from the origin. Takes `O(n log n)` time,
-    /// some 0.4 µs a sphere, and at most 500 bytes of growing storage a sphere, some 280 typically.
+    /// some 0.4 µs a sphere, and at most some 500 bytes a sphere, typically 280.
     ///
     /// # Errors
     /// [`Full`] when lent storage has no room left; the index is empty then, and may be built again.
