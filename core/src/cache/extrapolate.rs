@@ -91,7 +91,7 @@ impl Blend {
                 for channel in 0..3 {
                     let (l, change) = (value[channel], change[channel]);
                     // Negative lobes of truncated expansions are part of the mean.
-                    let carried = if l > 0.0 { l * grown((change / l).clamp(-self.limit, self.limit)) } else { l };
+                    let carried = if l > 0.0 { l * grown(change / l) } else { l };
                     self.sum[channel] += weight * carried;
                 }
             }
@@ -124,12 +124,18 @@ impl Blend {
     }
 }
 
-/// `eˣ`, cheap where |x| is small: squarings of a series.
+/// `eˣ` up to `x = 1`, straight on beyond: a value that nearly vanishes in one direction must not explode
+/// by what its slope is in that direction.
 #[inline]
 fn grown(x: f32) -> f32 {
-    if x.abs() > 1.5 {
+    use core::f32::consts::E;
+    if x > 1.0 {
+        return E * x;
+    }
+    if x < -1.0 {
         return float::exp(x);
     }
+    // The fourth power of a series: 10⁻⁶.
     let y = 0.25 * x;
     let e = 1.0 + y * (1.0 + y * (0.5 + y * (1.0 / 6.0 + y * (1.0 / 24.0 + y * (1.0 / 120.0)))));
     let e = e * e;
