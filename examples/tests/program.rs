@@ -78,7 +78,7 @@ fn every_scene_here_renders_with_layers_and_statistics() {
         }
         count += 1;
     }
-    assert_eq!(count, 5);
+    assert_eq!(count, 6);
 }
 
 #[test]
@@ -119,6 +119,26 @@ fn the_walk_stays_in_the_atrium_and_takes_short_steps() {
 }
 
 #[test]
+fn a_plume_is_a_folder_of_scenes_that_render() {
+    let folder = Folder::new("plume");
+    for name in ["a", "b"] {
+        let output = folder.run(&["plume", "--frames", "3", "--resolution", "16", "-o", name]);
+        assert_eq!(output.status.code(), Some(0), "{}", said(&output));
+        assert!(said(&output).contains("plume-02.xml"), "{}", said(&output));
+    }
+    for frame in ["plume-00", "plume-01", "plume-02"] {
+        for extension in ["vol", "xml"] {
+            let file = |name: &str| std::fs::read(folder.0.join(format!("{name}/{frame}.{extension}"))).unwrap();
+            assert!(file("a") == file("b"), "{frame}.{extension}");
+        }
+        let output =
+            folder.run(&["render", &format!("a/{frame}.xml"), "--size", "32x32", "--spp", "1", "-q", "-o", "a.pfm"]);
+        assert_eq!(output.status.code(), Some(0), "{frame}: {}", said(&output));
+    }
+    assert_eq!(std::fs::read_dir(folder.0.join("a")).unwrap().count(), 6);
+}
+
+#[test]
 fn the_same_bits_come_from_any_number_of_threads() {
     let folder = Folder::new("threads");
     let mut images = Vec::new();
@@ -156,6 +176,10 @@ fn bad_input_is_exit_code_2_and_no_image() {
         (&["render", SCENE, "--max-depth", "0"], "--max-depth"),
         (&["render", SCENE, "--method", "magic"], "magic"),
         (&["render", SCENE, "--stats", "none/s.json"], "cannot be written"),
+        (&["plume", "--frames", "0", "-o", "a"], "--frames"),
+        (&["plume", "--resolution", "7", "-o", "a"], "--resolution"),
+        (&["plume"], "--output"),
+        (&["plume", "-o", "bad.xml"], "bad.xml: cannot be written"),
         (&["compare", "a.png", "b.png"], "a.png: cannot be read"),
         (&["compare", "a.gif", "b.png"], "kind of image"),
     ];

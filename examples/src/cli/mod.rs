@@ -4,6 +4,7 @@
 
 mod compare;
 mod output;
+mod plume;
 mod render;
 mod report;
 
@@ -12,6 +13,7 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 
 pub use compare::CompareArguments;
+pub use plume::PlumeArguments;
 pub use render::{Method, RenderArguments};
 
 /// Light in fog, smoke and clouds.
@@ -30,6 +32,8 @@ pub enum Command {
     Render(RenderArguments),
     /// Says how far an image is from a reference.
     Compare(CompareArguments),
+    /// Writes an animation: a plume of smoke, a volume and a scene per frame.
+    Plume(PlumeArguments),
 }
 
 /// How a command ended well enough to leave a result.
@@ -46,6 +50,7 @@ pub fn run(arguments: Arguments) -> ExitCode {
     let result = match arguments.command {
         Command::Render(arguments) => render::run(&arguments),
         Command::Compare(arguments) => compare::run(&arguments),
+        Command::Plume(arguments) => plume::run(&arguments),
     };
     match result {
         Ok(Ending::Done) => ExitCode::SUCCESS,
