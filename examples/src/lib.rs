@@ -6,6 +6,7 @@
 //! | [`mesh`], [`volume`], [`picture`] | the files scenes name |
 //! | [`world`] | the host: surfaces, lights and media, ready for rays |
 //! | [`camera`] | the pinhole camera |
+//! | [`plume`] | an animation of smoke |
 //! | [`compare`] | how far two images are apart |
 //! | [`cli`] | the command line |
 
@@ -17,6 +18,7 @@ pub mod compare;
 pub mod error;
 pub mod mesh;
 pub mod picture;
+pub mod plume;
 pub mod scene_file;
 pub mod transform;
 pub mod volume;

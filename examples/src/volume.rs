@@ -91,6 +91,30 @@ impl Volume {
         Ok(Self { size, values })
     }
 
+    /// Writes a file, which [`Volume::read`] reads back as it is.
+    ///
+    /// # Errors
+    /// A file that cannot be written.
+    pub fn write(&self, file: &Path) -> Result<(), DataError> {
+        std::fs::write(file, self.to_bytes()).map_err(|e| DataError::new(file, "", format!("cannot be written: {e}")))
+    }
+
+    /// The bytes of a file. Its bounding box, which no reader here heeds, is the unit cube.
+    #[must_use]
+    pub fn to_bytes(&self) -> Vec<u8> {
+        let (encoding, values): (u32, Vec<u8>) = match &self.values {
+            Values::F32(values) => (1, values.iter().flat_map(|v| v.to_le_bytes()).collect()),
+            Values::U8(values) => (3, values.clone()),
+        };
+        let mut bytes = Vec::with_capacity(HEADER + values.len());
+        bytes.extend(b"VOL\x03");
+        let [x, y, z] = self.size;
+        bytes.extend([encoding, x, y, z, 1].iter().flat_map(|n| n.to_le_bytes()));
+        bytes.extend([0.0_f32, 0.0, 0.0, 1.0, 1.0, 1.0].iter().flat_map(|c| c.to_le_bytes()));
+        bytes.extend(values);
+        bytes
+    }
+
     /// Whether the outermost cells hold nothing.
     #[must_use]
     pub fn has_empty_border(&self) -> bool {
@@ -124,4 +148,25 @@ impl Volume {
 fn cell(index: usize, size: [u32; 3]) -> [usize; 3] {
     let (x, y) = (size[0] as usize, size[1] as usize);
     [index % x, index / x % y, index / x / y]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_written_is_read_back() {
+        let file = Path::new("a.vol");
+        for values in [Values::F32(vec![0.0, 0.25, 1e-30, 1.0, 0.5, 3.0]), Values::U8(vec![0, 1, 2, 128, 254, 255])] {
+            let volume = Volume { size: [3, 1, 2], values };
+            assert_eq!(Volume::from_bytes(file, &volume.to_bytes()), Ok(volume));
+        }
+    }
+
+    #[test]
+    fn a_folder_that_is_not_there_is_an_error() {
+        let file = std::env::temp_dir().join("fogbow-none").join("a.vol");
+        let volume = Volume { size: [1, 1, 1], values: Values::U8(vec![0]) };
+        assert!(volume.write(&file).unwrap_err().to_string().contains("a.vol: cannot be written"));
+    }
 }

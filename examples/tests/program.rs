@@ -66,7 +66,7 @@ fn every_scene_here_renders_with_layers_and_statistics() {
         }
         let scene = path.to_string_lossy();
         let arguments = [
-            "render", &scene, "--size", "8x8", "--spp", "1", "--aov", "-o", "a.exr", "-o", "a.pfm", "--stats",
+            "render", &scene, "--size", "32x32", "--spp", "1", "--aov", "-o", "a.exr", "-o", "a.pfm", "--stats",
             "s.json", "-q",
         ];
         let output = folder.run(&arguments);
@@ -78,7 +78,64 @@ fn every_scene_here_renders_with_layers_and_statistics() {
         }
         count += 1;
     }
-    assert_eq!(count, 4);
+    assert_eq!(count, 6);
+}
+
+#[test]
+fn a_camera_replaces_that_of_the_scene() {
+    let folder = Folder::new("camera");
+    let mut images = Vec::new();
+    // The first is where the camera of the scene stands already.
+    for camera in [None, Some("0,0,4 0,0,0"), Some("0.5,0,4 0,0,0")] {
+        let mut command = folder.fogbow();
+        command.args(["render", SCENE, "--size", "16x16", "--spp", "2", "-q", "-o", "a.pfm"]);
+        command.args(camera.iter().flat_map(|c| ["--camera", c]));
+        let output = command.output().unwrap();
+        assert_eq!(output.status.code(), Some(0), "{}", said(&output));
+        images.push(std::fs::read(folder.0.join("a.pfm")).unwrap());
+    }
+    assert!(images[0] == images[1] && images[0] != images[2]);
+}
+
+#[test]
+fn the_walk_stays_in_the_atrium_and_takes_short_steps() {
+    let folder = Folder::new("walk");
+    let scenes = Path::new(SCENE).parent().unwrap();
+    let atrium = scenes.join("atrium.xml").to_string_lossy().into_owned();
+    let walk = std::fs::read_to_string(scenes.join("atrium-walk.txt")).unwrap();
+    let origins: Vec<Vec<f64>> =
+        walk.lines().map(|l| l.split(' ').next().unwrap().split(',').map(|c| c.parse().unwrap()).collect()).collect();
+    assert_eq!(origins.len(), 10);
+    for pair in origins.windows(2) {
+        let step = (0..3).map(|i| (pair[1][i] - pair[0][i]).powi(2)).sum::<f64>().sqrt();
+        assert!(step > 0.1 && step < 1.0, "{pair:?}");
+    }
+    for camera in walk.lines() {
+        let output =
+            folder.run(&["render", &atrium, "--camera", camera, "--size", "8x8", "--spp", "1", "-q", "-o", "a.pfm"]);
+        assert_eq!(output.status.code(), Some(0), "{camera}: {}", said(&output));
+        assert!(output.stderr.is_empty(), "{}", said(&output));
+    }
+}
+
+#[test]
+fn a_plume_is_a_folder_of_scenes_that_render() {
+    let folder = Folder::new("plume");
+    for name in ["a", "b"] {
+        let output = folder.run(&["plume", "--frames", "3", "--resolution", "16", "-o", name]);
+        assert_eq!(output.status.code(), Some(0), "{}", said(&output));
+        assert!(said(&output).contains("plume-02.xml"), "{}", said(&output));
+    }
+    for frame in ["plume-00", "plume-01", "plume-02"] {
+        for extension in ["vol", "xml"] {
+            let file = |name: &str| std::fs::read(folder.0.join(format!("{name}/{frame}.{extension}"))).unwrap();
+            assert!(file("a") == file("b"), "{frame}.{extension}");
+        }
+        let output =
+            folder.run(&["render", &format!("a/{frame}.xml"), "--size", "32x32", "--spp", "1", "-q", "-o", "a.pfm"]);
+        assert_eq!(output.status.code(), Some(0), "{frame}: {}", said(&output));
+    }
+    assert_eq!(std::fs::read_dir(folder.0.join("a")).unwrap().count(), 6);
 }
 
 #[test]
@@ -107,6 +164,11 @@ fn bad_input_is_exit_code_2_and_no_image() {
         (&["render", SCENE, "--aov", "-o", "a.png"], "--aov"),
         (&["render", SCENE, "--size", "0x4"], "sides"),
         (&["render", SCENE, "--size", "4"], "640x480"),
+        (&["render", SCENE, "--camera", "1,2,3"], "0,1.8,4 0,1,0"),
+        (&["render", SCENE, "--camera", "-1,2,inf 0,0,0"], "0,1.8,4 0,1,0"),
+        (&["render", SCENE, "--camera", "0,5,0 0,1,0"], "--camera: the target must lie apart"),
+        (&["render", SCENE, "--camera", "0,1,0 0,1,0"], "--camera: the target must lie apart"),
+        (&["render", SCENE, "--camera", "0,0,-4000 0,0,0"], "--camera: far_clip 1000 would cut"),
         (&["render", SCENE, "--size", "65536x65536"], "pixels"),
         (&["render", SCENE, "--spp", "0"], "--spp"),
         (&["render", SCENE, "--time=-3"], "--time"),
@@ -114,6 +176,10 @@ fn bad_input_is_exit_code_2_and_no_image() {
         (&["render", SCENE, "--max-depth", "0"], "--max-depth"),
         (&["render", SCENE, "--method", "magic"], "magic"),
         (&["render", SCENE, "--stats", "none/s.json"], "cannot be written"),
+        (&["plume", "--frames", "0", "-o", "a"], "--frames"),
+        (&["plume", "--resolution", "7", "-o", "a"], "--resolution"),
+        (&["plume"], "--output"),
+        (&["plume", "-o", "bad.xml"], "bad.xml: cannot be written"),
         (&["compare", "a.png", "b.png"], "a.png: cannot be read"),
         (&["compare", "a.gif", "b.png"], "kind of image"),
     ];

@@ -4,6 +4,7 @@
 
 mod compare;
 mod output;
+mod plume;
 mod radiance_cache;
 mod render;
 mod report;
@@ -13,6 +14,7 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 
 pub use compare::CompareArguments;
+pub use plume::PlumeArguments;
 pub use radiance_cache::{CacheArguments, Kind, Single};
 pub use render::{Method, RenderArguments};
 
@@ -32,6 +34,8 @@ pub enum Command {
     Render(RenderArguments),
     /// Says how far an image is from a reference.
     Compare(CompareArguments),
+    /// Writes an animation: a plume of smoke, a volume and a scene per frame.
+    Plume(PlumeArguments),
 }
 
 /// How a command ended well enough to leave a result.
@@ -48,6 +52,7 @@ pub fn run(arguments: Arguments) -> ExitCode {
     let result = match arguments.command {
         Command::Render(arguments) => render::run(&arguments),
         Command::Compare(arguments) => compare::run(&arguments),
+        Command::Plume(arguments) => plume::run(&arguments),
     };
     match result {
         Ok(Ending::Done) => ExitCode::SUCCESS,

@@ -37,6 +37,17 @@ pub(super) fn positive(text: &str) -> Result<f64, String> {
     }
 }
 
+/// `x,y,z x,y,z`: an origin and a target.
+pub(super) fn camera(text: &str) -> Result<[[f64; 3]; 2], String> {
+    let number = |text: &str| text.trim().parse().ok().filter(|v: &f64| v.is_finite());
+    let point =
+        |text: &str| -> Option<[f64; 3]> { text.split(',').map(number).collect::<Option<Vec<_>>>()?.try_into().ok() };
+    let points: Option<Vec<_>> = text.split_whitespace().map(point).collect();
+    points
+        .and_then(|points| points.try_into().ok())
+        .ok_or_else(|| "must look like \"0,1.8,4 0,1,0\": where it stands, a space, what it looks at".to_owned())
+}
+
 /// `WIDTHxHEIGHT`.
 pub(super) fn size(text: &str) -> Result<(u32, u32), String> {
     let parsed = text.split_once('x').and_then(|(w, h)| Some((w.parse::<u32>().ok()?, h.parse::<u32>().ok()?)));
@@ -46,5 +57,18 @@ pub(super) fn size(text: &str) -> Result<(u32, u32), String> {
         }
         Some(_) => Err(format!("sides must lie in [1, 65536], with at most {} pixels", crate::scene_file::MAX_PIXELS)),
         None => Err("must look like 640x480".to_owned()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_camera_is_two_points() {
+        assert_eq!(camera("-9,1.8,0.4  0,4.2,-0.4"), Ok([[-9.0, 1.8, 0.4], [0.0, 4.2, -0.4]]));
+        for text in ["", "1,2,3", "1,2 3,4,5", "1,2,3 4,5,6 7,8,9", "1,2,x 4,5,6", "1,2,nan 4,5,6", "1, 2, 3 4, 5, 6"] {
+            assert!(camera(text).unwrap_err().contains("0,1.8,4 0,1,0"), "{text}");
+        }
     }
 }

@@ -50,6 +50,9 @@ pub struct RenderArguments {
     /// Size of the image [default: what the scene says].
     #[arg(long, value_name = "WxH", value_parser = output::size)]
     pub size: Option<(u32, u32)>,
+    /// Where the camera stands and what it looks at, +y up: "x,y,z x,y,z" [default: what the scene says].
+    #[arg(long, value_name = "ORIGIN TARGET", value_parser = output::camera, allow_hyphen_values = true)]
+    pub camera: Option<[[f64; 3]; 2]>,
     /// Image to write: .png, .exr or .pfm; may be repeated [default: SCENE.png and SCENE.exr in this folder].
     #[arg(short, long, value_name = "FILE")]
     pub output: Vec<PathBuf>,
@@ -96,7 +99,10 @@ static STOP: AtomicBool = AtomicBool::new(false);
 pub(super) fn run(arguments: &RenderArguments) -> Result<Ending, Failure> {
     let outputs = outputs(arguments)?;
     let mut statistics = Statistics::default();
-    let scene = statistics.time("read", || SceneFile::read(&arguments.scene))?;
+    let mut scene = statistics.time("read", || SceneFile::read(&arguments.scene))?;
+    if let Some([origin, target]) = arguments.camera {
+        scene = scene.seen_from(origin, target).map_err(|reason| format!("--camera: {reason}"))?;
+    }
     let mut storage = Storage::new(&scene);
     let world = statistics.time("build", || World::new(&scene, &mut storage))?;
     let (width, height) = arguments.size.unwrap_or((scene.sensor.width, scene.sensor.height));

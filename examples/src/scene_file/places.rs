@@ -11,7 +11,7 @@ use super::element::Element;
 use super::media;
 use super::shapes::ShapeElement;
 use crate::error::SceneError;
-use crate::transform::to_array;
+use crate::transform::{Transform, to_array};
 use crate::world::bounds_of;
 
 /// A container with the media at its sides.
@@ -182,6 +182,12 @@ fn check_camera<'a>(
 /// # Errors
 /// A far plane that would cut something off.
 pub(super) fn check_far_plane(scene: &SceneFile, sensor: &Element<'_>) -> Result<(), SceneError> {
+    far_plane(scene).map_err(|reason| sensor.error(reason))
+}
+
+/// # Errors
+/// A far plane that would cut something off.
+fn far_plane(scene: &SceneFile) -> Result<(), String> {
     let eye = scene.sensor.to_world.column(3);
     let mut corners: Vec<[f64; 3]> = Vec::new();
     for shape in &scene.shapes {
@@ -193,11 +199,27 @@ pub(super) fn check_far_plane(scene: &SceneFile, sensor: &Element<'_>) -> Result
     }
     let reach = |axis: usize| corners.iter().map(|c| (c[axis] - eye[axis]).abs()).fold(0.0, f64::max);
     let farthest = (reach(0).powi(2) + reach(1).powi(2) + reach(2).powi(2)).sqrt();
-    if scene.sensor.far < farthest {
-        let far = scene.sensor.far;
-        return Err(sensor.error(format!("far_clip {far} would cut the scene, which reaches {farthest:.3} away")));
+    let far = scene.sensor.far;
+    if far < farthest {
+        Err(format!("far_clip {far} would cut the scene, which reaches {farthest:.3} away"))
+    } else {
+        Ok(())
     }
-    Ok(())
+}
+
+impl SceneFile {
+    /// The same scene, seen from `origin` towards `target`, +y up. Whether the camera stands in a
+    /// medium is found from where it stands.
+    ///
+    /// # Errors
+    /// In words: a camera that looks nowhere or straight up or down, or stands where the far plane
+    /// would cut something off.
+    pub fn seen_from(mut self, origin: [f64; 3], target: [f64; 3]) -> Result<Self, String> {
+        self.sensor.to_world = Transform::look_at(origin, target, [0.0, 1.0, 0.0])
+            .ok_or("the target must lie apart from the origin, and not straight above or below it")?;
+        far_plane(&self)?;
+        Ok(self)
+    }
 }
 
 impl MediumDescription {
