@@ -1,7 +1,8 @@
 //! What the caches are filled with: the light at a point, with the sums that Eq. 34 needs.
 
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 
+use super::aim::Aims;
 use super::lookup::{Basis, Reading};
 use super::record::Facing;
 use super::store::{SurfaceCache, VolumeCache};
@@ -25,6 +26,28 @@ const MIN_COSINE: f32 = 0.05;
 
 /// A number whose multiples, wrapped, are even beside a golden-ratio lattice: the third coordinate.
 const THIRD: f32 = 0.414_213_56;
+
+/// Direction `j` of `count`, of which every other one is aimed at lights, and the density (sr⁻¹) of the mixture.
+fn aimed(
+    aims: &Aims,
+    j: u32,
+    count: u32,
+    shift: Vec2,
+    sample: impl Fn(Vec2) -> Vec3,
+    pdf: impl Fn(Vec3) -> f32,
+) -> (Vec3, f32) {
+    if aims.is_empty() {
+        let direction = sample(single_scatter::lattice(j, count, shift));
+        return (direction, pdf(direction));
+    }
+    let share = (count / 2) as f32 / count as f32;
+    let direction = if j % 2 == 0 {
+        sample(single_scatter::lattice(j / 2, count.div_ceil(2), shift))
+    } else {
+        aims.sample(single_scatter::lattice(j / 2, count / 2, shift))
+    };
+    (direction, (1.0 - share) * pdf(direction) + share * aims.pdf(direction))
+}
 
 /// Estimates the light that the caches hold.
 ///
@@ -111,14 +134,16 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
     ) -> Sums {
         let (walk, shift, third) = (self.walker(), uniform2(rng), uniform(rng));
         let share = 1.0 / paths.max(1) as f32;
+        let aims = Aims::new(point, self.world.lights);
         self.expanded(phase, higher, |into| {
             let mut cones = Cones::default();
             for j in 0..paths {
-                let to_light = warp::uniform_sphere(single_scatter::lattice(j, paths, shift));
+                let uniformly = |u| warp::uniform_sphere(u);
+                let (to_light, pdf) = aimed(&aims, j, paths, shift, uniformly, |_| warp::uniform_sphere_pdf());
                 let mut ray = Ray::new(point, to_light);
                 ray.length = nearest_surface(&ray, self.world.scene).map_or(f32::INFINITY, |hit| hit.distance);
                 let u = third + THIRD * j as f32;
-                let light = self.walked(&walk, ray, warp::uniform_sphere_pdf(), u - libm::floorf(u), rng) * share;
+                let light = self.walked(&walk, ray, pdf, u - libm::floorf(u), rng) * share;
                 let incoming = Incoming { to_light, light };
                 cones.add(to_light, &incoming.scatter_directional(into.moments, into.coefficients));
             }
@@ -153,12 +178,16 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
         let mut child = Generator::child(rng);
         let (frame, walk, shift, third) = (Frame::around(normal), self.walker(), uniform2(rng), uniform(rng));
         let share = 1.0 / paths.max(1) as f32;
+        let aims = Aims::new(point, self.world.lights);
         for j in 0..paths {
-            let u = single_scatter::lattice(j, paths, shift);
-            let to_light = frame.to_world(warp::cosine_hemisphere(u));
-            let cosine = normal.dot(to_light).max(1e-6);
-            // cos θ over density: π.
-            let weight = share * float::PI;
+            let upwards = |u| frame.to_world(warp::cosine_hemisphere(u));
+            let cosine_pdf = |direction| warp::cosine_hemisphere_pdf(normal.dot(direction).max(0.0));
+            let (to_light, pdf) = aimed(&aims, j, paths, shift, upwards, cosine_pdf);
+            let cosine = normal.dot(to_light);
+            if cosine <= 0.0 {
+                continue;
+            }
+            let weight = share * cosine / pdf;
             let mut ray = Ray::new(leave(point, normal, to_light, 0.0), to_light);
             let marching = Marching { steps: self.walk.steps, offset: uniform(rng) };
             let mut total = Contribution::ZERO;
@@ -207,7 +236,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
     }
 
     /// [`Estimator::direct`] with given random numbers for the choice of light and the point on it.
-    pub fn direct_at(&self, point: Vec3, hit: &Hit, random: (f32, glam::Vec2), rng: &mut Generator) -> Spectrum {
+    pub fn direct_at(&self, point: Vec3, hit: &Hit, random: (f32, Vec2), rng: &mut Generator) -> Spectrum {
         let origin = |to_light: Vec3| leave(point, hit.normal, to_light, hit.distance);
         let cosine = |to_light: Vec3| (Spectrum::splat(hit.normal.dot(to_light).max(0.0)), 0.0);
         next_event(&self.world, point, false, origin, cosine, random, rng)
@@ -227,7 +256,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
         hit: &Hit,
         to_eye: Vec3,
         surface: Surface,
-        random: (f32, glam::Vec2),
+        random: (f32, Vec2),
         rng: &mut Generator,
     ) -> Spectrum {
         let origin = |to_light: Vec3| leave(point, hit.normal, to_light, hit.distance);

@@ -22,9 +22,11 @@
 //! | `index` | [`Index`]: which spheres contain this point |
 //! | `store` | [`Cache`]: records, attachments, index |
 //! | `lookup` | look-ups in the medium and on surfaces |
+//! | `aim` | where random walks start towards |
 //! | `estimate` | [`Estimator`]: what records are made of |
 //! | `eye` | [`places`] and [`radiance`] of eye rays |
 
+mod aim;
 mod estimate;
 mod extrapolate;
 mod eye;

@@ -97,6 +97,13 @@ pub struct NearField {
 }
 
 impl NearField {
+    /// Its radius (m); `None` where it is all of space.
+    #[inline]
+    #[must_use]
+    pub fn radius(&self) -> Option<f32> {
+        self.radius2.is_finite().then(|| crate::math::float::sqrt(self.radius2))
+    }
+
     /// Whether the point lies inside.
     #[inline]
     #[must_use]

@@ -1,0 +1,82 @@
+//! Where random walks start towards: the surroundings of lights, from which most scattered light comes.
+
+use glam::{Vec2, Vec3};
+
+use crate::light::Light;
+use crate::math::{Frame, float};
+use crate::sampling::discrete::choose;
+use crate::sampling::warp;
+
+/// Lights aimed at, the strongest there are at a point: more spread the samples too thin to matter.
+const MOST: usize = 16;
+
+/// Radius of the ball aimed at, over that of a light's near field; fog around a light is brightest there.
+const BALL: f32 = 2.0;
+
+/// The same over the distance, for lights without extent.
+const SHARE: f32 = 0.3;
+
+/// A ball around a light that does not hold the point is seen under a cone of at most this sine.
+const WIDEST: f32 = 0.9;
+
+/// A mixture of cones towards lights: a density of directions to be mixed with a uniform one.
+#[derive(Debug, Clone)]
+pub(super) struct Aims {
+    cones: heapless::Vec<Cone, MOST>,
+    total: f32,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Cone {
+    axis: Vec3,
+    /// 1 − cos of half the opening angle.
+    height: f32,
+    weight: f32,
+}
+
+impl Aims {
+    pub(super) fn new(point: Vec3, lights: &[Light<'_>]) -> Self {
+        let mut cones = heapless::Vec::new();
+        for light in lights {
+            let Some(field) = light.near_field() else { continue };
+            let offset = field.centre() - point;
+            let distance = offset.length();
+            let radius = field.radius().map_or(SHARE * distance, |r| BALL * r);
+            let (weight, sine) = (light.importance(point), radius / distance);
+            // Written so that NaN fails, too.
+            if !(weight > 0.0 && weight < f32::INFINITY && sine < WIDEST) {
+                continue;
+            }
+            let cone = Cone { axis: offset / distance, height: 1.0 - float::safe_sqrt(1.0 - sine * sine), weight };
+            if let Err(cone) = cones.push(cone)
+                && let Some(weakest) = cones.iter_mut().min_by(|a, b| a.weight.total_cmp(&b.weight))
+                && weakest.weight < cone.weight
+            {
+                *weakest = cone;
+            }
+        }
+        let total = cones.iter().map(|cone| cone.weight).sum();
+        Self { cones, total }
+    }
+
+    pub(super) fn is_empty(&self) -> bool {
+        self.cones.is_empty()
+    }
+
+    /// A direction (unit); the first coordinate of `u` also chooses the cone.
+    pub(super) fn sample(&self, u: Vec2) -> Vec3 {
+        let Some((cone, choice)) = choose(self.cones.iter().map(|cone| (cone.weight, cone)), u.x) else {
+            return Vec3::Z;
+        };
+        let local = warp::uniform_cone(Vec2::new(choice.remainder, u.y), cone.height);
+        Frame::around(cone.axis).to_world(local)
+    }
+
+    /// Its density (sr⁻¹).
+    pub(super) fn pdf(&self, direction: Vec3) -> f32 {
+        let inside = |cone: &&Cone| 0.5 * cone.axis.distance_squared(direction) <= cone.height;
+        let sum: f32 =
+            self.cones.iter().filter(inside).map(|c| c.weight * warp::uniform_cone_pdf(c.height)).sum();
+        if self.total > 0.0 { sum / self.total } else { 0.0 }
+    }
+}
