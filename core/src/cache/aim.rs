@@ -75,8 +75,7 @@ impl Aims {
     /// Its density (sr⁻¹).
     pub(super) fn pdf(&self, direction: Vec3) -> f32 {
         let inside = |cone: &&Cone| 0.5 * cone.axis.distance_squared(direction) <= cone.height;
-        let sum: f32 =
-            self.cones.iter().filter(inside).map(|c| c.weight * warp::uniform_cone_pdf(c.height)).sum();
+        let sum: f32 = self.cones.iter().filter(inside).map(|c| c.weight * warp::uniform_cone_pdf(c.height)).sum();
         if self.total > 0.0 { sum / self.total } else { 0.0 }
     }
 }

@@ -260,9 +260,8 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
         rng: &mut Generator,
     ) -> Spectrum {
         let origin = |to_light: Vec3| leave(point, hit.normal, to_light, hit.distance);
-        let value = |to_light: Vec3| {
-            (surface.value(hit.normal, to_eye, to_light) * hit.normal.dot(to_light).max(0.0), 0.0)
-        };
+        let value =
+            |to_light: Vec3| (surface.value(hit.normal, to_eye, to_light) * hit.normal.dot(to_light).max(0.0), 0.0);
         next_event(&self.world, point, false, origin, value, random, rng)
     }
 

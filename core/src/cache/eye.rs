@@ -6,7 +6,7 @@ use super::estimate::Estimator;
 use super::lookup::{Basis, Reading};
 use super::store::{SurfaceCache, VolumeCache};
 use crate::host::{Hit, Medium, Properties, Rng, Scene};
-use crate::light::{Falloff, Light, Source};
+use crate::light::{Falloff, Source};
 use crate::march::scattering_points;
 use crate::math::{Frame, Ray};
 use crate::path::World;
@@ -239,7 +239,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized, F: FnMut(Place)> Sight for Wanted<'_
 /// Radiance that arrives at the origin of `ray`, read from caches.
 ///
 /// Light of the lights is connected to at the points of the ray unless [`Caches::single`] is there: to
-/// lights without extent and to spheres within their near field by an equiangular connection per segment.
+/// lights within whose [`Light::steep_field`] it lies by an equiangular connection per segment.
 /// Where a cache has no record at a point, one sample of what it would hold takes its place, so that
 /// gaps make noise and no holes. `estimator` brings the world; its surface cache is what such
 /// samples use.
@@ -285,12 +285,6 @@ struct Gather<'a, M: ?Sized, S: ?Sized> {
     rng: Generator,
 }
 
-/// Whether a light is joined to a point sampled around it rather than to the points of a ray.
-fn near_field(light: &Light<'_>) -> Option<crate::light::NearField> {
-    // The solid angle of a flat light, by which it is sampled, has a bound: it needs no near field.
-    if matches!(light, Light::Quad(_)) { None } else { light.near_field() }
-}
-
 impl<M: Medium + ?Sized, S: Scene + ?Sized> Gather<'_, M, S> {
     /// Single scattering at a point of the ray of one light, in whose near field it does not lie.
     fn connected(&mut self, point: Vec3, to_eye: Vec3, properties: &Properties, k: u32) -> Spectrum {
@@ -300,7 +294,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Gather<'_, M, S> {
             (x - libm::floorf(x)).min(1.0 - f32::EPSILON)
         });
         let weighted = world.lights.iter().map(|light| {
-            let is_near = near_field(light).is_some_and(|field| field.contains(point));
+            let is_near = light.steep_field().is_some_and(|field| field.contains(point));
             (if is_near { 0.0 } else { light.importance(point).min(1e30) }, light)
         });
         let Some((light, chosen)) = choose(weighted, choice) else { return Spectrum::ZERO };
@@ -314,7 +308,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Gather<'_, M, S> {
     fn near(&mut self, segment: &Ray) -> Option<Spectrum> {
         let world = &self.estimator.world;
         let reached = world.lights.iter().filter_map(|light| {
-            let centre = near_field(light)?.centre();
+            let centre = light.steep_field()?.centre();
             let interval = light.near_interval(segment, 0.0, segment.length)?;
             let along = segment.direction.dot(centre - segment.origin).clamp(interval.0, interval.1);
             let height = segment.at(along).distance(centre).max(1e-6);
@@ -340,7 +334,10 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Gather<'_, M, S> {
             return None;
         }
         let marching = Marching { steps: self.estimator.walk.steps, offset: uniform(&mut self.rng) };
-        let way = Ray { length: if source.falloff == Falloff::Distant { f32::INFINITY } else { incident.distance }, ..shadow };
+        let way = Ray {
+            length: if source.falloff == Falloff::Distant { f32::INFINITY } else { incident.distance },
+            ..shadow
+        };
         let through = transmittance(&segment.with_length(distance), world.medium, marching)
             * transmittance(&way, world.medium, marching);
         let pdf = law.pdf(distance) * chosen.probability;

@@ -207,13 +207,7 @@ impl SurfaceCache<'_> {
     }
 
     #[inline]
-    fn visit_facing(
-        &self,
-        point: Vec3,
-        normal: Vec3,
-        margin: f32,
-        mut visit: impl FnMut(&Record, &Facing, f32),
-    ) {
+    fn visit_facing(&self, point: Vec3, normal: Vec3, margin: f32, mut visit: impl FnMut(&Record, &Facing, f32)) {
         self.visit(point, |i, record, share| {
             let Some(facing) = self.attached(i).first() else { return };
             let d = 1.0 - facing_distance(point, normal, record, facing, share) - margin;
@@ -238,7 +232,9 @@ fn facing_distance(point: Vec3, normal: Vec3, record: &Record, facing: &Facing, 
 pub fn gradient_towards(cache: &VolumeCache<'_>, record: u32, basis: &Basis) -> (Spectrum, Gradient) {
     let Some(r) = cache.records().get(record as usize) else { return (Spectrum::ZERO, Gradient::ZERO) };
     let higher = basis.values.get(1..basis.count).unwrap_or(&[]);
-    cache.attached(record).iter().zip(higher).fold((r.value, r.gradient), |(value, gradient), (c, &y)| {
-        (value + c.value * y, gradient + c.gradient * y)
-    })
+    cache
+        .attached(record)
+        .iter()
+        .zip(higher)
+        .fold((r.value, r.gradient), |(value, gradient), (c, &y)| (value + c.value * y, gradient + c.gradient * y))
 }

@@ -59,8 +59,7 @@ impl Limits {
 #[must_use]
 pub fn valid_radius(sums: &Sums, tolerance: f32) -> Option<f32> {
     let mut least: Option<f32> = None;
-    let variants =
-        [(sums.value, sums.gradient_norms), (sums.unshadowed, sums.unshadowed_gradient_norms)];
+    let variants = [(sums.value, sums.gradient_norms), (sums.unshadowed, sums.unshadowed_gradient_norms)];
     for (value, norms) in variants {
         for channel in 0..3 {
             if norms[channel] > 0.0 {

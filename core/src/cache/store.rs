@@ -88,7 +88,11 @@ impl<'s, E: Pod> Cache<'s, E> {
     #[inline]
     #[must_use]
     pub fn attached(&self, record: u32) -> &[E] {
-        self.attached.as_slice().get(record as usize * self.stride..).and_then(|rest| rest.get(..self.stride)).unwrap_or(&[])
+        self.attached
+            .as_slice()
+            .get(record as usize * self.stride..)
+            .and_then(|rest| rest.get(..self.stride))
+            .unwrap_or(&[])
     }
 
     /// Bytes held by records, attachments and index.

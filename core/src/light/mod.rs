@@ -234,6 +234,16 @@ impl Light<'_> {
         Some(NearField { centre, radius2 })
     }
 
+    /// The near field of a light whose sampled irradiance at a point has no bound, or hardly one: what
+    /// cannot do without connections spread along rays. `None` for rectangles, which are sampled
+    /// by the solid angle they are seen under; around their own points, spread connections
+    /// have the heavier tail.
+    #[inline]
+    #[must_use]
+    pub fn steep_field(&self) -> Option<NearField> {
+        if matches!(self, Self::Quad(_)) { None } else { self.near_field() }
+    }
+
     /// A point of the light to spread a connection around, before it is known where on a ray the
     /// connection starts. The source is `None` for a sphere, whose visible cap has to be sampled
     /// from there.

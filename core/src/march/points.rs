@@ -97,7 +97,8 @@ pub fn scattering_points(
                 let lengths = extinction.map(|sigma| attenuated_length(sigma, end - at));
                 emitted += thickness.transmitted() * properties.emission * lengths;
             }
-            thickness = if count == 1 { before + extinction * (end - start) } else { thickness + extinction * (end - at) };
+            thickness =
+                if count == 1 { before + extinction * (end - start) } else { thickness + extinction * (end - at) };
             // 0 · ∞
             thickness = thickness.map(|t| if t.is_nan() { 0.0 } else { t });
             at = end;

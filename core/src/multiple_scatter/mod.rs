@@ -9,7 +9,7 @@
 //! start; phase functions, densities, lengths and roulette are frozen. Departs from the paper:
 //!
 //! - lengths come from delta tracking, which suits heterogeneous media; Eq. 29 remains as a choice;
-//! - within its near field ([`Light::near_field`](crate::light::Light::near_field): all of space for
+//! - within its near field ([`Light::steep_field`](crate::light::Light::steep_field): all of space for
 //!   lights without extent) a light is joined not to the collisions but to a point of every segment,
 //!   sampled equiangularly (Kulla and Fajardo 2012), which takes the `1/ρ²` out along the segment.
 //!   What is left of `‖∇L‖` still diverges logarithmically, so the fall-off of lights without extent

@@ -186,7 +186,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Walk<'_, M, S> {
     /// Single scattering at a vertex of the lights in whose near field it does not lie.
     fn lights_at(&self, at: Vec3, to_eye: Vec3, properties: &Properties, rng: &mut Generator) -> Contribution {
         let importance = |light: &Light<'_>| {
-            let near = light.near_field().is_some_and(|field| field.contains(at));
+            let near = light.steep_field().is_some_and(|field| field.contains(at));
             if near { 0.0 } else { light.importance(at) }
         };
         self.each_light(importance, rng, |light, share, rng| {
@@ -200,7 +200,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Walk<'_, M, S> {
 
     /// Light scattered somewhere along a segment within a light's near field, carried to the start.
     fn near_lights(&self, ray: &Ray, weight: &Weight, kappa: Spectrum, rng: &mut Generator) -> Contribution {
-        let importance = |light: &Light<'_>| match light.near_field() {
+        let importance = |light: &Light<'_>| match light.steep_field() {
             Some(field) => light.intensity() / height(ray, field.centre()),
             None => 0.0,
         };

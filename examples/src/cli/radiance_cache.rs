@@ -171,7 +171,10 @@ impl WithMedium for CacheJob<'_> {
             world: PathWorld { medium, scene: self.world, lights: self.lights },
             surfaces: None,
             scattered: None,
-            walk: multiple_scatter::Settings { one_light: self.lights.len() > 1, ..multiple_scatter::Settings::new(steps) },
+            walk: multiple_scatter::Settings {
+                one_light: self.lights.len() > 1,
+                ..multiple_scatter::Settings::new(steps)
+            },
             paths: self.paths,
             light_samples: 16,
         };

@@ -108,7 +108,8 @@ impl Report<'_> {
             let _ = write!(phases, "{comma}\n    {}: {{\"wall\": {:.6}, \"cpu\": {cpu}}}", quoted(name), seconds.wall);
         }
         let listed = |counts: &[(String, u64)]| {
-            let entries: Vec<String> = counts.iter().map(|(name, count)| format!("{}: {count}", quoted(name))).collect();
+            let entries: Vec<String> =
+                counts.iter().map(|(name, count)| format!("{}: {count}", quoted(name))).collect();
             entries.join(", ")
         };
         let (bytes, records) = (listed(&self.statistics.bytes), listed(&self.statistics.records));
