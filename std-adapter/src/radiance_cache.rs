@@ -302,7 +302,7 @@ where
             let clock = Stopwatch::start();
             // The first records come from whole walks. The final ones end theirs at those.
             let mut first: VolumeCache<'static> = Cache::growing(cache.stride());
-            let rough = effort.coarser(1.0, 2);
+            let rough = effort.coarser(1.5, 1);
             outcome.computed[2] = self.multiple(&mut first, &rough, 5, &all, surface, None, &estimator);
             let known = Some((&first, self.settings.reading(&rough)));
             outcome.computed[2] += self.multiple(cache, &effort, 2, &all, surface, known, &estimator);

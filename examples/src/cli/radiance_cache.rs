@@ -147,7 +147,7 @@ impl CacheJob<'_> {
         };
         cache::Settings {
             single: if cached { effort(Kind::Single, 0.2, 16.0, degree(1, 0.0), 0.1) } else { None },
-            surface: effort(Kind::Surface, 2.0, 256.0, degree(1, 1.0), 0.1),
+            surface: effort(Kind::Surface, 2.0, 256.0, degree(1, 1.5), 0.1),
             multiple: effort(Kind::Multiple, 1.0, 512.0, degree(2, 0.0), 0.1),
             irradiance: effort(Kind::Irradiance, 0.35, 256.0, 0, 0.1),
             rays: 16384,
@@ -161,7 +161,7 @@ impl CacheJob<'_> {
     }
 }
 
-/// The least degree beyond which an expansion holds less than a twentieth of the phase function, applied
+/// The least degree beyond which an expansion holds less than a sixtieth of the phase function, applied
 /// `power` times, to light whose own expansion falls off like `1/(l + 1)^damping`.
 fn degree_for(phase: &Phase, power: i32, damping: f32) -> usize {
     let energy = |l: usize| {
@@ -172,7 +172,7 @@ fn degree_for(phase: &Phase, power: i32, damping: f32) -> usize {
     let mut rest = total;
     for l in 0..=fogbow::sh::MAX_DEGREE {
         rest -= energy(l);
-        if rest <= 0.0025 * total {
+        if rest <= 2.5e-4 * total {
             return l;
         }
     }
