@@ -7,7 +7,7 @@
 
 use std::path::PathBuf;
 
-use fogbow::cache::{Estimator, EyeSettings, Place, places};
+use fogbow::cache::{Estimator, Extrapolation, EyeSettings, Limits, Place, places};
 use fogbow::host::Medium;
 use fogbow::math::{Vec2, Vec3};
 use fogbow::multiple_scatter;
@@ -17,8 +17,11 @@ use fogbow::sampling::Generator;
 use fogbow::sh::Coefficient;
 use fogbow::single_scatter::Sums;
 use fogbow::transmittance::thickness::Steps;
+use fogbow_examples::camera::Camera;
 use fogbow_examples::scene_file::SceneFile;
 use fogbow_examples::world::{Storage, WithMedium, World};
+use fogbow_std::progress::Control;
+use fogbow_std::radiance_cache::{Effort, RadianceCaches, Settings, fill};
 use fogbow_std::stats::Stopwatch;
 
 const SAMPLES: u32 = 256;
@@ -49,7 +52,56 @@ impl WithMedium for Job<'_> {
                 }
             });
         }
-        println!("{:12} {:>7} {:>12} {:>10} {:>14}", "kind", "places", "us/sample", "noise", "noise^2 * us");
+        let caches = filled(&estimator, &camera, REACH * self.0.bounds().size().max_element());
+        let read = caches.reader();
+        let known = read.surface.zip(read.multiple).map(|(s, m)| [(s.cache, s.reading), (m.cache, m.reading)]);
+        let surfaces = read.irradiance.map(|r| (r.cache, r.reading));
+        for (name, estimator) in [
+            ("nothing cached", estimator),
+            ("surfaces cached", Estimator { surfaces, ..estimator }),
+            ("everything cached", Estimator { surfaces, scattered: known, ..estimator }),
+        ] {
+            println!("{name}");
+            println!("  {:10} {:>7} {:>12} {:>10} {:>14}", "kind", "places", "us/sample", "noise", "noise^2 * us");
+            measure(&estimator, &found);
+        }
+    }
+}
+
+/// Greatest radius over the size of the scene.
+const REACH: f32 = 0.1;
+
+fn filled<M: Medium + Sync>(
+    estimator: &Estimator<'_, M, World<'_>>,
+    camera: &Camera,
+    most: f32,
+) -> RadianceCaches {
+    let effort = |tolerance| {
+        Some(Effort { tolerance, samples: SAMPLES, degree: 0, limits: Limits { min: 0.01 * most, max: most } })
+    };
+    let mut caches = RadianceCaches::new(Settings {
+        single: None,
+        surface: effort(2.0),
+        multiple: effort(1.0),
+        irradiance: effort(0.7),
+        rays: 4096,
+        extrapolation: Extrapolation::default(),
+        margin: 0.1,
+        pixels: (1.5, 64.0),
+        round: 64,
+        threads: 0,
+        seed: 1,
+    });
+    let eye = EyeSettings { density: 8.0, lights_visible: true, indirect: true };
+    let ray = |at: [f32; 2]| camera.ray(Vec2::from(at));
+    if let Err(error) = fill(&mut caches, estimator, &eye, 0.005, &Control::default(), ray) {
+        eprintln!("{error}");
+    }
+    caches
+}
+
+fn measure<M: Medium>(estimator: &Estimator<'_, M, World<'_>>, found: &[Place]) {
+    {
         let medium_places = || found.iter().filter(|p| p.normal.is_none()).map(|p| (p.point, Vec3::Z));
         let surface_places = || found.iter().filter_map(|p| Some((p.point, p.normal?)));
         let phase: Phase = estimator.phase(medium_places().next().map_or(Vec3::ZERO, |p| p.0));
@@ -82,7 +134,7 @@ fn report(
     let each = 1e6 * seconds / (f64::from(count.max(1)) * REPEATS as f64 * f64::from(SAMPLES));
     let variance = noise / f64::from(count.max(1));
     let worth = variance * each * f64::from(SAMPLES);
-    println!("{name:12} {count:>7} {each:>12.3} {:>9.1}% {worth:>14.3}", 100.0 * variance.sqrt());
+    println!("  {name:10} {count:>7} {each:>12.3} {:>9.1}% {worth:>14.3}", 100.0 * variance.sqrt());
 }
 
 fn main() -> Result<(), Box<dyn core::error::Error>> {

@@ -9,7 +9,7 @@ use core::fmt;
 
 use fogbow::cache::{
     Cache, Caches, Estimator, Extrapolation, EyeSettings, Facing, Limits, Place, Reader, Reading, Record, SurfaceCache, VolumeCache,
-    places,
+    clamp_gradient, places,
 };
 use fogbow::host::{Medium, Scene};
 use fogbow::math::{Ray, Vec3};
@@ -17,6 +17,7 @@ use fogbow::sampling::Generator;
 use fogbow::sampling::uniform::mix;
 use fogbow::sh::{Coefficient, coefficient_count};
 use fogbow::single_scatter::Sums;
+use fogbow::spectrum::{Gradient, Spectrum};
 use rayon::iter::{IntoParallelIterator, IntoParallelRefIterator, ParallelIterator};
 
 use crate::progress::Control;
@@ -123,6 +124,10 @@ impl RadianceCaches {
         }
     }
 
+    fn lighting(&self) -> Option<(&SurfaceCache<'_>, Reading)> {
+        self.reader().irradiance.map(|r| (r.cache, r.reading))
+    }
+
     /// Records and bytes of every cache; zeros for those that are off.
     #[must_use]
     pub fn counts(&self) -> [(usize, usize); 4] {
@@ -214,6 +219,10 @@ trait Fill: Sync {
     fn guess(&self, place: &Place) -> Option<f32>;
     fn add(&mut self, record: Record, attached: Self::Attached) -> bool;
     fn finish(&mut self);
+    fn count(&self) -> u32;
+    fn place(&self, record: u32) -> Place;
+    fn replace(&mut self, record: u32, value: Spectrum, gradient: &Gradient, attached: Self::Attached);
+    fn radius(&self, record: u32) -> f32;
 }
 
 impl Fill for VolumeCache<'_> {
@@ -227,6 +236,18 @@ impl Fill for VolumeCache<'_> {
     fn add(&mut self, record: Record, higher: Vec<Coefficient>) -> bool {
         // Storage that grows is never full.
         self.insert(record, &higher) == Ok(true)
+    }
+    fn count(&self) -> u32 {
+        self.len() as u32
+    }
+    fn place(&self, record: u32) -> Place {
+        Place { point: self.records()[record as usize].position, normal: None, is_seen: true }
+    }
+    fn replace(&mut self, record: u32, value: Spectrum, gradient: &Gradient, higher: Vec<Coefficient>) {
+        self.revise(record, value, gradient, &higher);
+    }
+    fn radius(&self, record: u32) -> f32 {
+        self.records()[record as usize].radius
     }
     fn finish(&mut self) {
         let _ = Cache::finish(self);
@@ -244,6 +265,19 @@ impl Fill for SurfaceCache<'_> {
     fn add(&mut self, record: Record, facing: Facing) -> bool {
         self.insert(record, &[facing]) == Ok(true)
     }
+    fn count(&self) -> u32 {
+        self.len() as u32
+    }
+    fn place(&self, record: u32) -> Place {
+        let normal = self.attached(record).first().map(|facing| facing.normal);
+        Place { point: self.records()[record as usize].position, normal, is_seen: false }
+    }
+    fn replace(&mut self, record: u32, value: Spectrum, gradient: &Gradient, facing: Facing) {
+        self.revise(record, value, gradient, &[facing]);
+    }
+    fn radius(&self, record: u32) -> f32 {
+        self.records()[record as usize].radius
+    }
     fn finish(&mut self) {
         let _ = Cache::finish(self);
     }
@@ -252,7 +286,63 @@ impl Fill for SurfaceCache<'_> {
 /// Records that end walks are carried along their gradients: what noise adds in one bounce would be
 /// carried into the next by exponentials.
 fn straight<'a>(known: [(&'a VolumeCache<'a>, Reading); 2]) -> [(&'a VolumeCache<'a>, Reading); 2] {
-    known.map(|(cache, reading)| (cache, Reading { extrapolation: Extrapolation::Linear, ..reading }))
+    known.map(|(cache, reading)| (cache, Reading { extrapolation: match fogbow::cache::tune(2) { 0 => Extrapolation::Linear, 1 => Extrapolation::ExponentialMean, 2 => Extrapolation::Constant, _ => Extrapolation::Exponential }, margin: fogbow::cache::tune(3) as f32 * 0.1, ..reading }))
+}
+
+/// How often rough caches are revised: every time halves what is left of their first noise and more.
+const REVISIONS: u64 = 2;
+
+/// What light a record in the medium holds.
+#[derive(Clone, Copy)]
+enum Part {
+    Single,
+    Surface,
+    Multiple,
+}
+
+/// An estimate for a record in the medium.
+fn scattered<M: Medium + ?Sized, S: Scene + ?Sized>(
+    cache: &VolumeCache<'_>,
+    estimator: &Estimator<'_, M, S>,
+    effort: &Effort,
+    place: &Place,
+    rng: &mut Generator,
+    part: Part,
+) -> (Sums, Vec<Coefficient>) {
+    let mut higher = vec![Coefficient::ZERO; cache.stride()];
+    let phase = estimator.phase(place.point);
+    let sums = match part {
+        Part::Single => estimator.single(place.point, &phase, &mut higher, rng),
+        Part::Surface => estimator.surface(place.point, &phase, effort.samples, &mut higher, rng),
+        Part::Multiple => estimator.multiple(place.point, &phase, effort.samples, &mut higher, rng),
+    };
+    (sums, higher)
+}
+
+/// An estimate for a record on a surface.
+fn irradiance<M: Medium + ?Sized, S: Scene + ?Sized>(
+    estimator: &Estimator<'_, M, S>,
+    effort: &Effort,
+    place: &Place,
+    rng: &mut Generator,
+) -> (Sums, Facing) {
+    estimator.irradiance(place.point, place.normal.unwrap_or(Vec3::Z), effort.samples, rng)
+}
+
+/// Puts revised estimates in the place of the old ones.
+fn put<C: Fill>(
+    cache: Option<&mut C>,
+    effort: Option<Effort>,
+    revised: Option<Vec<(Sums, C::Attached)>>,
+    computed: &mut u64,
+) {
+    let (Some(cache), Some(effort), Some(revised)) = (cache, effort, revised) else { return };
+    *computed += revised.len() as u64;
+    for (i, (sums, attached)) in (0..).zip(revised) {
+        // Within its radius a record changes by a factor of e to the tolerance at most.
+        let gradient = clamp_gradient(&sums.gradient, sums.value, cache.radius(i) / effort.tolerance);
+        cache.replace(i, sums.value, &gradient, attached);
+    }
 }
 
 impl<M, S, F> Filler<'_, M, S, F>
@@ -269,92 +359,130 @@ where
         let in_medium = |place: &Place| place.normal.is_none();
         let in_sight = |place: &Place| place.normal.is_some() && place.is_seen;
 
-        // What lights everything else: coarse, because whoever asks sees many records at once.
-        let coarse = settings.irradiance.map(|effort| {
-            let effort = effort.coarser(4.0, 2);
-            let mut cache: SurfaceCache<'static> = Cache::growing(1);
-            let clock = Stopwatch::start();
-            outcome.computed[3] += self.irradiance(&mut cache, &effort, 4, &all, everywhere, self.estimator);
-            outcome.seconds[3] = clock.elapsed();
-            (cache, self.settings.reading(&effort))
+        // What lights everything else: coarse, because whoever asks sees many records at once. Made
+        // by whole walks, then revised with what those have told.
+        let clock = Stopwatch::start();
+        let mut rough = RadianceCaches::new(Settings {
+            single: None,
+            surface: settings.surface.map(|effort| effort.coarser(1.5, 2)),
+            multiple: settings.multiple.map(|effort| effort.coarser(1.5, 1)),
+            irradiance: settings.irradiance.map(|effort| effort.coarser(4.0, 2)),
+            ..*settings
         });
-        let surfaces = coarse.as_ref().map(|(cache, reading)| (cache, *reading));
-        let estimator = Estimator { surfaces, ..*self.estimator };
+        if let (Some(cache), Some(effort)) = (&mut rough.irradiance, rough.settings.irradiance) {
+            outcome.computed[3] += self.rounds(cache, &effort, 4, &all, everywhere, |cache, place, rng| {
+                let surfaces = Some((cache, settings.reading(&effort)));
+                irradiance(&Estimator { surfaces, ..*self.estimator }, &effort, place, rng)
+            });
+        }
+        outcome.seconds[3] = clock.elapsed();
+        let clock = Stopwatch::start();
+        let mut surface = rough.surface.take();
+        if let (Some(cache), Some(effort)) = (&mut surface, rough.settings.surface) {
+            let estimator = Estimator { surfaces: rough.lighting(), ..*self.estimator };
+            outcome.computed[1] += self.rounds(cache, &effort, 6, &all, in_medium, |cache, place, rng| {
+                scattered(cache, &estimator, &effort, place, rng, Part::Surface)
+            });
+        }
+        rough.surface = surface;
+        outcome.seconds[1] = clock.elapsed();
+        let clock = Stopwatch::start();
+        let mut multiple = rough.multiple.take();
+        if let (Some(cache), Some(effort)) = (&mut multiple, rough.settings.multiple) {
+            let estimator = Estimator { surfaces: rough.lighting(), ..*self.estimator };
+            let surface = rough.reader().surface;
+            outcome.computed[2] += self.rounds(cache, &effort, 5, &all, in_medium, |cache, place, rng| {
+                let known = surface.map(|s| [(s.cache, s.reading), (cache, settings.reading(&effort))]);
+                let estimator = Estimator { scattered: known.map(straight), ..estimator };
+                scattered(cache, &estimator, &effort, place, rng, Part::Multiple)
+            });
+        }
+        rough.multiple = multiple;
+        outcome.seconds[2] = clock.elapsed();
+        for pass in 0..REVISIONS {
+            self.revise(&mut rough, pass, &mut outcome);
+        }
+
+        let estimator = Estimator { surfaces: rough.lighting(), ..*self.estimator };
         if let (Some(cache), Some(effort)) = (&mut caches.single, settings.single) {
             let clock = Stopwatch::start();
             outcome.computed[0] = self.rounds(cache, &effort, 0, &all, in_medium, |cache, place, rng| {
-                let mut higher = vec![Coefficient::ZERO; cache.stride()];
-                (estimator.single(place.point, &estimator.phase(place.point), &mut higher, rng), higher)
+                scattered(cache, &estimator, &effort, place, rng, Part::Single)
             });
             outcome.seconds[0] = clock.elapsed();
         }
         if let (Some(cache), Some(effort)) = (&mut caches.surface, settings.surface) {
             let clock = Stopwatch::start();
-            outcome.computed[1] = self.rounds(cache, &effort, 1, &all, in_medium, |cache, place, rng| {
-                let mut higher = vec![Coefficient::ZERO; cache.stride()];
-                let phase = estimator.phase(place.point);
-                (estimator.surface(place.point, &phase, effort.samples, &mut higher, rng), higher)
+            outcome.computed[1] += self.rounds(cache, &effort, 1, &all, in_medium, |cache, place, rng| {
+                scattered(cache, &estimator, &effort, place, rng, Part::Surface)
             });
-            outcome.seconds[1] = clock.elapsed();
+            outcome.seconds[1] = outcome.seconds[1] + clock.elapsed();
         }
         let surface = caches.surface.as_ref().zip(settings.surface).map(|(c, e)| (c, settings.reading(&e)));
         if let (Some(cache), Some(effort)) = (&mut caches.multiple, settings.multiple) {
             let clock = Stopwatch::start();
-            // The first records come from whole walks. The final ones end theirs at those.
-            let mut first: VolumeCache<'static> = Cache::growing(cache.stride());
-            let rough = effort.coarser(1.5, 1);
-            outcome.computed[2] = self.multiple(&mut first, &rough, 5, &all, surface, None, &estimator);
-            let known = Some((&first, self.settings.reading(&rough)));
-            outcome.computed[2] += self.multiple(cache, &effort, 2, &all, surface, known, &estimator);
-            outcome.seconds[2] = clock.elapsed();
+            let known = surface.zip(rough.reader().multiple).map(|(s, m)| [s, (m.cache, m.reading)]);
+            let estimator = Estimator { scattered: known.map(straight), ..estimator };
+            outcome.computed[2] += self.rounds(cache, &effort, 2, &all, in_medium, |cache, place, rng| {
+                scattered(cache, &estimator, &effort, place, rng, Part::Multiple)
+            });
+            outcome.seconds[2] = outcome.seconds[2] + clock.elapsed();
         }
         let multiple = caches.multiple.as_ref().zip(settings.multiple).map(|(c, e)| (c, settings.reading(&e)));
         if let (Some(cache), Some(effort)) = (&mut caches.irradiance, settings.irradiance) {
             let clock = Stopwatch::start();
-            let scattered = surface.zip(multiple).map(|(surface, multiple)| [surface, multiple]);
-            let estimator = Estimator { scattered: scattered.map(straight), ..estimator };
-            outcome.computed[3] += self.irradiance(cache, &effort, 3, &all, in_sight, &estimator);
+            let known = surface.zip(multiple).map(|(surface, multiple)| straight([surface, multiple]));
+            let estimator = Estimator { scattered: known, ..estimator };
+            outcome.computed[3] += self.rounds(cache, &effort, 3, &all, in_sight, |_, place, rng| {
+                irradiance(&estimator, &effort, place, rng)
+            });
             outcome.seconds[3] = outcome.seconds[3] + clock.elapsed();
         }
         outcome.cancelled = self.control.is_cancelled();
         outcome
     }
 
-    fn irradiance(
-        &self,
-        cache: &mut SurfaceCache<'_>,
-        effort: &Effort,
-        stream: u64,
-        all: &[Vec<Wanted>],
-        is_for: impl Fn(&Place) -> bool,
-        estimator: &Estimator<'_, M, S>,
-    ) -> u64 {
-        self.rounds(cache, effort, stream, all, is_for, |cache, place, rng| {
-            let own = Some((cache, self.settings.reading(&effort)));
-            let estimator = Estimator { surfaces: estimator.surfaces.or(own), ..*estimator };
-            estimator.irradiance(place.point, place.normal.unwrap_or(Vec3::Z), effort.samples, rng)
-        })
+    /// Estimates all records of the rough caches once more, with everything they know of each other.
+    fn revise(&self, rough: &mut RadianceCaches, pass: u64, outcome: &mut Outcome) {
+        let settings = rough.settings;
+        let read = rough.reader();
+        let surfaces = read.irradiance.map(|r| (r.cache, r.reading));
+        let known = read.surface.zip(read.multiple).map(|(s, m)| straight([(s.cache, s.reading), (m.cache, m.reading)]));
+        let estimator = Estimator { surfaces, scattered: known, ..*self.estimator };
+        let clock = Stopwatch::start();
+        let on_surfaces = rough.irradiance.as_ref().zip(settings.irradiance).map(|(cache, effort)| {
+            self.revised(cache, 16 + 4 * pass, |place, rng| irradiance(&estimator, &effort, place, rng))
+        });
+        let done = clock.elapsed();
+        outcome.seconds[3] = outcome.seconds[3] + done;
+        let clock = Stopwatch::start();
+        let multiple = rough.multiple.as_ref().zip(settings.multiple).map(|(cache, effort)| {
+            self.revised(cache, 17 + 4 * pass, |place, rng| {
+                scattered(cache, &estimator, &effort, place, rng, Part::Multiple)
+            })
+        });
+        outcome.seconds[2] = outcome.seconds[2] + clock.elapsed();
+        let clock = Stopwatch::start();
+        let surface = rough.surface.as_ref().zip(settings.surface).map(|(cache, effort)| {
+            self.revised(cache, 18 + 4 * pass, |place, rng| {
+                scattered(cache, &estimator, &effort, place, rng, Part::Surface)
+            })
+        });
+        outcome.seconds[1] = outcome.seconds[1] + clock.elapsed();
+        put(rough.irradiance.as_mut(), settings.irradiance, on_surfaces, &mut outcome.computed[3]);
+        put(rough.multiple.as_mut(), settings.multiple, multiple, &mut outcome.computed[2]);
+        put(rough.surface.as_mut(), settings.surface, surface, &mut outcome.computed[1]);
     }
 
-    fn multiple(
+    fn revised<C: Fill>(
         &self,
-        cache: &mut VolumeCache<'_>,
-        effort: &Effort,
+        cache: &C,
         stream: u64,
-        all: &[Vec<Wanted>],
-        surface: Option<(&VolumeCache<'_>, Reading)>,
-        known: Option<(&VolumeCache<'_>, Reading)>,
-        estimator: &Estimator<'_, M, S>,
-    ) -> u64 {
-        let is_for = |place: &Place| place.normal.is_none();
-        self.rounds(cache, effort, stream, all, is_for, |cache, place, rng| {
-            let own = (cache, self.settings.reading(&effort));
-            let scattered = surface.map(|surface| [surface, known.unwrap_or(own)]);
-            let estimator = Estimator { scattered: scattered.map(straight), ..*estimator };
-            let mut higher = vec![Coefficient::ZERO; cache.stride()];
-            let phase = estimator.phase(place.point);
-            (estimator.multiple(place.point, &phase, effort.samples, &mut higher, rng), higher)
-        })
+        compute: impl Fn(&Place, &mut Generator) -> (Sums, C::Attached) + Sync,
+    ) -> Vec<(Sums, C::Attached)> {
+        let seed = mix(self.settings.seed ^ mix(stream + 1));
+        let number = |i: u32| compute(&cache.place(i), &mut Generator::new(seed ^ u64::from(i)));
+        (0..cache.count()).into_par_iter().map(number).collect()
     }
 
     /// Every place that eye rays ask for, in batches from coarse to fine.

@@ -151,7 +151,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
             }
             let (mut sums, trust) = (cones.sums(), halves.trust());
             sums.gradient = sums.gradient * trust;
-            into.coefficients.iter_mut().for_each(|c| c.gradient = c.gradient * trust);
+            if super::tune(1) == 0 { into.coefficients.iter_mut().for_each(|c| c.gradient = c.gradient * trust); }
             sums
         })
     }
@@ -344,6 +344,7 @@ impl Halves {
     }
 
     fn trust(&self) -> Spectrum {
+        if super::tune(0) == 1 { return Spectrum::ONE; }
         let [a, b] = self.0;
         // Scaled, so that squares stay in the range of f32.
         let largest = a.norm().max(b.norm());

@@ -44,3 +44,8 @@ pub use lookup::{Basis, Reading, gradient_towards};
 pub use radius::{Limits, clamp_gradient, log_gradient_radius, neighbour_clamped, valid_radius};
 pub use record::{Facing, Record};
 pub use store::{Cache, SurfaceCache, VolumeCache};
+
+#[allow(missing_docs)]
+pub static TUNE: [core::sync::atomic::AtomicU32; 8] = [const { core::sync::atomic::AtomicU32::new(0) }; 8];
+#[allow(missing_docs)]
+pub fn tune(i: usize) -> u32 { TUNE[i].load(core::sync::atomic::Ordering::Relaxed) }

@@ -188,6 +188,7 @@ impl WithMedium for CacheJob<'_> {
             let mean = |p: &Phase| p.moment(1).max_element().abs();
             mean(a).total_cmp(&mean(b))
         });
+        for (i, v) in std::env::var("TUNE").unwrap_or_default().split(',').enumerate() { if let Ok(v) = v.parse() { fogbow::cache::TUNE[i].store(v, core::sync::atomic::Ordering::Relaxed); } }
         let settings = self.efforts(&sharpest.unwrap_or(Phase::ISOTROPIC));
         let eye = EyeSettings {
             density: 8.0,
