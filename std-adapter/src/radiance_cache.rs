@@ -5,8 +5,11 @@
 //! one of the same round now covers. First the cache on surfaces, because light from surfaces enters all
 //! others.
 
+mod file;
+
 use core::fmt;
 
+use fogbow::cache::bytes::Crc;
 use fogbow::cache::{
     Cache, Caches, Estimator, EyeSettings, Facing, Limits, Place, Reader, Reading, Record, SurfaceCache, VolumeCache,
     places,
@@ -21,6 +24,8 @@ use rayon::iter::{IntoParallelIterator, IntoParallelRefIterator, ParallelIterato
 
 use crate::progress::Control;
 use crate::stats::{Seconds, Stopwatch};
+
+pub use file::{FileError, Problem, load, save};
 
 /// One cache's share of quality and effort.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -67,7 +72,37 @@ pub struct Settings {
     pub seed: u64,
 }
 
-/// Filled caches.
+impl Default for Settings {
+    /// No caches; what else is good for pictures.
+    fn default() -> Self {
+        Self {
+            single: None,
+            surface: None,
+            multiple: None,
+            irradiance: None,
+            rays: 16384,
+            margin: 0.15,
+            pixels: (1.5, 64.0),
+            round: 64,
+            threads: 0,
+            seed: 0,
+        }
+    }
+}
+
+impl Settings {
+    /// Of the records on surfaces that light all other records.
+    fn coarse_irradiance(&self) -> Option<Effort> {
+        self.irradiance.map(|effort| effort.coarser(FIRST_SAMPLES))
+    }
+
+    /// Of the records at which random walks of the final ones end.
+    fn coarse_multiple(&self) -> Option<Effort> {
+        self.multiple.map(|effort| effort.coarser(1))
+    }
+}
+
+/// Filled caches. They may be filled again for another view, and then gain what is missing.
 #[derive(Debug)]
 pub struct RadianceCaches {
     /// What they were filled with.
@@ -80,6 +115,12 @@ pub struct RadianceCaches {
     pub multiple: Option<VolumeCache<'static>>,
     /// As [`Settings::irradiance`].
     pub irradiance: Option<SurfaceCache<'static>>,
+    /// Serves the making of [`RadianceCaches::multiple`] alone.
+    pub coarse_multiple: Option<VolumeCache<'static>>,
+    /// Serves the making of all others.
+    pub coarse_irradiance: Option<SurfaceCache<'static>>,
+    /// Marks of the views that were filled to the end: for them nothing is missing.
+    pub views: Vec<u64>,
 }
 
 /// Names of the caches, in the order of [`RadianceCaches::counts`].
@@ -96,6 +137,9 @@ impl RadianceCaches {
             surface: volume(settings.surface),
             multiple: volume(settings.multiple),
             irradiance: settings.irradiance.map(|_| Cache::growing(1)),
+            coarse_multiple: volume(settings.coarse_multiple()),
+            coarse_irradiance: settings.coarse_irradiance().map(|_| Cache::growing(1)),
+            views: Vec::new(),
         }
     }
 
@@ -206,6 +250,7 @@ trait Fill: Sync {
     fn is_covered(&self, place: &Place, reading: &Reading) -> bool;
     fn guess(&self, place: &Place) -> Option<f32>;
     fn add(&mut self, record: Record, attached: Self::Attached) -> bool;
+    fn count(&self) -> usize;
     fn finish(&mut self);
 }
 
@@ -220,6 +265,9 @@ impl Fill for VolumeCache<'_> {
     fn add(&mut self, record: Record, higher: Vec<Coefficient>) -> bool {
         // Storage that grows is never full.
         self.insert(record, &higher) == Ok(true)
+    }
+    fn count(&self) -> usize {
+        self.len()
     }
     fn finish(&mut self) {
         let _ = Cache::finish(self);
@@ -237,6 +285,9 @@ impl Fill for SurfaceCache<'_> {
     fn add(&mut self, record: Record, facing: Facing) -> bool {
         self.insert(record, &[facing]) == Ok(true)
     }
+    fn count(&self) -> usize {
+        self.len()
+    }
     fn finish(&mut self) {
         let _ = Cache::finish(self);
     }
@@ -250,22 +301,28 @@ where
 {
     fn fill(&self, caches: &mut RadianceCaches) -> Outcome {
         let mut outcome = Outcome::default();
+        let view = self.view();
+        if caches.views.contains(&view) {
+            return outcome;
+        }
         let all = self.all_places();
         let settings = self.settings;
         let everywhere = |place: &Place| place.normal.is_some();
         let in_medium = |place: &Place| place.normal.is_none();
         let in_sight = |place: &Place| place.normal.is_some() && place.is_seen;
+        if self.are_covered(caches, &all) {
+            caches.views.push(view);
+            return outcome;
+        }
 
         // What lights everything else: coarse, because whoever asks sees many records at once.
-        let coarse = settings.irradiance.map(|effort| {
-            let effort = effort.coarser(FIRST_SAMPLES);
-            let mut cache: SurfaceCache<'static> = Cache::growing(1);
+        if let (Some(cache), Some(effort)) = (&mut caches.coarse_irradiance, settings.coarse_irradiance()) {
             let clock = Stopwatch::start();
-            outcome.computed[3] += self.irradiance(&mut cache, &effort, 4, &all, everywhere, self.estimator);
+            outcome.computed[3] += self.irradiance(cache, &effort, 4, &all, everywhere, self.estimator);
             outcome.seconds[3] = clock.elapsed();
-            (cache, Reading::new(effort.tolerance))
-        });
-        let surfaces = coarse.as_ref().map(|(cache, reading)| (cache, *reading));
+        }
+        let coarse = caches.coarse_irradiance.as_ref().zip(settings.coarse_irradiance());
+        let surfaces = coarse.map(|(cache, effort)| (cache, Reading::new(effort.tolerance)));
         let estimator = Estimator { surfaces, ..*self.estimator };
         if let (Some(cache), Some(effort)) = (&mut caches.single, settings.single) {
             let clock = Stopwatch::start();
@@ -285,13 +342,13 @@ where
             outcome.seconds[1] = clock.elapsed();
         }
         let surface = caches.surface.as_ref().zip(settings.surface).map(|(c, e)| (c, Reading::new(e.tolerance)));
-        if let (Some(cache), Some(effort)) = (&mut caches.multiple, settings.multiple) {
+        if let (Some(cache), Some(effort), Some(first), Some(rough)) =
+            (&mut caches.multiple, settings.multiple, &mut caches.coarse_multiple, settings.coarse_multiple())
+        {
             let clock = Stopwatch::start();
             // The first records come from whole walks. The final ones end theirs at those.
-            let mut first: VolumeCache<'static> = Cache::growing(cache.stride());
-            let rough = effort.coarser(1);
-            outcome.computed[2] = self.multiple(&mut first, &rough, 5, &all, surface, None, &estimator);
-            let known = Some((&first, Reading::new(rough.tolerance)));
+            outcome.computed[2] = self.multiple(first, &rough, 5, &all, surface, None, &estimator);
+            let known = Some((&*first, Reading::new(rough.tolerance)));
             outcome.computed[2] += self.multiple(cache, &effort, 2, &all, surface, known, &estimator);
             outcome.seconds[2] = clock.elapsed();
         }
@@ -304,7 +361,45 @@ where
             outcome.seconds[3] = outcome.seconds[3] + clock.elapsed();
         }
         outcome.cancelled = self.control.is_cancelled();
+        if !outcome.cancelled {
+            caches.views.push(view);
+        }
         outcome
+    }
+
+    /// A mark of where the eye rays go and how densely places are asked for.
+    fn view(&self) -> u64 {
+        let Settings { rays, margin, pixels, round, seed, .. } = *self.settings;
+        let EyeSettings { density, lights_visible, indirect } = *self.eye;
+        let mut crc = Crc::new();
+        let mut add = |numbers: &[f32]| numbers.iter().for_each(|n| crc.add(&n.to_bits().to_le_bytes()));
+        add(&[margin, pixels.0, pixels.1, self.pixel, density, f32::from(lights_visible), f32::from(indirect)]);
+        for at in [[0.5, 0.5], [0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.3, 0.6]] {
+            let ray = (self.eye_ray)(at);
+            add(&ray.origin.to_array());
+            add(&ray.direction.to_array());
+        }
+        for number in [u64::from(rays), u64::from(round), seed] {
+            crc.add(&number.to_le_bytes());
+        }
+        crc.value()
+    }
+
+    /// Whether the final caches answer for all places.
+    fn are_covered(&self, caches: &RadianceCaches, all: &[Vec<Wanted>]) -> bool {
+        fn check<C: Fill>(cache: &Option<C>, effort: Option<Effort>, margin: f32, place: &Place) -> bool {
+            let (Some(cache), Some(effort)) = (cache, effort) else { return true };
+            cache.is_covered(place, &Reading { margin, ..Reading::new(effort.tolerance) })
+        }
+        let Settings { single, surface, multiple, irradiance, margin, .. } = *self.settings;
+        all.par_iter().flatten().all(|Wanted { place, .. }| match place.normal {
+            None => {
+                check(&caches.single, single, margin, place)
+                    && check(&caches.surface, surface, margin, place)
+                    && check(&caches.multiple, multiple, margin, place)
+            }
+            Some(_) => !place.is_seen || check(&caches.irradiance, irradiance, margin, place),
+        })
     }
 
     fn irradiance(
@@ -383,6 +478,8 @@ where
         compute: impl Fn(&C, &Place, &mut Generator) -> (Sums, C::Attached) + Sync,
     ) -> u64 {
         let reading = Reading { margin: self.settings.margin, ..Reading::new(effort.tolerance) };
+        // Records added later must not share the random numbers of the first.
+        let start = if cache.count() == 0 { 0 } else { mix(cache.count() as u64) };
         let mut computed = 0_u64;
         for batch in batches {
             let mut open: Vec<Wanted> = batch.iter().filter(|wanted| is_for(&wanted.place)).copied().collect();
@@ -393,8 +490,8 @@ where
                     break;
                 }
                 let chosen = self.choose(frozen, effort, &open);
-                let first = computed;
-                let numbered: Vec<(u64, Wanted)> = (first..).zip(chosen).collect();
+                let numbered: Vec<(u64, Wanted)> =
+                    chosen.into_iter().enumerate().map(|(i, w)| (start.wrapping_add(computed + i as u64), w)).collect();
                 computed += numbered.len() as u64;
                 let records: Vec<(Place, Option<Record>, C::Attached)> = numbered
                     .par_iter()
