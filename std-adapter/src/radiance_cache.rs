@@ -164,6 +164,14 @@ impl RadianceCaches {
         let surface = self.irradiance.as_ref().map_or((0, 0), |c| (c.len(), c.bytes()));
         [volume(&self.single), volume(&self.surface), volume(&self.multiple), surface]
     }
+
+    /// The same of the caches that serve the making of others: multiple scattering, irradiance.
+    #[must_use]
+    pub fn coarse_counts(&self) -> [(usize, usize); 2] {
+        let volume = self.coarse_multiple.as_ref().map_or((0, 0), |c| (c.len(), c.bytes()));
+        let surface = self.coarse_irradiance.as_ref().map_or((0, 0), |c| (c.len(), c.bytes()));
+        [volume, surface]
+    }
 }
 
 /// What filling took.
@@ -173,6 +181,8 @@ pub struct Outcome {
     pub computed: [u64; 4],
     /// Time by cache.
     pub seconds: [Seconds; 4],
+    /// Time to find the places that eye rays ask for, and which of them no record covers.
+    pub search: Seconds,
     /// Whether the host asked to stop.
     pub cancelled: bool,
 }
@@ -305,12 +315,15 @@ where
         if caches.views.contains(&view) {
             return outcome;
         }
+        let clock = Stopwatch::start();
         let all = self.all_places();
         let settings = self.settings;
         let everywhere = |place: &Place| place.normal.is_some();
         let in_medium = |place: &Place| place.normal.is_none();
         let in_sight = |place: &Place| place.normal.is_some() && place.is_seen;
-        if self.are_covered(caches, &all) {
+        let is_complete = self.are_covered(caches, &all);
+        outcome.search = clock.elapsed();
+        if is_complete {
             caches.views.push(view);
             return outcome;
         }
