@@ -25,7 +25,7 @@ use rayon::iter::{IntoParallelIterator, IntoParallelRefIterator, ParallelIterato
 use crate::progress::Control;
 use crate::stats::{Seconds, Stopwatch};
 
-pub use file::{FileError, Problem, load, save};
+pub use file::{FileError, Problem, decode, encode, load, save};
 
 /// One cache's share of quality and effort.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -316,14 +316,13 @@ where
             return outcome;
         }
         let clock = Stopwatch::start();
-        let all = self.all_places();
+        let all = self.all_places(caches);
         let settings = self.settings;
         let everywhere = |place: &Place| place.normal.is_some();
         let in_medium = |place: &Place| place.normal.is_none();
         let in_sight = |place: &Place| place.normal.is_some() && place.is_seen;
-        let is_complete = self.are_covered(caches, &all);
         outcome.search = clock.elapsed();
-        if is_complete {
+        if all.iter().all(Vec::is_empty) {
             caches.views.push(view);
             return outcome;
         }
@@ -398,21 +397,21 @@ where
         crc.value()
     }
 
-    /// Whether the final caches answer for all places.
-    fn are_covered(&self, caches: &RadianceCaches, all: &[Vec<Wanted>]) -> bool {
+    /// Whether the final caches have all that is asked for at a place.
+    fn is_covered(&self, caches: &RadianceCaches, place: &Place) -> bool {
         fn check<C: Fill>(cache: &Option<C>, effort: Option<Effort>, margin: f32, place: &Place) -> bool {
             let (Some(cache), Some(effort)) = (cache, effort) else { return true };
             cache.is_covered(place, &Reading { margin, ..Reading::new(effort.tolerance) })
         }
         let Settings { single, surface, multiple, irradiance, margin, .. } = *self.settings;
-        all.par_iter().flatten().all(|Wanted { place, .. }| match place.normal {
+        match place.normal {
             None => {
                 check(&caches.single, single, margin, place)
                     && check(&caches.surface, surface, margin, place)
                     && check(&caches.multiple, multiple, margin, place)
             }
-            Some(_) => !place.is_seen || check(&caches.irradiance, irradiance, margin, place),
-        })
+            Some(_) => check(&caches.irradiance, irradiance, margin, place),
+        }
     }
 
     fn irradiance(
@@ -452,12 +451,12 @@ where
         })
     }
 
-    /// Every place that eye rays ask for, in batches from coarse to fine.
-    fn all_places(&self) -> Vec<Vec<Wanted>> {
+    /// Every place that eye rays ask for and `caches` do not cover, in batches from coarse to fine.
+    fn all_places(&self, caches: &RadianceCaches) -> Vec<Vec<Wanted>> {
         let (mut batches, mut from, mut size) = (Vec::new(), 0, FIRST_BATCH);
         while from < self.settings.rays {
             let until = self.settings.rays.min(from + size);
-            let found: Vec<Vec<Wanted>> = (from..until).into_par_iter().map(|number| self.places_of(number)).collect();
+            let found: Vec<Vec<Wanted>> = (from..until).into_par_iter().map(|number| self.places_of(number, caches)).collect();
             batches.push(found.concat());
             from = until;
             size = LAST_BATCH.min(size * 2);
@@ -465,7 +464,7 @@ where
         batches
     }
 
-    fn places_of(&self, number: u32) -> Vec<Wanted> {
+    fn places_of(&self, number: u32, caches: &RadianceCaches) -> Vec<Wanted> {
         // The plane filled evenly by multiples of the plastic number (Roberts 2018).
         let turn = |step: f64| {
             let x = 0.5 + step * f64::from(number + 1);
@@ -474,7 +473,15 @@ where
         let ray = (self.eye_ray)([turn(0.754_877_666_246_692_8), turn(0.569_840_290_998_053_3)]);
         let mut rng = Generator::new(mix(self.settings.seed ^ 0x70_1a_ce) ^ u64::from(number));
         let mut found = Vec::new();
+        // Surfaces that light a place come right after it, and are of no use if nothing is made there.
+        let mut is_open = false;
         places(&ray, &self.estimator.world, self.eye, &mut rng, |place| {
+            if place.is_seen {
+                is_open = !self.is_covered(caches, &place);
+            }
+            if !is_open {
+                return;
+            }
             found.push(Wanted { place, distance: place.point.distance(ray.origin) });
         });
         found

@@ -219,7 +219,9 @@ fn efforts(settings: &Settings) -> [Option<Effort>; 6] {
     [single, surface, multiple, irradiance, settings.coarse_multiple(), settings.coarse_irradiance()]
 }
 
-fn encode(caches: &RadianceCaches, tag: u64) -> Vec<u8> {
+/// What [`save`] writes, for hosts without files.
+#[must_use]
+pub fn encode(caches: &RadianceCaches, tag: u64) -> Vec<u8> {
     fn part<E: Attachment>(cache: Option<&Cache<'_, E>>, tag: u64) -> Option<Vec<u8>> {
         let cache = cache?;
         let mut part = Vec::with_capacity(bytes::byte_count(cache));
@@ -275,7 +277,11 @@ struct Row<'a> {
     bytes: &'a [u8],
 }
 
-fn decode(file: &[u8], settings: Settings, tag: u64) -> Result<RadianceCaches, Problem> {
+/// As [`load`], from bytes.
+///
+/// # Errors
+/// The first check that fails.
+pub fn decode(file: &[u8], settings: Settings, tag: u64) -> Result<RadianceCaches, Problem> {
     let (rows, views) = rows(file, tag)?;
     for ((part, row), effort) in PARTS.into_iter().zip(&rows).zip(efforts(&settings)) {
         let (found, due) = match (row, effort) {
