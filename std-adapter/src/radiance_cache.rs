@@ -456,7 +456,8 @@ where
         let (mut batches, mut from, mut size) = (Vec::new(), 0, FIRST_BATCH);
         while from < self.settings.rays {
             let until = self.settings.rays.min(from + size);
-            let found: Vec<Vec<Wanted>> = (from..until).into_par_iter().map(|number| self.places_of(number, caches)).collect();
+            let found: Vec<Vec<Wanted>> =
+                (from..until).into_par_iter().map(|number| self.places_of(number, caches)).collect();
             batches.push(found.concat());
             from = until;
             size = LAST_BATCH.min(size * 2);

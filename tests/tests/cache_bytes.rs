@@ -131,7 +131,8 @@ proptest! {
 fn the_layout_is_the_one_documented() {
     let mut cache: VolumeCache<'_> = Cache::growing(3);
     let gradient = Gradient::outer(Spectrum::new(1.0, 2.0, 4.0), Vec3::new(0.5, 0.25, 0.0));
-    let record = Record { position: Vec3::new(1.0, 2.0, 3.0), radius: 0.5, value: Spectrum::new(7.0, 8.0, 9.0), gradient };
+    let record =
+        Record { position: Vec3::new(1.0, 2.0, 3.0), radius: 0.5, value: Spectrum::new(7.0, 8.0, 9.0), gradient };
     let higher = [1.0, 2.0, 3.0].map(|v| Coefficient { value: Spectrum::splat(v), gradient: Gradient::ZERO });
     cache.insert(record, &higher).unwrap();
     let bytes = to_bytes(&cache);
@@ -187,7 +188,11 @@ fn what_is_wrong_is_said() {
         (&with(&whole, 0, b"\x89PNG\r\n\x1a\n"), BytesError::Magic, "not a radiance cache"),
         (&number(8, 2), BytesError::Version(2), "version 2 of the format; 1 is known"),
         (&number(12, 3), BytesError::UnknownKind(3), "unknown kind 3"),
-        (&sealed(number(12, 2)), BytesError::Kind { found: Kind::Surface, due: Kind::Volume }, "on surfaces where records in a medium"),
+        (
+            &sealed(number(12, 2)),
+            BytesError::Kind { found: Kind::Surface, due: Kind::Volume },
+            "on surfaces where records in a medium",
+        ),
         (&number(16, 300), BytesError::Size { stride: 300, count: 4 }, "300 attachments"),
         (&number(20, 5), BytesError::Length { found: 296, due: 360 }, "cut off: 360 bytes are due, 296"),
         (&number(20, 3), BytesError::Length { found: 296, due: 232 }, "goes on after its end"),
@@ -274,7 +279,13 @@ impl Drop for Folder {
 fn settings() -> Settings {
     let effort = Effort { tolerance: 0.5, samples: 64, degree: 1, limits: Limits { min: 0.01, max: 1.0 } };
     let flat = Effort { degree: 0, ..effort };
-    Settings { single: None, surface: Some(effort), multiple: Some(effort), irradiance: Some(flat), ..Settings::default() }
+    Settings {
+        single: None,
+        surface: Some(effort),
+        multiple: Some(effort),
+        irradiance: Some(flat),
+        ..Settings::default()
+    }
 }
 
 fn caches() -> RadianceCaches {
@@ -328,8 +339,13 @@ fn files_damaged_anywhere_are_refused() {
     assert!(refusal(&folder.with(&whole[..whole.len() - 1]), settings(), TAG).contains("cut off"));
     assert!(refusal(&folder.with(&[&whole[..], b"."].concat()), settings(), TAG).contains("goes on after its end"));
     assert!(refusal(&folder.with(b""), settings(), TAG).contains("not a file of radiance caches"));
-    assert!(refusal(&folder.with(b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR"), settings(), TAG).contains("not a file of radiance caches"));
-    assert!(refusal(&folder.with(&to_bytes(&volume(2, 0, 1))), settings(), TAG).contains("not a file of radiance caches"));
+    assert!(
+        refusal(&folder.with(b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR"), settings(), TAG)
+            .contains("not a file of radiance caches")
+    );
+    assert!(
+        refusal(&folder.with(&to_bytes(&volume(2, 0, 1))), settings(), TAG).contains("not a file of radiance caches")
+    );
     assert!(refusal(&folder.with(&with(&whole, 8, &[9])), settings(), TAG).contains("version 9"));
     assert!(refusal(&folder.with(&with(&whole, 12, &[0xff; 8])), settings(), TAG).contains("cut off"));
     assert!(refusal(&folder.with(&with(&whole, 60, &[1])), settings(), TAG).contains("damaged"));

@@ -182,7 +182,9 @@ impl fmt::Display for BytesError {
             Self::Size { stride, count } => {
                 write!(f, "claims {count} records with {stride} attachments each, which no cache has")
             }
-            Self::Length { found, due } if found < due => write!(f, "is cut off: {due} bytes are due, {found} are there"),
+            Self::Length { found, due } if found < due => {
+                write!(f, "is cut off: {due} bytes are due, {found} are there")
+            }
             Self::Length { found, due } => write!(f, "goes on after its end: {due} bytes are due, {found} are there"),
             Self::Checksum => f.write_str("is damaged: the checksum is another"),
             Self::Kind { found, due } => write!(f, "holds {found} where {due} are due"),
@@ -322,8 +324,7 @@ pub fn read_into<E: Attachment>(bytes: &[u8], tag: u64, cache: &mut Cache<'_, E>
     let stride = header.stride as usize;
     let (records, attached) = body.split_at(header.count as usize * size_of::<Record>());
     let records = records.chunks_exact(size_of::<Record>());
-    let attached_to =
-        |i: usize| attached.chunks_exact(size_of::<E>()).skip(i * stride).take(stride).map(element::<E>);
+    let attached_to = |i: usize| attached.chunks_exact(size_of::<E>()).skip(i * stride).take(stride).map(element::<E>);
     for (i, record) in records.clone().enumerate() {
         if !element::<Record>(record).is_valid() {
             return Err(BytesError::Record(i as u32));

@@ -181,7 +181,9 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<Ending, Failure> {
         for (i, name) in ["read caches", "write caches"].into_iter().enumerate() {
             statistics.add(name, cached.files[i]);
         }
-        for (name, (records, bytes)) in ["coarse multiple", "coarse irradiance"].iter().zip(cached.caches.coarse_counts()) {
+        for (name, (records, bytes)) in
+            ["coarse multiple", "coarse irradiance"].iter().zip(cached.caches.coarse_counts())
+        {
             statistics.bytes.push((format!("cache {name}"), bytes as u64));
             statistics.records.push(((*name).to_owned(), records as u64));
         }

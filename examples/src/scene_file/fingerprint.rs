@@ -74,7 +74,9 @@ mod tests {
         let scene = r#"<scene version="3.0.0"><default name="mesh" value="a.ply"/><sensor type="perspective"><float name="fov"
             value="36"/></sensor><shape type="ply"><string name="filename" value="$mesh"/></shape></scene>"#;
         let first = of(scene);
-        for same in [scene.replace("36", "40"), scene.replace("<shape", "<!-- a shape --> <shape"), scene.replace("\n", " ")] {
+        for same in
+            [scene.replace("36", "40"), scene.replace("<shape", "<!-- a shape --> <shape"), scene.replace("\n", " ")]
+        {
             assert_eq!(of(&same), first, "{same}");
         }
         let with = |from: &str, to: &str| scene.replace(from, to);

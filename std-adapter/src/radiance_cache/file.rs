@@ -186,7 +186,9 @@ pub fn save(file: impl AsRef<Path>, caches: &RadianceCaches, tag: u64) -> Result
 /// ```
 pub fn load(file: impl AsRef<Path>, settings: Settings, tag: u64) -> Result<RadianceCaches, FileError> {
     let path = file.as_ref();
-    read(path).and_then(|bytes| decode(&bytes, settings, tag)).map_err(|problem| FileError { path: path.to_owned(), problem })
+    read(path)
+        .and_then(|bytes| decode(&bytes, settings, tag))
+        .map_err(|problem| FileError { path: path.to_owned(), problem })
 }
 
 fn read(path: &Path) -> Result<Vec<u8>, Problem> {
@@ -245,7 +247,8 @@ pub fn encode(caches: &RadianceCaches, tag: u64) -> Vec<u8> {
         let (Some(part), Some(effort)) = (part, effort) else { continue };
         count += 1;
         let Limits { min, max } = effort.limits;
-        let words = [number, effort.degree as u32, effort.tolerance.to_bits(), effort.samples, min.to_bits(), max.to_bits()];
+        let words =
+            [number, effort.degree as u32, effort.tolerance.to_bits(), effort.samples, min.to_bits(), max.to_bits()];
         words.iter().for_each(|word| tables.extend(word.to_le_bytes()));
         tables.extend((part.len() as u64).to_le_bytes());
     }
