@@ -63,7 +63,10 @@ fn surface(count: usize, seed: u64) -> SurfaceCache<'static> {
 
 fn to_bytes<E: Attachment>(cache: &Cache<'_, E>) -> Vec<u8> {
     let mut all = Vec::new();
-    let Ok(()) = bytes::write(cache, TAG, |part| Ok::<_, core::convert::Infallible>(all.extend_from_slice(part)));
+    let Ok(()) = bytes::write(cache, TAG, |part| {
+        all.extend_from_slice(part);
+        Ok::<(), core::convert::Infallible>(())
+    });
     assert_eq!(all.len(), byte_count(cache));
     all
 }
