@@ -11,8 +11,8 @@ use core::fmt;
 
 use fogbow::cache::bytes::Crc;
 use fogbow::cache::{
-    Cache, Caches, Estimator, EyeSettings, Facing, Limits, Place, Reader, Reading, Record, SurfaceCache, VolumeCache,
-    places,
+    Cache, Caches, Estimator, Extrapolation, EyeSettings, Facing, Limits, Place, Reader, Reading, Record, SurfaceCache,
+    VolumeCache, places,
 };
 use fogbow::host::{Medium, Scene};
 use fogbow::math::{Ray, Vec3};
@@ -41,9 +41,9 @@ pub struct Effort {
 }
 
 impl Effort {
-    /// For records that serve the making of others: twice the tolerance, samples divided.
-    fn coarser(self, fewer: u32) -> Self {
-        Self { tolerance: 1.5 * self.tolerance, samples: (self.samples / fewer).max(16), ..self }
+    /// For records that serve the making of others.
+    fn coarser(self, tolerance: f32, fewer: u32) -> Self {
+        Self { tolerance: tolerance * self.tolerance, samples: (self.samples / fewer).max(16), ..self }
     }
 }
 
@@ -58,6 +58,8 @@ pub struct Settings {
     pub multiple: Option<Effort>,
     /// Indirect irradiance on surfaces.
     pub irradiance: Option<Effort>,
+    /// How records are carried to other points.
+    pub extrapolation: Extrapolation,
     /// Eye rays that say where records are needed.
     pub rays: u32,
     /// Share of every radius that spheres overlap by.
@@ -80,6 +82,7 @@ impl Default for Settings {
             surface: None,
             multiple: None,
             irradiance: None,
+            extrapolation: Extrapolation::ExponentialMean,
             rays: 16384,
             margin: 0.15,
             pixels: (1.5, 64.0),
@@ -91,14 +94,20 @@ impl Default for Settings {
 }
 
 impl Settings {
+    /// How a cache made with `effort` is read.
+    #[must_use]
+    pub fn reading(&self, effort: &Effort) -> Reading {
+        Reading { extrapolation: self.extrapolation, ..Reading::new(effort.tolerance) }
+    }
+
     /// Of the records on surfaces that light all other records.
     fn coarse_irradiance(&self) -> Option<Effort> {
-        self.irradiance.map(|effort| effort.coarser(FIRST_SAMPLES))
+        self.irradiance.map(|effort| effort.coarser(4.0, 2))
     }
 
     /// Of the records at which random walks of the final ones end.
     fn coarse_multiple(&self) -> Option<Effort> {
-        self.multiple.map(|effort| effort.coarser(1))
+        self.multiple.map(|effort| effort.coarser(1.5, 1))
     }
 }
 
@@ -146,14 +155,14 @@ impl RadianceCaches {
     /// The caches, to be read.
     #[must_use]
     pub fn reader(&self) -> Caches<'_> {
-        fn read<'a, C>(cache: &'a Option<C>, effort: Option<Effort>) -> Option<Reader<'a, C>> {
-            Some(Reader { cache: cache.as_ref()?, reading: Reading::new(effort?.tolerance) })
+        fn read<'a, C>(settings: &Settings, cache: &'a Option<C>, effort: Option<Effort>) -> Option<Reader<'a, C>> {
+            Some(Reader { cache: cache.as_ref()?, reading: settings.reading(&effort?) })
         }
         Caches {
-            single: read(&self.single, self.settings.single),
-            surface: read(&self.surface, self.settings.surface),
-            multiple: read(&self.multiple, self.settings.multiple),
-            irradiance: read(&self.irradiance, self.settings.irradiance),
+            single: read(&self.settings, &self.single, self.settings.single),
+            surface: read(&self.settings, &self.surface, self.settings.surface),
+            multiple: read(&self.settings, &self.multiple, self.settings.multiple),
+            irradiance: read(&self.settings, &self.irradiance, self.settings.irradiance),
         }
     }
 
@@ -203,9 +212,6 @@ impl fmt::Display for FillError {
 }
 
 impl core::error::Error for FillError {}
-
-/// By how much fewer samples the records have that only light other records.
-const FIRST_SAMPLES: u32 = 4;
 
 /// Rays of the first batch; each next one has twice as many, up to [`LAST_BATCH`].
 const FIRST_BATCH: u32 = 64;
@@ -303,6 +309,12 @@ impl Fill for SurfaceCache<'_> {
     }
 }
 
+/// Records that end walks are carried along their gradients: what noise adds in one bounce would be
+/// carried into the next by exponentials.
+fn straight<'a>(known: [(&'a VolumeCache<'a>, Reading); 2]) -> [(&'a VolumeCache<'a>, Reading); 2] {
+    known.map(|(cache, reading)| (cache, Reading { extrapolation: Extrapolation::Linear, ..reading }))
+}
+
 impl<M, S, F> Filler<'_, M, S, F>
 where
     M: Medium + Sync + ?Sized,
@@ -334,7 +346,7 @@ where
             outcome.seconds[3] = clock.elapsed();
         }
         let coarse = caches.coarse_irradiance.as_ref().zip(settings.coarse_irradiance());
-        let surfaces = coarse.map(|(cache, effort)| (cache, Reading::new(effort.tolerance)));
+        let surfaces = coarse.map(|(cache, effort)| (cache, settings.reading(&effort)));
         let estimator = Estimator { surfaces, ..*self.estimator };
         if let (Some(cache), Some(effort)) = (&mut caches.single, settings.single) {
             let clock = Stopwatch::start();
@@ -353,22 +365,22 @@ where
             });
             outcome.seconds[1] = clock.elapsed();
         }
-        let surface = caches.surface.as_ref().zip(settings.surface).map(|(c, e)| (c, Reading::new(e.tolerance)));
+        let surface = caches.surface.as_ref().zip(settings.surface).map(|(c, e)| (c, settings.reading(&e)));
         if let (Some(cache), Some(effort), Some(first), Some(rough)) =
             (&mut caches.multiple, settings.multiple, &mut caches.coarse_multiple, settings.coarse_multiple())
         {
             let clock = Stopwatch::start();
             // The first records come from whole walks. The final ones end theirs at those.
             outcome.computed[2] = self.multiple(first, &rough, 5, &all, surface, None, &estimator);
-            let known = Some((&*first, Reading::new(rough.tolerance)));
+            let known = Some((&*first, settings.reading(&rough)));
             outcome.computed[2] += self.multiple(cache, &effort, 2, &all, surface, known, &estimator);
             outcome.seconds[2] = clock.elapsed();
         }
-        let multiple = caches.multiple.as_ref().zip(settings.multiple).map(|(c, e)| (c, Reading::new(e.tolerance)));
+        let multiple = caches.multiple.as_ref().zip(settings.multiple).map(|(c, e)| (c, settings.reading(&e)));
         if let (Some(cache), Some(effort)) = (&mut caches.irradiance, settings.irradiance) {
             let clock = Stopwatch::start();
             let scattered = surface.zip(multiple).map(|(surface, multiple)| [surface, multiple]);
-            let estimator = Estimator { scattered, ..estimator };
+            let estimator = Estimator { scattered: scattered.map(straight), ..estimator };
             outcome.computed[3] += self.irradiance(cache, &effort, 3, &all, in_sight, &estimator);
             outcome.seconds[3] = outcome.seconds[3] + clock.elapsed();
         }
@@ -424,7 +436,7 @@ where
         estimator: &Estimator<'_, M, S>,
     ) -> u64 {
         self.rounds(cache, effort, stream, all, is_for, |cache, place, rng| {
-            let own = Some((cache, Reading::new(effort.tolerance)));
+            let own = Some((cache, self.settings.reading(&effort)));
             let estimator = Estimator { surfaces: estimator.surfaces.or(own), ..*estimator };
             estimator.irradiance(place.point, place.normal.unwrap_or(Vec3::Z), effort.samples, rng)
         })
@@ -442,9 +454,9 @@ where
     ) -> u64 {
         let is_for = |place: &Place| place.normal.is_none();
         self.rounds(cache, effort, stream, all, is_for, |cache, place, rng| {
-            let own = (cache, Reading::new(effort.tolerance));
+            let own = (cache, self.settings.reading(&effort));
             let scattered = surface.map(|surface| [surface, known.unwrap_or(own)]);
-            let estimator = Estimator { scattered, ..*estimator };
+            let estimator = Estimator { scattered: scattered.map(straight), ..*estimator };
             let mut higher = vec![Coefficient::ZERO; cache.stride()];
             let phase = estimator.phase(place.point);
             (estimator.multiple(place.point, &phase, effort.samples, &mut higher, rng), higher)
@@ -498,7 +510,7 @@ where
         is_for: impl Fn(&Place) -> bool,
         compute: impl Fn(&C, &Place, &mut Generator) -> (Sums, C::Attached) + Sync,
     ) -> u64 {
-        let reading = Reading { margin: self.settings.margin, ..Reading::new(effort.tolerance) };
+        let reading = Reading { margin: self.settings.margin, ..self.settings.reading(effort) };
         // Records added later must not share the random numbers of the first.
         let start = if cache.count() == 0 { 0 } else { mix(cache.count() as u64) };
         let mut computed = 0_u64;
