@@ -436,7 +436,7 @@ where
         estimator: &Estimator<'_, M, S>,
     ) -> u64 {
         self.rounds(cache, effort, stream, all, is_for, |cache, place, rng| {
-            let own = Some((cache, self.settings.reading(&effort)));
+            let own = Some((cache, self.settings.reading(effort)));
             let estimator = Estimator { surfaces: estimator.surfaces.or(own), ..*estimator };
             estimator.irradiance(place.point, place.normal.unwrap_or(Vec3::Z), effort.samples, rng)
         })
@@ -454,7 +454,7 @@ where
     ) -> u64 {
         let is_for = |place: &Place| place.normal.is_none();
         self.rounds(cache, effort, stream, all, is_for, |cache, place, rng| {
-            let own = (cache, self.settings.reading(&effort));
+            let own = (cache, self.settings.reading(effort));
             let scattered = surface.map(|surface| [surface, known.unwrap_or(own)]);
             let estimator = Estimator { scattered: scattered.map(straight), ..*estimator };
             let mut higher = vec![Coefficient::ZERO; cache.stride()];

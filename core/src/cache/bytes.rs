@@ -257,7 +257,7 @@ impl Header {
     }
 }
 
-/// How many bytes [`write`] writes.
+/// How many bytes [`write()`] writes.
 #[must_use]
 pub fn byte_count<E: Attachment>(cache: &Cache<'_, E>) -> usize {
     HEADER_BYTES + size_of_val(cache.records()) + size_of_val(cache.attachments())
