@@ -109,7 +109,9 @@ fn measure<M: Medium>(estimator: &Estimator<'_, M, World<'_>>, found: &[Place]) 
         report("surface", medium_places(), |(point, _), rng| estimator.surface(point, &phase, SAMPLES, none, rng));
         let none: &mut [Coefficient] = &mut [];
         report("multiple", medium_places(), |(point, _), rng| estimator.multiple(point, &phase, SAMPLES, none, rng));
-        report("irradiance", surface_places(), |(point, normal), rng| estimator.irradiance(point, normal, SAMPLES, rng).0);
+        report("irradiance", surface_places(), |(point, normal), rng| {
+            estimator.irradiance(point, normal, SAMPLES, rng).0
+        });
     }
 }
 

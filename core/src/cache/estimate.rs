@@ -27,6 +27,9 @@ const MIN_COSINE: f32 = 0.05;
 /// A number whose multiples, wrapped, are even beside a golden-ratio lattice: the third coordinate.
 const THIRD: f32 = 0.414_213_56;
 
+/// Highest degree read where a walk ends: a phase function still to come smooths what is finer.
+const KNOWN_DEGREE: usize = 3;
+
 /// Direction `j` of `count`, of which every other one is aimed at lights, and the density (sr⁻¹) of the mixture.
 fn aimed(
     aims: &Aims,
@@ -41,7 +44,7 @@ fn aimed(
         return (direction, pdf(direction));
     }
     let share = (count / 2) as f32 / count as f32;
-    let direction = if j % 2 == 0 {
+    let direction = if j.is_multiple_of(2) {
         sample(single_scatter::lattice(j / 2, count.div_ceil(2), shift))
     } else {
         aims.sample(single_scatter::lattice(j / 2, count / 2, shift))
@@ -151,7 +154,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
             }
             let (mut sums, trust) = (cones.sums(), halves.trust());
             sums.gradient = sums.gradient * trust;
-            if super::tune(1) == 0 { into.coefficients.iter_mut().for_each(|c| c.gradient = c.gradient * trust); }
+            into.coefficients.iter_mut().for_each(|c| c.gradient = c.gradient * trust);
             sums
         })
     }
@@ -162,7 +165,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
         let outgoing = |ray: &Ray, hit: &Hit| self.outgoing(ray, hit, &mut child);
         let known = |point: Vec3, to_eye: Vec3, _: &Properties| {
             let [surface, multiple] = self.scattered.as_ref()?;
-            let basis = Basis::new(to_eye, surface.0.degree().max(multiple.0.degree()));
+            let basis = Basis::new(to_eye, surface.0.degree().max(multiple.0.degree()).min(KNOWN_DEGREE));
             let mut light = multiple.0.lookup_with_gradient(point, &basis, &multiple.1)?;
             light += surface.0.lookup_with_gradient(point, &basis, &surface.1)?;
             Some(light)
@@ -344,7 +347,6 @@ impl Halves {
     }
 
     fn trust(&self) -> Spectrum {
-        if super::tune(0) == 1 { return Spectrum::ONE; }
         let [a, b] = self.0;
         // Scaled, so that squares stay in the range of f32.
         let largest = a.norm().max(b.norm());

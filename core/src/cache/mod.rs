@@ -25,8 +25,10 @@
 //! | `aim` | where random walks start towards |
 //! | `estimate` | [`Estimator`]: what records are made of |
 //! | `eye` | [`places`] and [`radiance`] of eye rays |
+//! | [`bytes`] | caches as bytes, to be saved |
 
 mod aim;
+pub mod bytes;
 mod estimate;
 mod extrapolate;
 mod eye;
@@ -44,8 +46,3 @@ pub use lookup::{Basis, Reading, gradient_towards};
 pub use radius::{Limits, clamp_gradient, log_gradient_radius, neighbour_clamped, valid_radius};
 pub use record::{Facing, Record};
 pub use store::{Cache, SurfaceCache, VolumeCache};
-
-#[allow(missing_docs)]
-pub static TUNE: [core::sync::atomic::AtomicU32; 8] = [const { core::sync::atomic::AtomicU32::new(0) }; 8];
-#[allow(missing_docs)]
-pub fn tune(i: usize) -> u32 { TUNE[i].load(core::sync::atomic::Ordering::Relaxed) }

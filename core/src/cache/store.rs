@@ -144,6 +144,21 @@ impl<'s, E: Pod> Cache<'s, E> {
         true
     }
 
+    /// Forgets all records and keeps the memory.
+    pub fn clear(&mut self) {
+        self.records.clear();
+        self.attached.clear();
+        // Of no spheres, an index needs no room.
+        let _ = (self.index.rebuild(0, |_| (Vec3::ZERO, 0.0)), self.wide.rebuild(0, |_| (Vec3::ZERO, 0.0)));
+    }
+
+    /// Appends a record as it is: one that was in a cache already, with radii clamped then. It is seen
+    /// after [`Cache::finish`].
+    pub(super) fn restore(&mut self, record: Record, attached: impl Iterator<Item = E>) -> Result<(), Full> {
+        self.records.push(record)?;
+        attached.into_iter().try_for_each(|element| self.attached.push(element))
+    }
+
     /// After filling, before many look-ups: brings all records into the index, and prepares for points in
     /// the gaps between them. Until then those are misses.
     ///

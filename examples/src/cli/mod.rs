@@ -6,6 +6,7 @@ mod compare;
 mod output;
 mod plume;
 mod radiance_cache;
+mod records;
 mod render;
 mod report;
 
@@ -16,6 +17,7 @@ use clap::{Parser, Subcommand};
 pub use compare::CompareArguments;
 pub use plume::PlumeArguments;
 pub use radiance_cache::{CacheArguments, Kind, Single};
+pub use records::RecordsArguments;
 pub use render::{Method, RenderArguments};
 
 /// Light in fog, smoke and clouds.
@@ -32,6 +34,8 @@ pub struct Arguments {
 pub enum Command {
     /// Renders a Mitsuba 3 scene.
     Render(RenderArguments),
+    /// Draws where the records of radiance caches lie.
+    Records(RecordsArguments),
     /// Says how far an image is from a reference.
     Compare(CompareArguments),
     /// Writes an animation: a plume of smoke, a volume and a scene per frame.
@@ -51,6 +55,7 @@ pub enum Ending {
 pub fn run(arguments: Arguments) -> ExitCode {
     let result = match arguments.command {
         Command::Render(arguments) => render::run(&arguments),
+        Command::Records(arguments) => records::run(&arguments),
         Command::Compare(arguments) => compare::run(&arguments),
         Command::Plume(arguments) => plume::run(&arguments),
     };

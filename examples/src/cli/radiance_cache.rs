@@ -1,6 +1,9 @@
 //! `fogbow render --method radiance-cache`.
 
+use std::path::{Path, PathBuf};
+
 use clap::{Args, ValueEnum};
+use fogbow::cache::bytes::Crc;
 use fogbow::cache::{Estimator, Extrapolation, EyeSettings, Limits, radiance};
 use fogbow::host::Medium;
 use fogbow::light::Light;
@@ -12,12 +15,14 @@ use fogbow::sampling::uniform2;
 use fogbow::transmittance::thickness::Steps;
 use fogbow_std::film::Film;
 use fogbow_std::progress::Control;
-use fogbow_std::radiance_cache::{self as cache, Effort, RadianceCaches};
-use fogbow_std::stats::{CountingMedium, CountingScene};
+use fogbow_std::radiance_cache::{self as cache, Effort, Problem, RadianceCaches};
+use fogbow_std::stats::{CountingMedium, CountingScene, Seconds, Stopwatch};
 use fogbow_std::tiles::{self, Outcome};
 
 use super::{Failure, output};
 use crate::camera::Camera;
+use crate::error::SceneError;
+use crate::scene_file::fingerprint;
 use crate::world::{WithMedium, World};
 
 /// Of `--method radiance-cache`.
@@ -39,12 +44,51 @@ pub struct CacheArguments {
     /// Caches not to use: their light is estimated anew at every point; may be repeated.
     #[arg(long, value_name = "CACHE", value_enum)]
     pub uncached: Vec<Kind>,
-    /// How records are carried to other points.
-    #[arg(long, value_enum, default_value_t = Carrying::ExponentialMean)]
-    pub extrapolation: Carrying,
+    /// How records are carried to other points [default: exponential-mean in homogeneous media, else linear].
+    #[arg(long, value_enum)]
+    pub extrapolation: Option<Carrying>,
     /// How light straight from the lights is scattered once.
     #[arg(long, value_enum, default_value_t = Single::Auto)]
     pub single: Single,
+    /// Starts from the records in this file, and adds only what is missing: made by --cache-out for the same scene
+    /// and the same options; the camera may be another.
+    #[arg(long, value_name = "FILE")]
+    pub cache_in: Option<PathBuf>,
+    /// Writes all records, for --cache-in; may be the same file.
+    #[arg(long, value_name = "FILE")]
+    pub cache_out: Option<PathBuf>,
+}
+
+impl CacheArguments {
+    /// # Errors
+    /// A file that cannot be written: better before a long render than after it.
+    pub(super) fn check(&self) -> Result<(), String> {
+        self.cache_out.as_deref().map_or(Ok(()), output::check_place)
+    }
+
+    /// What caches in files are for: all that changes the light of a scene, and not the camera.
+    pub(super) fn tag(&self, scene: &Path, paths: &path::Settings) -> Result<u64, SceneError> {
+        if self.cache_in.is_none() && self.cache_out.is_none() {
+            return Ok(0);
+        }
+        let mut crc = Crc::new();
+        crc.add(&fingerprint(scene)?.to_le_bytes());
+        let path::Settings { max_scatterings, roulette_after, lights_visible } = *paths;
+        for number in [max_scatterings, roulette_after, u32::from(lights_visible)] {
+            crc.add(&number.to_le_bytes());
+        }
+        Ok(crc.value())
+    }
+
+    fn load(&self, settings: cache::Settings, tag: u64) -> Result<RadianceCaches, String> {
+        let Some(file) = &self.cache_in else { return Ok(RadianceCaches::new(settings)) };
+        cache::load(file, settings, tag).map_err(|error| match error.problem {
+            Problem::Tag { .. } => {
+                format!("{}: was made for another scene, or with another --max-depth", file.display())
+            }
+            _ => error.to_string(),
+        })
+    }
 }
 
 /// How records are carried to other points.
@@ -114,6 +158,8 @@ pub(super) struct CacheJob<'a> {
     pub(super) settings: &'a tiles::Settings,
     pub(super) control: &'a Control<'a>,
     pub(super) arguments: &'a CacheArguments,
+    /// See [`CacheArguments::tag`].
+    pub(super) tag: u64,
 }
 
 /// What caching did besides the picture.
@@ -121,6 +167,8 @@ pub(super) struct CacheJob<'a> {
 pub(super) struct Cached {
     pub(super) caches: RadianceCaches,
     pub(super) filled: cache::Outcome,
+    /// Time to read and write them.
+    pub(super) files: [Seconds; 2],
     pub(super) render: Outcome,
 }
 
@@ -145,13 +193,16 @@ impl CacheJob<'_> {
             Single::Direct => false,
             Single::Cached => true,
         };
+        // Gradients through changing extinction are noisy, and exponentials of noise are too bright.
+        let carrying =
+            if self.world.media().is_homogeneous() { Carrying::ExponentialMean } else { Carrying::Linear };
         cache::Settings {
             single: if cached { effort(Kind::Single, 0.2, 16.0, degree(1, 0.0), 0.1) } else { None },
             surface: effort(Kind::Surface, 2.0, 256.0, degree(1, 1.5), 0.1),
             multiple: effort(Kind::Multiple, 1.0, 512.0, degree(2, 0.0), 0.1),
             irradiance: effort(Kind::Irradiance, 0.35, 256.0, 0, 0.1),
             rays: 16384,
-            extrapolation: arguments.extrapolation.into(),
+            extrapolation: arguments.extrapolation.unwrap_or(carrying).into(),
             margin: 0.15,
             pixels: (1.5, 64.0),
             round: 64,
@@ -188,7 +239,6 @@ impl WithMedium for CacheJob<'_> {
             let mean = |p: &Phase| p.moment(1).max_element().abs();
             mean(a).total_cmp(&mean(b))
         });
-        for (i, v) in std::env::var("TUNE").unwrap_or_default().split(',').enumerate() { if let Ok(v) = v.parse() { fogbow::cache::TUNE[i].store(v, core::sync::atomic::Ordering::Relaxed); } }
         let settings = self.efforts(&sharpest.unwrap_or(Phase::ISOTROPIC));
         let eye = EyeSettings {
             density: 8.0,
@@ -210,8 +260,15 @@ impl WithMedium for CacheJob<'_> {
         let (width, height) = (self.film.width() as f32, self.film.height() as f32);
         let ray = |at: [f32; 2]| -> Ray { self.camera.ray(Vec2::from(at)) };
         let apart = ray([0.5, 0.5]).direction.angle_between(ray([0.5 + 1.0 / width, 0.5]).direction);
-        let mut caches = RadianceCaches::new(settings);
+        let clock = Stopwatch::start();
+        let mut caches = self.arguments.load(settings, self.tag)?;
+        let loaded = clock.elapsed();
         let filled = cache::fill(&mut caches, &estimator, &eye, apart, self.control, ray)?;
+        let clock = Stopwatch::start();
+        if let Some(file) = &self.arguments.cache_out {
+            cache::save(file, &caches, self.tag)?;
+        }
+        let files = [loaded, clock.elapsed()];
         let has_layers = self.film.layers().len() > 1;
         let reader = caches.reader();
         let render = tiles::render(self.film, self.settings, self.control, |sample, rng, layers| {
@@ -247,6 +304,6 @@ impl WithMedium for CacheJob<'_> {
                 *total = seen.total();
             }
         })?;
-        Ok(Cached { caches, filled, render })
+        Ok(Cached { caches, filled, files, render })
     }
 }

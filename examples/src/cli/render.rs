@@ -163,6 +163,7 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<Ending, Failure> {
                 settings: settings_of,
                 control: control_of,
                 arguments: &arguments.cache,
+                tag: arguments.cache.tag(&arguments.scene, &paths)?,
             })?;
             let outcome = done.render;
             cached = Some(done);
@@ -175,6 +176,16 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<Ending, Failure> {
             statistics.add(&format!("fill {name}"), cached.filled.seconds[i]);
             statistics.bytes.push((format!("cache {name}"), cached.caches.counts()[i].1 as u64));
             statistics.records.push(((*name).to_owned(), cached.caches.counts()[i].0 as u64));
+        }
+        statistics.add("fill search", cached.filled.search);
+        for (i, name) in ["read caches", "write caches"].into_iter().enumerate() {
+            statistics.add(name, cached.files[i]);
+        }
+        for (name, (records, bytes)) in
+            ["coarse multiple", "coarse irradiance"].iter().zip(cached.caches.coarse_counts())
+        {
+            statistics.bytes.push((format!("cache {name}"), bytes as u64));
+            statistics.records.push(((*name).to_owned(), records as u64));
         }
         statistics.records.push(("computed".to_owned(), cached.filled.computed.iter().sum()));
     }
@@ -214,6 +225,11 @@ fn outputs(arguments: &RenderArguments) -> Result<Vec<PathBuf>, Failure> {
     if let Some(file) = &arguments.stats {
         output::check_place(file)?;
     }
+    let caches = &arguments.cache;
+    if arguments.method == Method::Path && (caches.cache_in.is_some() || caches.cache_out.is_some()) {
+        return Err("--cache-in and --cache-out need --method radiance-cache".into());
+    }
+    caches.check()?;
     if !arguments.exposure.is_finite() {
         return Err("--exposure must be a finite number".into());
     }
@@ -221,7 +237,7 @@ fn outputs(arguments: &RenderArguments) -> Result<Vec<PathBuf>, Failure> {
 }
 
 /// Mitsuba counts the segments of a path, the path tracer its scatterings.
-fn path_settings(scene: &SceneFile, max_depth: Option<u32>) -> path::Settings {
+pub(super) fn path_settings(scene: &SceneFile, max_depth: Option<u32>) -> path::Settings {
     let depth = max_depth.or(scene.integrator.max_depth);
     path::Settings {
         max_scatterings: depth.map_or(u32::MAX, |d| d.saturating_sub(1)),
