@@ -8,7 +8,7 @@
 use core::fmt;
 
 use fogbow::cache::{
-    Cache, Caches, Estimator, EyeSettings, Facing, Limits, Place, Reader, Reading, Record, SurfaceCache, VolumeCache,
+    Cache, Caches, Estimator, Extrapolation, EyeSettings, Facing, Limits, Place, Reader, Reading, Record, SurfaceCache, VolumeCache,
     places,
 };
 use fogbow::host::{Medium, Scene};
@@ -36,9 +36,9 @@ pub struct Effort {
 }
 
 impl Effort {
-    /// For records that serve the making of others: twice the tolerance, samples divided.
-    fn coarser(self, fewer: u32) -> Self {
-        Self { tolerance: 1.5 * self.tolerance, samples: (self.samples / fewer).max(16), ..self }
+    /// For records that serve the making of others.
+    fn coarser(self, tolerance: f32, fewer: u32) -> Self {
+        Self { tolerance: tolerance * self.tolerance, samples: (self.samples / fewer).max(16), ..self }
     }
 }
 
@@ -53,6 +53,8 @@ pub struct Settings {
     pub multiple: Option<Effort>,
     /// Indirect irradiance on surfaces.
     pub irradiance: Option<Effort>,
+    /// How records are carried to other points.
+    pub extrapolation: Extrapolation,
     /// Eye rays that say where records are needed.
     pub rays: u32,
     /// Share of every radius that spheres overlap by.
@@ -65,6 +67,14 @@ pub struct Settings {
     pub threads: usize,
     /// Changes all random numbers.
     pub seed: u64,
+}
+
+impl Settings {
+    /// How a cache made with `effort` is read.
+    #[must_use]
+    pub fn reading(&self, effort: &Effort) -> Reading {
+        Reading { extrapolation: self.extrapolation, ..Reading::new(effort.tolerance) }
+    }
 }
 
 /// Filled caches.
@@ -102,14 +112,14 @@ impl RadianceCaches {
     /// The caches, to be read.
     #[must_use]
     pub fn reader(&self) -> Caches<'_> {
-        fn read<'a, C>(cache: &'a Option<C>, effort: Option<Effort>) -> Option<Reader<'a, C>> {
-            Some(Reader { cache: cache.as_ref()?, reading: Reading::new(effort?.tolerance) })
+        fn read<'a, C>(settings: &Settings, cache: &'a Option<C>, effort: Option<Effort>) -> Option<Reader<'a, C>> {
+            Some(Reader { cache: cache.as_ref()?, reading: settings.reading(&effort?) })
         }
         Caches {
-            single: read(&self.single, self.settings.single),
-            surface: read(&self.surface, self.settings.surface),
-            multiple: read(&self.multiple, self.settings.multiple),
-            irradiance: read(&self.irradiance, self.settings.irradiance),
+            single: read(&self.settings, &self.single, self.settings.single),
+            surface: read(&self.settings, &self.surface, self.settings.surface),
+            multiple: read(&self.settings, &self.multiple, self.settings.multiple),
+            irradiance: read(&self.settings, &self.irradiance, self.settings.irradiance),
         }
     }
 
@@ -149,9 +159,6 @@ impl fmt::Display for FillError {
 }
 
 impl core::error::Error for FillError {}
-
-/// By how much fewer samples the records have that only light other records.
-const FIRST_SAMPLES: u32 = 4;
 
 /// Rays of the first batch; each next one has twice as many, up to [`LAST_BATCH`].
 const FIRST_BATCH: u32 = 64;
@@ -242,6 +249,12 @@ impl Fill for SurfaceCache<'_> {
     }
 }
 
+/// Records that end walks are carried along their gradients: what noise adds in one bounce would be
+/// carried into the next by exponentials.
+fn straight<'a>(known: [(&'a VolumeCache<'a>, Reading); 2]) -> [(&'a VolumeCache<'a>, Reading); 2] {
+    known.map(|(cache, reading)| (cache, Reading { extrapolation: Extrapolation::Linear, ..reading }))
+}
+
 impl<M, S, F> Filler<'_, M, S, F>
 where
     M: Medium + Sync + ?Sized,
@@ -258,12 +271,12 @@ where
 
         // What lights everything else: coarse, because whoever asks sees many records at once.
         let coarse = settings.irradiance.map(|effort| {
-            let effort = effort.coarser(FIRST_SAMPLES);
+            let effort = effort.coarser(4.0, 2);
             let mut cache: SurfaceCache<'static> = Cache::growing(1);
             let clock = Stopwatch::start();
             outcome.computed[3] += self.irradiance(&mut cache, &effort, 4, &all, everywhere, self.estimator);
             outcome.seconds[3] = clock.elapsed();
-            (cache, Reading::new(effort.tolerance))
+            (cache, self.settings.reading(&effort))
         });
         let surfaces = coarse.as_ref().map(|(cache, reading)| (cache, *reading));
         let estimator = Estimator { surfaces, ..*self.estimator };
@@ -284,22 +297,22 @@ where
             });
             outcome.seconds[1] = clock.elapsed();
         }
-        let surface = caches.surface.as_ref().zip(settings.surface).map(|(c, e)| (c, Reading::new(e.tolerance)));
+        let surface = caches.surface.as_ref().zip(settings.surface).map(|(c, e)| (c, settings.reading(&e)));
         if let (Some(cache), Some(effort)) = (&mut caches.multiple, settings.multiple) {
             let clock = Stopwatch::start();
             // The first records come from whole walks. The final ones end theirs at those.
             let mut first: VolumeCache<'static> = Cache::growing(cache.stride());
-            let rough = effort.coarser(1);
+            let rough = effort.coarser(1.5, 1);
             outcome.computed[2] = self.multiple(&mut first, &rough, 5, &all, surface, None, &estimator);
-            let known = Some((&first, Reading::new(rough.tolerance)));
+            let known = Some((&first, self.settings.reading(&rough)));
             outcome.computed[2] += self.multiple(cache, &effort, 2, &all, surface, known, &estimator);
             outcome.seconds[2] = clock.elapsed();
         }
-        let multiple = caches.multiple.as_ref().zip(settings.multiple).map(|(c, e)| (c, Reading::new(e.tolerance)));
+        let multiple = caches.multiple.as_ref().zip(settings.multiple).map(|(c, e)| (c, settings.reading(&e)));
         if let (Some(cache), Some(effort)) = (&mut caches.irradiance, settings.irradiance) {
             let clock = Stopwatch::start();
             let scattered = surface.zip(multiple).map(|(surface, multiple)| [surface, multiple]);
-            let estimator = Estimator { scattered, ..estimator };
+            let estimator = Estimator { scattered: scattered.map(straight), ..estimator };
             outcome.computed[3] += self.irradiance(cache, &effort, 3, &all, in_sight, &estimator);
             outcome.seconds[3] = outcome.seconds[3] + clock.elapsed();
         }
@@ -317,7 +330,7 @@ where
         estimator: &Estimator<'_, M, S>,
     ) -> u64 {
         self.rounds(cache, effort, stream, all, is_for, |cache, place, rng| {
-            let own = Some((cache, Reading::new(effort.tolerance)));
+            let own = Some((cache, self.settings.reading(&effort)));
             let estimator = Estimator { surfaces: estimator.surfaces.or(own), ..*estimator };
             estimator.irradiance(place.point, place.normal.unwrap_or(Vec3::Z), effort.samples, rng)
         })
@@ -335,9 +348,9 @@ where
     ) -> u64 {
         let is_for = |place: &Place| place.normal.is_none();
         self.rounds(cache, effort, stream, all, is_for, |cache, place, rng| {
-            let own = (cache, Reading::new(effort.tolerance));
+            let own = (cache, self.settings.reading(&effort));
             let scattered = surface.map(|surface| [surface, known.unwrap_or(own)]);
-            let estimator = Estimator { scattered, ..*estimator };
+            let estimator = Estimator { scattered: scattered.map(straight), ..*estimator };
             let mut higher = vec![Coefficient::ZERO; cache.stride()];
             let phase = estimator.phase(place.point);
             (estimator.multiple(place.point, &phase, effort.samples, &mut higher, rng), higher)
@@ -382,7 +395,7 @@ where
         is_for: impl Fn(&Place) -> bool,
         compute: impl Fn(&C, &Place, &mut Generator) -> (Sums, C::Attached) + Sync,
     ) -> u64 {
-        let reading = Reading { margin: self.settings.margin, ..Reading::new(effort.tolerance) };
+        let reading = Reading { margin: self.settings.margin, ..self.settings.reading(&effort) };
         let mut computed = 0_u64;
         for batch in batches {
             let mut open: Vec<Wanted> = batch.iter().filter(|wanted| is_for(&wanted.place)).copied().collect();

@@ -5,7 +5,8 @@
     FOGBOW_REFERENCE=FOLDER python3 tests/acceptance/ground.py speed    [SCENE...]
 
 FOLDER holds compare.py, peer.py and public/ with scenes and their references. `accuracy` needs numpy;
-`speed` also the peer (pip install mitsuba==3.9.1). Build first: cargo build --release.
+`speed` also the peer (pip install mitsuba==3.9.1; where its compiler
+stumbles over the processor, DRJIT_LIBLLVM_PATH names another libLLVM). Build first: cargo build --release.
 
 accuracy  every scene: |bias| <= 0.4 %, no 16x16 block beyond 5 combined standard errors. Point scenes: bias only
           (their variance is infinite). nave-shafts, lantern: |bias| <= 1 %, at most 3 % of blocks beyond 3.

@@ -2,7 +2,7 @@
 
 use core::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
-use fogbow::cache::{Estimator, EyeSettings, Limits, Place, Reading, places, radiance};
+use fogbow::cache::{Estimator, Extrapolation, EyeSettings, Limits, Place, Reading, places, radiance};
 use fogbow::host::{Gradients, Medium, Properties, Stretch};
 use fogbow::light::{Light, PointLight};
 use fogbow::math::{Ray, Vec2, Vec3};
@@ -55,6 +55,7 @@ fn settings() -> Settings {
         surface: effort(1.5, 2),
         multiple: effort(1.0, 2),
         irradiance: effort(0.5, 0),
+        extrapolation: Extrapolation::ExponentialMean,
         rays: 600,
         margin: 0.15,
         pixels: (1.0, 1000.0),

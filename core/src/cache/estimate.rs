@@ -136,7 +136,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
         let share = 1.0 / paths.max(1) as f32;
         let aims = Aims::new(point, self.world.lights);
         self.expanded(phase, higher, |into| {
-            let mut cones = Cones::default();
+            let (mut cones, mut halves) = (Cones::default(), Halves::default());
             for j in 0..paths {
                 let uniformly = |u| warp::uniform_sphere(u);
                 let (to_light, pdf) = aimed(&aims, j, paths, shift, uniformly, |_| warp::uniform_sphere_pdf());
@@ -145,9 +145,14 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
                 let u = third + THIRD * j as f32;
                 let light = self.walked(&walk, ray, pdf, u - libm::floorf(u), rng) * share;
                 let incoming = Incoming { to_light, light };
-                cones.add(to_light, &incoming.scatter_directional(into.moments, into.coefficients));
+                let mean = incoming.scatter_directional(into.moments, into.coefficients);
+                cones.add(to_light, &mean);
+                halves.add(j, &mean.gradient);
             }
-            cones.sums()
+            let (mut sums, trust) = (cones.sums(), halves.trust());
+            sums.gradient = sums.gradient * trust;
+            into.coefficients.iter_mut().for_each(|c| c.gradient = c.gradient * trust);
+            sums
         })
     }
 
@@ -175,6 +180,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
     /// ```
     pub fn irradiance(&self, point: Vec3, normal: Vec3, paths: u32, rng: &mut impl Rng) -> (Sums, Facing) {
         let (mut sums, mut scattered, mut turn) = (Sums::default(), Cones::default(), Gradient::ZERO);
+        let mut halves = Halves::default();
         let mut child = Generator::child(rng);
         let (frame, walk, shift, third) = (Frame::around(normal), self.walker(), uniform2(rng), uniform(rng));
         let share = 1.0 / paths.max(1) as f32;
@@ -207,9 +213,11 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
             let light = self.walked(&walk, ray, 1.0, u - libm::floorf(u), rng) * weight;
             scattered.add(to_light, &light);
             total += light;
+            halves.add(j, &total.gradient);
             turn += Gradient::outer(total.radiance, to_light / cosine.max(MIN_COSINE));
         }
         sums.merge(&scattered.sums());
+        sums.gradient = sums.gradient * halves.trust();
         (sums, Facing { normal, turn })
     }
 
@@ -313,5 +321,38 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
         let sums = estimate(&mut into);
         higher.copy_from_slice(&all[1..=higher.len()]);
         sums
+    }
+}
+
+/// How far an estimated gradient can be believed: as far as two halves of its samples agree.
+///
+/// ```text
+/// t = g₁·g₂ / ‖(g₁ + g₂)/2‖², in [0, 1], per channel
+/// ```
+///
+/// The product is an unbiased estimate of the true square, the norm is too large by the noise.
+/// Unbelieved, noise in gradients would brighten whatever is extrapolated with them, because
+/// the exponential of noise is more than 1 in the mean.
+#[derive(Debug, Clone, Copy, Default)]
+struct Halves([Gradient; 2]);
+
+impl Halves {
+    /// Adds the gradient of sample `j`; of every four neighbours, two go to either half.
+    #[inline]
+    fn add(&mut self, j: u32, gradient: &Gradient) {
+        self.0[(j as usize >> 1) & 1] += *gradient;
+    }
+
+    fn trust(&self) -> Spectrum {
+        let [a, b] = self.0;
+        // Scaled, so that squares stay in the range of f32.
+        let largest = a.norm().max(b.norm());
+        let dot = |a: &Gradient, b: &Gradient| {
+            let part = |a: Spectrum, b: Spectrum| a.ratio(largest) * b.ratio(largest);
+            part(a.x, b.x) + part(a.y, b.y) + part(a.z, b.z)
+        };
+        let sum = a + b;
+        let square = dot(&sum, &sum) * 0.25;
+        dot(&a, &b).zip(square, |ab, ss| if ss > 0.0 { (ab / ss).clamp(0.0, 1.0) } else { 0.0 })
     }
 }

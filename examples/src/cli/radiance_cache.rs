@@ -1,7 +1,7 @@
 //! `fogbow render --method radiance-cache`.
 
 use clap::{Args, ValueEnum};
-use fogbow::cache::{Estimator, EyeSettings, Limits, Seen, radiance};
+use fogbow::cache::{Estimator, Extrapolation, EyeSettings, Limits, Seen, radiance};
 use fogbow::host::Medium;
 use fogbow::light::Light;
 use fogbow::math::{Ray, Vec2};
@@ -39,9 +39,36 @@ pub struct CacheArguments {
     /// Caches not to use: their light is estimated anew at every point; may be repeated.
     #[arg(long, value_name = "CACHE", value_enum)]
     pub uncached: Vec<Kind>,
+    /// How records are carried to other points.
+    #[arg(long, value_enum, default_value_t = Carrying::ExponentialMean)]
+    pub extrapolation: Carrying,
     /// How light straight from the lights is scattered once.
     #[arg(long, value_enum, default_value_t = Single::Auto)]
     pub single: Single,
+}
+
+/// How records are carried to other points.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Carrying {
+    /// Exponentially, mixed by their mean.
+    ExponentialMean,
+    /// Exponentially, mixed by their geometric mean: as Jarosz et al. do.
+    Exponential,
+    /// Along the gradient.
+    Linear,
+    /// Unchanged.
+    Constant,
+}
+
+impl From<Carrying> for Extrapolation {
+    fn from(carrying: Carrying) -> Self {
+        match carrying {
+            Carrying::ExponentialMean => Self::ExponentialMean,
+            Carrying::Exponential => Self::Exponential,
+            Carrying::Linear => Self::Linear,
+            Carrying::Constant => Self::Constant,
+        }
+    }
 }
 
 /// A cache.
@@ -133,10 +160,11 @@ impl CacheJob<'_> {
         };
         cache::Settings {
             single: if cached { effort(Kind::Single, 0.2, 16.0, degree(1, 0.0), 0.1) } else { None },
-            surface: effort(Kind::Surface, 2.0, 256.0, degree(1, 1.0), 0.1),
+            surface: effort(Kind::Surface, 2.0, 256.0, degree(1, 1.5), 0.1),
             multiple: effort(Kind::Multiple, 1.0, 512.0, degree(2, 0.0), 0.1),
             irradiance: effort(Kind::Irradiance, 0.35, 256.0, 0, 0.1),
             rays: 16384,
+            extrapolation: arguments.extrapolation.into(),
             margin: 0.15,
             pixels: (1.5, 64.0),
             round: 64,
@@ -146,7 +174,7 @@ impl CacheJob<'_> {
     }
 }
 
-/// The least degree beyond which an expansion holds less than a twentieth of the phase function, applied
+/// The least degree beyond which an expansion holds less than a sixtieth of the phase function, applied
 /// `power` times, to light whose own expansion falls off like `1/(l + 1)^damping`.
 fn degree_for(phase: &Phase, power: i32, damping: f32) -> usize {
     let energy = |l: usize| {
@@ -157,7 +185,7 @@ fn degree_for(phase: &Phase, power: i32, damping: f32) -> usize {
     let mut rest = total;
     for l in 0..=fogbow::sh::MAX_DEGREE {
         rest -= energy(l);
-        if rest <= 0.0025 * total {
+        if rest <= 2.5e-4 * total {
             return l;
         }
     }
@@ -179,7 +207,7 @@ impl WithMedium for CacheJob<'_> {
             lights_visible: self.paths.lights_visible,
             indirect: self.paths.max_scatterings > 1,
         };
-        let steps = Steps::Length(medium.resolution());
+        let steps = Steps::Length(3.0 * medium.resolution());
         let estimator = Estimator {
             world: PathWorld { medium, scene: self.world, lights: self.lights },
             surfaces: None,
