@@ -228,11 +228,16 @@ impl Medium for Impatient<'_> {
 
 #[test]
 fn a_fill_cancelled_on_its_way_leaves_caches_that_serve_and_can_be_filled() {
-    let (whole, _) = filled(settings());
+    let flag = AtomicBool::new(false);
+    let impatient = |questions| Impatient { medium: fog(), left: AtomicU64::new(questions), flag: &flag };
+    let (mut whole, patient) = (RadianceCaches::new(settings()), impatient(u64::MAX));
+    fill_in(&mut whole, &patient, &Control::default());
+    let asked = u64::MAX - patient.left.load(Ordering::Relaxed);
     let expected = mean(&picture(&whole, 2).0);
-    for questions in [20_000, 100_000, 300_000] {
-        let flag = AtomicBool::new(false);
-        let medium = Impatient { medium: fog(), left: AtomicU64::new(questions), flag: &flag };
+    for tenths in [1, 5, 8] {
+        let questions = asked * tenths / 10;
+        let medium = impatient(questions);
+        flag.store(false, Ordering::Relaxed);
         let mut caches = RadianceCaches::new(settings());
         let outcome = fill_in(&mut caches, &medium, &Control { cancel: Some(&flag), progress: None });
         assert!(outcome.cancelled, "{questions}: {outcome:?}");
