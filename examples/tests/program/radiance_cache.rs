@@ -70,7 +70,7 @@ fn picture(folder: &Folder, method: &str, options: &[&str]) -> Image {
     assert_eq!(output.status.code(), Some(0), "{method} {options:?}: {}", said(&output));
     let statistics = std::fs::read_to_string(folder.0.join("s.json")).unwrap();
     assert!(statistics.contains("\"non_finite\": 0}"), "{method} {options:?}: {statistics}");
-    let image = read(&folder.0.join("a.pfm")).unwrap();
+    let image = read(folder.0.join("a.pfm")).unwrap();
     assert!(image.pixels.iter().all(|p| p.is_valid()), "{method} {options:?}");
     image
 }
