@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use fogbow::cache::bytes::Crc;
-use fogbow::cache::{Estimator, Extrapolation, EyeSettings, Limits, radiance};
+use fogbow::cache::{Estimator, Extrapolation, EyeSettings, Limits, Seen, radiance};
 use fogbow::host::Medium;
 use fogbow::light::Light;
 use fogbow::math::{Ray, Vec2};
@@ -143,6 +143,19 @@ pub enum Single {
 fn named(text: &str) -> Result<(Kind, f64), String> {
     let (kind, value) = text.split_once('=').ok_or("must look like multiple=0.2")?;
     Ok((Kind::from_str(kind, false)?, output::positive(value)?))
+}
+
+/// # Errors
+/// A limit on scatterings between one and none: a record does not know how often its light was scattered.
+pub(super) fn check_depth(paths: &path::Settings) -> Result<(), String> {
+    match paths.max_scatterings {
+        0 | 1 | u32::MAX => Ok(()),
+        limit => Err(format!(
+            "radiance caching knows paths of depth 1, of depth 2, or without limit: not {}; leave --max-depth out, \
+             or max_depth of the scene at -1, or take --method path",
+            u64::from(limit) + 1
+        )),
+    }
 }
 
 /// Number of lights from which on single scattering is cached.
@@ -287,7 +300,12 @@ impl WithMedium for CacheJob<'_> {
             };
             let jitter = uniform2(rng);
             let film = Vec2::new((sample.x as f32 + jitter.x) / width, (sample.y as f32 + jitter.y) / height);
-            let seen = radiance(&self.camera.ray(film), &estimator, &reader, &eye, rng);
+            let ray = self.camera.ray(film);
+            let seen = if self.paths.max_scatterings == 0 {
+                Seen { emitted: path::radiance(&ray, &estimator.world, &self.paths, rng).emitted, ..Seen::default() }
+            } else {
+                radiance(&ray, &estimator, &reader, &eye, rng)
+            };
             sample.tally.look_up(seen.lookups, seen.misses);
             if has_layers {
                 let parts = [

@@ -17,7 +17,7 @@ use fogbow_std::radiance_cache::NAMES;
 use fogbow_std::stats::{CountingMedium, CountingScene, Statistics};
 use fogbow_std::tiles::{self, Outcome, Reason, RenderError};
 
-use super::radiance_cache::{CacheArguments, CacheJob};
+use super::radiance_cache::{CacheArguments, CacheJob, check_depth};
 use super::report::{Bar, Report};
 use super::{Ending, Failure, output};
 use crate::camera::Camera;
@@ -103,6 +103,10 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<Ending, Failure> {
     if let Some([origin, target]) = arguments.camera {
         scene = scene.seen_from(origin, target).map_err(|reason| format!("--camera: {reason}"))?;
     }
+    let paths = path_settings(&scene, arguments.max_depth);
+    if arguments.method == Method::RadianceCache {
+        check_depth(&paths)?;
+    }
     let mut storage = Storage::new(&scene);
     let world = statistics.time("build", || World::new(&scene, &mut storage))?;
     let (width, height) = arguments.size.unwrap_or((scene.sensor.width, scene.sensor.height));
@@ -140,7 +144,6 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<Ending, Failure> {
     };
     let lights = world.lights();
     let camera = world.camera_for(width, height);
-    let paths = path_settings(&scene, arguments.max_depth);
     let (film_of, settings_of, control_of) = (&mut film, &settings, &control);
     let mut cached = None;
     let outcome = match arguments.method {
