@@ -40,7 +40,7 @@ impl WithMedium for Job<'_> {
         let world = path::World { medium, scene: self.0, lights: &lights };
         let paths = path::Settings::default();
         let estimator = Estimator { world, surfaces: None, scattered: None, walk, paths, light_samples: 16 };
-        let eye = EyeSettings { density: 1.0, lights_visible: true, indirect: true };
+        let eye = EyeSettings { density: 1.0, connections: 4, lights_visible: true, indirect: true };
         let camera = self.0.camera();
         let mut found: Vec<Place> = Vec::new();
         for i in 0..RAYS {
@@ -92,7 +92,7 @@ fn filled<M: Medium + Sync>(
         threads: 0,
         seed: 1,
     });
-    let eye = EyeSettings { density: 8.0, lights_visible: true, indirect: true };
+    let eye = EyeSettings { density: 8.0, connections: 4, lights_visible: true, indirect: true };
     let ray = |at: [f32; 2]| camera.ray(Vec2::from(at));
     if let Err(error) = fill(&mut caches, estimator, &eye, 0.005, &Control::default(), ray) {
         eprintln!("{error}");

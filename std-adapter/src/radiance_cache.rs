@@ -491,7 +491,7 @@ where
     /// A mark of where the eye rays go and how densely places are asked for.
     fn view(&self) -> u64 {
         let Settings { rays, margin, pixels, round, seed, .. } = *self.settings;
-        let EyeSettings { density, lights_visible, indirect } = *self.eye;
+        let EyeSettings { density, lights_visible, indirect, .. } = *self.eye;
         let mut crc = Crc::new();
         let mut add = |numbers: &[f32]| numbers.iter().for_each(|n| crc.add(&n.to_bits().to_le_bytes()));
         add(&[margin, pixels.0, pixels.1, self.pixel, density, f32::from(lights_visible), f32::from(indirect)]);

@@ -20,7 +20,7 @@ use fogbow_std::radiance_cache::{Effort, Outcome, RadianceCaches, Settings, fill
 use fogbow_std::tiles;
 use fogbow_tests::hosts::{Ball, Body, Filled};
 
-const EYE: EyeSettings = EyeSettings { density: 6.0, lights_visible: true, indirect: true };
+const EYE: EyeSettings = EyeSettings { density: 6.0, connections: 4, lights_visible: true, indirect: true };
 /// About the angle between pixels of an image of 16 × 16 (rad).
 const PIXEL: f32 = 0.06;
 

@@ -35,13 +35,18 @@ struct Cone {
 }
 
 impl Aims {
-    pub(super) fn new(point: Vec3, lights: &[Light<'_>]) -> Self {
+    pub(super) fn new(point: Vec3, lights: &[Light<'_>], is_aim: impl Fn(&Light<'_>) -> bool) -> Self {
         let mut cones = heapless::Vec::new();
         for light in lights {
-            let Some(field) = light.near_field() else { continue };
+            let Some(field) = light.near_field().filter(|_| is_aim(light)) else { continue };
             let offset = field.centre() - point;
             let distance = offset.length();
-            let radius = field.radius().map_or(SHARE * distance, |r| BALL * r);
+            let radius = match (light, field.radius()) {
+                (_, None) => SHARE * distance,
+                // Wide already.
+                (Light::Sphere(_), Some(r)) => r,
+                (_, Some(r)) => BALL * r,
+            };
             let (weight, sine) = (light.importance(point), radius / distance);
             // Written so that NaN fails, too.
             if !(weight > 0.0 && weight < f32::INFINITY && sine < WIDEST) {

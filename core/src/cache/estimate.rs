@@ -7,18 +7,19 @@ use super::lookup::{Basis, Reading};
 use super::record::Facing;
 use super::store::{SurfaceCache, VolumeCache};
 use crate::host::{Hit, Medium, Properties, Rng, Scene};
+use crate::light::Light;
 use crate::math::{Frame, Ray, float};
 use crate::multiple_scatter::{self, Cones, Incoming, Walk};
-use crate::path::connect::next_event;
 use crate::path::trace::leave;
 use crate::path::{self, World};
 use crate::phase::Phase;
+use crate::sampling::discrete::choose;
 use crate::sampling::{Generator, uniform, uniform2, warp};
 use crate::sh::{Coefficient, MAX_DEGREE};
-use crate::single_scatter::{self, Arrival, Contribution, Directional, Sums, nearest_surface};
+use crate::single_scatter::{self, Arrival, Contribution, Directional, Sums, nearest_surface, shadow_ray};
 use crate::spectrum::{Gradient, Spectrum};
 use crate::surface::{Surface, lambert};
-use crate::transmittance::thickness::Marching;
+use crate::transmittance::thickness::{Marching, transmittance};
 
 /// Least cosine in the gradient of an irradiance sample: at grazing directions `1/cos` has a
 /// variance without bound.
@@ -116,12 +117,25 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
         higher: &mut [Coefficient],
         rng: &mut impl Rng,
     ) -> Sums {
-        let mut child = Generator::child(rng);
+        let (mut child, shift) = (Generator::child(rng), uniform2(rng));
+        let World { medium, scene, lights } = self.world;
+        // Rectangles light what lies before them, not what surrounds them.
+        let aims = Aims::new(point, lights, |light| !matches!(light, Light::Quad(_)));
         self.expanded(phase, higher, |into| {
-            let World { medium, scene, .. } = self.world;
-            let outgoing = |ray: &Ray, hit: &Hit| self.outgoing(ray, hit, &mut child);
-            let steps = self.walk.steps;
-            single_scatter::sample_surfaces_directional(point, medium, scene, outgoing, directions, steps, rng, into)
+            let mut sums = Sums::default();
+            for j in 0..directions {
+                let (direction, pdf) =
+                    aimed(&aims, j, directions, shift, warp::uniform_sphere, |_| warp::uniform_sphere_pdf());
+                let ray = Ray::new(point, direction);
+                let marching = Marching { steps: self.walk.steps, offset: uniform(rng) };
+                let Some(hit) = nearest_surface(&ray, scene) else { continue };
+                let radiance = self.outgoing(&ray, &hit, &mut child);
+                let pdf = pdf * directions as f32;
+                if let Some(arrival) = Arrival::from_surface(&ray, &hit, radiance, pdf, medium, marching) {
+                    sums.add(&arrival.scatter_directional(into.moments, 1.0, into.coefficients), true);
+                }
+            }
+            sums
         })
     }
 
@@ -137,7 +151,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
     ) -> Sums {
         let (walk, shift, third) = (self.walker(), uniform2(rng), uniform(rng));
         let share = 1.0 / paths.max(1) as f32;
-        let aims = Aims::new(point, self.world.lights);
+        let aims = Aims::new(point, self.world.lights, |_| true);
         self.expanded(phase, higher, |into| {
             let (mut cones, mut halves) = (Cones::default(), Halves::default());
             for j in 0..paths {
@@ -187,7 +201,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
         let mut child = Generator::child(rng);
         let (frame, walk, shift, third) = (Frame::around(normal), self.walker(), uniform2(rng), uniform(rng));
         let share = 1.0 / paths.max(1) as f32;
-        let aims = Aims::new(point, self.world.lights);
+        let aims = Aims::new(point, self.world.lights, |_| true);
         for j in 0..paths {
             let upwards = |u| frame.to_world(warp::cosine_hemisphere(u));
             let cosine_pdf = |direction| warp::cosine_hemisphere_pdf(normal.dot(direction).max(0.0));
@@ -249,8 +263,37 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
     /// [`Estimator::direct`] with given random numbers for the choice of light and the point on it.
     pub fn direct_at(&self, point: Vec3, hit: &Hit, random: (f32, Vec2), rng: &mut Generator) -> Spectrum {
         let origin = |to_light: Vec3| leave(point, hit.normal, to_light, hit.distance);
-        let cosine = |to_light: Vec3| (Spectrum::splat(hit.normal.dot(to_light).max(0.0)), 0.0);
-        next_event(&self.world, point, false, origin, cosine, random, rng)
+        let cosine = |to_light: Vec3| Spectrum::splat(hit.normal.dot(to_light).max(0.0));
+        self.connected(point, origin, |light| light.importance(point), cosine, random, rng)
+    }
+
+    /// Light of one of the lights, chosen by `weight`, times `value(to_light)`. Transmittance is marched:
+    /// what ratio tracking adds in noise would rule pictures whose other parts have none.
+    pub(super) fn connected(
+        &self,
+        point: Vec3,
+        origin: impl Fn(Vec3) -> Vec3,
+        weight: impl Fn(&Light<'_>) -> f32,
+        value: impl Fn(Vec3) -> Spectrum,
+        random: (f32, Vec2),
+        rng: &mut Generator,
+    ) -> Spectrum {
+        let World { medium, scene, lights } = self.world;
+        // Capped, so that a sum over all lights stays a number.
+        let weighted = lights.iter().map(|light| (weight(light).min(1e30), light));
+        let Some((light, chosen)) = choose(weighted, random.0) else { return Spectrum::ZERO };
+        let Some(sample) = light.sample(point, random.1) else { return Spectrum::ZERO };
+        let value = value(sample.incident.to_light);
+        if value.is_black() {
+            return Spectrum::ZERO;
+        }
+        let shadow = shadow_ray(origin(sample.incident.to_light), &sample.source);
+        if scene.is_blocked(&shadow) {
+            return Spectrum::ZERO;
+        }
+        let marching = Marching { steps: self.walk.steps, offset: uniform(rng) };
+        let through = transmittance(&shadow, medium, marching);
+        value * sample.incident.irradiance * through / chosen.probability
     }
 
     /// Irradiance (W·m⁻²) that is not straight from the lights, by one path.
@@ -271,9 +314,8 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
         rng: &mut Generator,
     ) -> Spectrum {
         let origin = |to_light: Vec3| leave(point, hit.normal, to_light, hit.distance);
-        let value =
-            |to_light: Vec3| (surface.value(hit.normal, to_eye, to_light) * hit.normal.dot(to_light).max(0.0), 0.0);
-        next_event(&self.world, point, false, origin, value, random, rng)
+        let value = |to_light: Vec3| surface.value(hit.normal, to_eye, to_light) * hit.normal.dot(to_light).max(0.0);
+        self.connected(point, origin, |light| light.importance(point), value, random, rng)
     }
 
     /// Light of all lights, scattered once at `point` towards `to_eye`: one sample of each.

@@ -6,11 +6,10 @@ use super::estimate::Estimator;
 use super::lookup::{Basis, Reading};
 use super::store::{SurfaceCache, VolumeCache};
 use crate::host::{Hit, Medium, Properties, Rng, Scene};
-use crate::light::{Falloff, Source};
+use crate::light::{Falloff, Light, Source};
 use crate::march::scattering_points;
 use crate::math::{Frame, Ray};
 use crate::path::World;
-use crate::path::connect::reach;
 use crate::path::trace::leave;
 use crate::phase::deflection;
 use crate::sampling::discrete::choose;
@@ -32,6 +31,8 @@ const STEPS: [f32; 3] = [0.618_034, 0.754_877_67, 0.569_840_3];
 pub struct EyeSettings {
     /// Points per sample on a ray through opaque fog: see [`scattering_points`].
     pub density: f32,
+    /// Connections per segment of a ray to lights in whose near field it runs.
+    pub connections: u32,
     /// Whether eye rays see area lights and the environment.
     pub lights_visible: bool,
     /// Whether light is followed beyond its first scattering.
@@ -288,24 +289,20 @@ struct Gather<'a, M: ?Sized, S: ?Sized> {
 impl<M: Medium + ?Sized, S: Scene + ?Sized> Gather<'_, M, S> {
     /// Single scattering at a point of the ray of one light, in whose near field it does not lie.
     fn connected(&mut self, point: Vec3, to_eye: Vec3, properties: &Properties, k: u32) -> Spectrum {
-        let world = &self.estimator.world;
         let [choice, u, v] = [0, 1, 2].map(|i| {
             let x = self.light[i] + STEPS[i] * k as f32;
             (x - libm::floorf(x)).min(1.0 - f32::EPSILON)
         });
-        let weighted = world.lights.iter().map(|light| {
+        let weight = |light: &Light<'_>| {
             let is_near = light.steep_field().is_some_and(|field| field.contains(point));
-            (if is_near { 0.0 } else { light.importance(point).min(1e30) }, light)
-        });
-        let Some((light, chosen)) = choose(weighted, choice) else { return Spectrum::ZERO };
-        let Some(sample) = light.sample(point, Vec2::new(u, v)) else { return Spectrum::ZERO };
-        let value = properties.phase.value(deflection(sample.incident.to_light, to_eye));
-        let way = Ray { origin: point, direction: sample.incident.to_light, length: sample.incident.distance };
-        value * sample.incident.irradiance * reach(world, &way, &mut self.rng) / chosen.probability
+            if is_near { 0.0 } else { light.importance(point) }
+        };
+        let value = |to_light: Vec3| properties.phase.value(deflection(to_light, to_eye));
+        self.estimator.connected(point, |_| point, weight, value, (choice, Vec2::new(u, v)), &mut self.rng)
     }
 
     /// Single scattering along a segment of one light within its near field.
-    fn near(&mut self, segment: &Ray) -> Option<Spectrum> {
+    fn near(&mut self, segment: &Ray, choice: f32, u: f32) -> Option<Spectrum> {
         let world = &self.estimator.world;
         let reached = world.lights.iter().filter_map(|light| {
             let centre = light.steep_field()?.centre();
@@ -314,10 +311,10 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Gather<'_, M, S> {
             let height = segment.at(along).distance(centre).max(1e-6);
             Some((light.intensity() / height, (light, interval)))
         });
-        let ((light, interval), chosen) = choose(reached, self.along[0])?;
+        let ((light, interval), chosen) = choose(reached, choice)?;
         let (pivot, source) = light.anchor(uniform2(&mut self.rng))?;
         let law = Equiangular::new(segment.origin, segment.direction, pivot, interval.0, interval.1)?;
-        let distance = law.sample(self.along[1]).clamp(interval.0, interval.1);
+        let distance = law.sample(u).clamp(interval.0, interval.1);
         let point = segment.at(distance);
         let properties = world.medium.properties(point);
         if properties.scattering.is_black() {
@@ -370,10 +367,16 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Gather<'_, M, S> {
 
 impl<M: Medium + ?Sized, S: Scene + ?Sized> Sight for Gather<'_, M, S> {
     fn segment(&mut self, segment: &Ray, throughput: Spectrum) {
-        if self.caches.single.is_none()
-            && let Some(light) = self.near(segment)
-        {
-            self.seen.medium_single += throughput * light;
+        if self.caches.single.is_some() {
+            return;
+        }
+        let count = self.settings.connections.max(1);
+        for k in 0..count {
+            let choice = self.along[0] + STEPS[0] * k as f32;
+            let u = (k as f32 + self.along[1]) / count as f32;
+            if let Some(light) = self.near(segment, choice - libm::floorf(choice), u) {
+                self.seen.medium_single += throughput * light / count as f32;
+            }
         }
     }
 

@@ -85,7 +85,7 @@ fn way(origin: Vec3, point: Vec3, source: &Source, incident: &Incident) -> Ray {
 
 /// Transmittance times visibility on the way to a light, 0 or more per channel.
 #[inline]
-pub(crate) fn reach<M: Medium + ?Sized, S: Scene + ?Sized>(
+pub(super) fn reach<M: Medium + ?Sized, S: Scene + ?Sized>(
     world: &World<'_, M, S>,
     way: &Ray,
     rng: &mut Generator,
@@ -97,7 +97,7 @@ pub(crate) fn reach<M: Medium + ?Sized, S: Scene + ?Sized>(
 /// Next-event estimation: `value(to_light)` gives the scattering function (with the cosine, at a
 /// surface) and the density with which the walk itself would go there.
 #[inline]
-pub(crate) fn next_event<M: Medium + ?Sized, S: Scene + ?Sized>(
+pub(super) fn next_event<M: Medium + ?Sized, S: Scene + ?Sized>(
     world: &World<'_, M, S>,
     point: Vec3,
     in_medium: bool,

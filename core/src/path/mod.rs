@@ -19,7 +19,7 @@
 //! * hits of lights with extent and of the environment by the path itself; the power heuristic
 //!   (Veach 1997) weighs them against connections.
 
-pub(crate) mod connect;
+mod connect;
 pub mod trace;
 
 pub use trace::radiance;

@@ -255,6 +255,7 @@ impl WithMedium for CacheJob<'_> {
         let settings = self.efforts(&sharpest.unwrap_or(Phase::ISOTROPIC));
         let eye = EyeSettings {
             density: 8.0,
+            connections: 4,
             lights_visible: self.paths.lights_visible,
             indirect: self.paths.max_scatterings > 1,
         };

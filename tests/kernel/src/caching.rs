@@ -146,7 +146,7 @@ fn in_medium(out: &mut Digest, medium: &dyn Medium, lights: &[Light<'_>]) -> Res
     }
     let caches =
         Caches { single: None, surface: reader(&surface), multiple: reader(&multiple), irradiance: reader(&floor) };
-    let settings = EyeSettings { density: 4.0, lights_visible: true, indirect: true };
+    let settings = EyeSettings { density: 4.0, connections: 4, lights_visible: true, indirect: true };
     for _ in 0..QUESTIONS / 2 {
         let eye = Vec3::new(0.0, 0.5, -5.0);
         let ray = Ray::new(eye, (point(&mut rng) * 0.5 - eye).normalize());
