@@ -71,11 +71,7 @@ impl WithMedium for Job<'_> {
 /// Greatest radius over the size of the scene.
 const REACH: f32 = 0.1;
 
-fn filled<M: Medium + Sync>(
-    estimator: &Estimator<'_, M, World<'_>>,
-    camera: &Camera,
-    most: f32,
-) -> RadianceCaches {
+fn filled<M: Medium + Sync>(estimator: &Estimator<'_, M, World<'_>>, camera: &Camera, most: f32) -> RadianceCaches {
     let effort = |tolerance| {
         Some(Effort { tolerance, samples: SAMPLES, degree: 0, limits: Limits { min: 0.01 * most, max: most } })
     };

@@ -217,6 +217,9 @@ impl core::error::Error for FillError {}
 /// By how much fewer walks the very first records are made of.
 const FIRST_WALKS: u32 = 4;
 
+/// By how much fewer samples decide the radii of final records: their values come from samples of their own.
+const FIRST_LOOK: u32 = 3;
+
 /// Rays of the first batch; each next one has twice as many, up to [`LAST_BATCH`].
 const FIRST_BATCH: u32 = 64;
 
@@ -331,7 +334,10 @@ impl Fill for SurfaceCache<'_> {
 }
 
 /// What lights all final records.
-fn lighting<'a>(cache: &'a Option<SurfaceCache<'static>>, settings: &Settings) -> Option<(&'a SurfaceCache<'a>, Reading)> {
+fn lighting<'a>(
+    cache: &'a Option<SurfaceCache<'static>>,
+    settings: &Settings,
+) -> Option<(&'a SurfaceCache<'a>, Reading)> {
     Some((cache.as_ref()?, settings.reading(&settings.coarse_irradiance()?)))
 }
 
@@ -418,6 +424,8 @@ where
             caches.coarse_irradiance.as_ref().map_or(0, Fill::count),
             caches.surface.as_ref().map_or(0, Fill::count),
             caches.coarse_multiple.as_ref().map_or(0, Fill::count),
+            caches.multiple.as_ref().map_or(0, Fill::count),
+            caches.irradiance.as_ref().map_or(0, Fill::count),
         ];
         // What lights everything else: coarse, because whoever asks sees many records at once. Made by
         // whole walks, and few, because it is revised with what those have told.
@@ -467,18 +475,32 @@ where
             let known = surface.zip(coarse).map(|(s, (c, e))| [s, (c, settings.reading(&e))]);
             let estimator = Estimator { scattered: known, ..estimator };
             outcome.computed[2] += self.rounds(cache, &effort, 2, &all, in_medium, |cache, place, rng| {
-                scattered(cache, &estimator, effort.samples, place, rng, Part::Multiple)
+                scattered(cache, &estimator, effort.samples / FIRST_LOOK, place, rng, Part::Multiple)
             });
             outcome.seconds[2] = outcome.seconds[2] + clock.elapsed();
         }
+        let clock = Stopwatch::start();
+        let known = surface.zip(caches.multiple.as_ref().zip(settings.multiple));
+        let known = known.map(|(s, (c, e))| [s, (c, settings.reading(&e))]);
+        let again = Estimator { scattered: known, ..estimator };
+        let revised = self.revised(&caches.multiple, settings.multiple, before[3], 100, |cache, e, place, rng| {
+            scattered(cache, &again, e.samples, place, rng, Part::Multiple)
+        });
+        outcome.computed[2] += put(&mut caches.multiple, settings.multiple, before[3], revised);
+        outcome.seconds[2] = outcome.seconds[2] + clock.elapsed();
         let multiple = caches.multiple.as_ref().zip(settings.multiple).map(|(c, e)| (c, settings.reading(&e)));
-        if let (Some(cache), Some(effort)) = (&mut caches.irradiance, settings.irradiance) {
+        if let Some(effort) = settings.irradiance {
             let clock = Stopwatch::start();
             let known = surface.zip(multiple).map(|(surface, multiple)| [surface, multiple]);
             let estimator = Estimator { scattered: known, ..estimator };
+            let Some(cache) = &mut caches.irradiance else { return outcome };
             outcome.computed[3] += self.rounds(cache, &effort, 3, &all, in_sight, |_, place, rng| {
-                irradiance(&estimator, effort.samples, place, rng)
+                irradiance(&estimator, effort.samples / FIRST_LOOK, place, rng)
             });
+            let revised = self.revised(&caches.irradiance, settings.irradiance, before[4], 101, |_, e, place, rng| {
+                irradiance(&estimator, e.samples, place, rng)
+            });
+            outcome.computed[3] += put(&mut caches.irradiance, settings.irradiance, before[4], revised);
             outcome.seconds[3] = outcome.seconds[3] + clock.elapsed();
         }
         outcome.cancelled = self.control.is_cancelled();
@@ -524,18 +546,19 @@ where
     }
 
     /// Estimates the first records once more, with everything they know of each other; from those numbers on.
-    fn revise(&self, caches: &mut RadianceCaches, from: [usize; 3], pass: u64, outcome: &mut Outcome) {
+    fn revise(&self, caches: &mut RadianceCaches, from: [usize; 5], pass: u64, outcome: &mut Outcome) {
         let settings = self.settings;
-        let (on_surfaces, light, coarse) =
-            (settings.coarse_irradiance(), settings.surface, settings.coarse_multiple());
+        let (on_surfaces, light, coarse) = (settings.coarse_irradiance(), settings.surface, settings.coarse_multiple());
         let surface = caches.surface.as_ref().zip(light).map(|(c, e)| (c, settings.reading(&e)));
         let multiple = caches.coarse_multiple.as_ref().zip(coarse).map(|(c, e)| (c, settings.reading(&e)));
         let known = surface.zip(multiple).map(|(surface, multiple)| [surface, multiple]);
-        let estimator = Estimator { surfaces: lighting(&caches.coarse_irradiance, settings), scattered: known, ..*self.estimator };
+        let estimator =
+            Estimator { surfaces: lighting(&caches.coarse_irradiance, settings), scattered: known, ..*self.estimator };
         let mut clock = Stopwatch::start();
-        let new_irradiance = self.revised(&caches.coarse_irradiance, on_surfaces, from[0], 3 * pass, |_, e, place, rng| {
-            irradiance(&estimator, e.samples, place, rng)
-        });
+        let new_irradiance =
+            self.revised(&caches.coarse_irradiance, on_surfaces, from[0], 3 * pass, |_, e, place, rng| {
+                irradiance(&estimator, e.samples, place, rng)
+            });
         outcome.seconds[3] = outcome.seconds[3] + clock.elapsed();
         clock = Stopwatch::start();
         let new_surface = self.revised(&caches.surface, light, from[1], 3 * pass + 1, |cache, e, place, rng| {
@@ -543,9 +566,10 @@ where
         });
         outcome.seconds[1] = outcome.seconds[1] + clock.elapsed();
         clock = Stopwatch::start();
-        let new_multiple = self.revised(&caches.coarse_multiple, coarse, from[2], 3 * pass + 2, |cache, e, place, rng| {
-            scattered(cache, &estimator, e.samples, place, rng, Part::Multiple)
-        });
+        let new_multiple =
+            self.revised(&caches.coarse_multiple, coarse, from[2], 3 * pass + 2, |cache, e, place, rng| {
+                scattered(cache, &estimator, e.samples, place, rng, Part::Multiple)
+            });
         outcome.seconds[2] = outcome.seconds[2] + clock.elapsed();
         outcome.computed[3] += put(&mut caches.coarse_irradiance, on_surfaces, from[0], new_irradiance);
         outcome.computed[1] += put(&mut caches.surface, light, from[1], new_surface);
@@ -565,9 +589,8 @@ where
             return Vec::new();
         }
         let seed = mix(self.settings.seed ^ mix(stream + 16));
-        let estimate = |number: usize| {
-            compute(cache, &effort, &cache.record(number).0, &mut Generator::new(seed ^ number as u64))
-        };
+        let estimate =
+            |number: usize| compute(cache, &effort, &cache.record(number).0, &mut Generator::new(seed ^ number as u64));
         (from..cache.count()).into_par_iter().map(estimate).collect()
     }
 

@@ -207,8 +207,7 @@ impl CacheJob<'_> {
             Single::Cached => true,
         };
         // Gradients through changing extinction are noisy, and exponentials of noise are too bright.
-        let carrying =
-            if self.world.media().is_homogeneous() { Carrying::ExponentialMean } else { Carrying::Linear };
+        let carrying = if self.world.media().is_homogeneous() { Carrying::ExponentialMean } else { Carrying::Linear };
         cache::Settings {
             single: if cached { effort(Kind::Single, 0.2, 16.0, degree(1, 0.0), 0.1) } else { None },
             surface: effort(Kind::Surface, 2.0, 256.0, degree(1, 1.5), 0.1),
