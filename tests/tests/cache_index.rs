@@ -1,6 +1,6 @@
 //! The index of the radiance cache finds the spheres that brute force finds, wherever they lie.
 
-use fogbow::cache::index::{Block, Index, Node};
+use fogbow::cache::{Block, Index, Node};
 use fogbow::math::Vec3;
 use fogbow::storage::Full;
 use proptest::prelude::*;
