@@ -52,6 +52,16 @@ impl Camera {
         Ray::new(self.eye + across * self.near, across.normalize())
     }
 
+    /// Where on the film a point is seen, in the coordinates of [`Camera::ray`]; `None` if it lies behind. May lie
+    /// outside the film.
+    #[must_use]
+    pub fn film(&self, point: Vec3) -> Option<Vec2> {
+        let offset = point - self.eye;
+        let depth = offset.dot(self.forward);
+        let along = |axis: Vec3| 0.5 * offset.dot(axis) / (depth * axis.length_squared());
+        (depth > self.near).then(|| Vec2::new(0.5 + along(self.right), 0.5 - along(self.up)))
+    }
+
     /// Where it stands (m).
     #[must_use]
     pub fn position(&self) -> Vec3 {
