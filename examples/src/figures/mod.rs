@@ -23,7 +23,7 @@ use fogbow::spectrum::Spectrum;
 
 use crate::cli::Failure;
 use extrapolation::{Slice, WAYS};
-use plot::{BLACK, BLUE, GREEN, Line, ORANGE, Plot};
+use plot::{BLACK, BLUE, GREEN, GREY, Line, ORANGE, Plot};
 use radius::{Claims, Radii, TOLERANCE};
 
 /// What to make, and where.
@@ -104,8 +104,7 @@ fn head(plan: &Plan, seconds: f64) -> String {
          makes all of this, the numbers on this page among it; here in {:.1} minutes. Errors are the root of the mean \
          square difference from the truth over the root of the mean square of the truth, over all pixels and channels. \
          Two more path-traced pictures, with random numbers of their own, stand in for the truth in such a way that their \
-         noise cancels: the mean of (image − a)(image − b). Errors are exact on the mean but for the luck of bright \
-         outliers.\n\n",
+         noise cancels: the mean of (image − a)(image − b). Bright outliers of path tracing make errors uncertain.\n\n",
         seconds / 60.0
     )
 }
@@ -150,7 +149,7 @@ fn fourth(plan: &Plan) -> Result<String, Failure> {
 fn radii_plot(radii: &[Radii]) -> Plot<'static> {
     let line = |name, colour, of: fn(&Radii) -> f64| {
         let points = radii.iter().map(|r| [r.x, of(r)]).collect();
-        Line { name, colour, points }
+        Line { name, colour, width: 1.4, points }
     };
     Plot {
         across: "position (m)",
@@ -181,13 +180,18 @@ fn fifth(plan: &Plan) -> Result<String, Failure> {
     {
         let [constant, linear, exponential] = slice.errors().map(|e| 100.0 * e);
         table += &format!("| {name} | {} | {constant:.2} % | {linear:.2} % | {exponential:.2} % |\n", slice.records);
-        let file = format!("fig-05-{}.svg", name.replace(' ', "-"));
-        plan.write(&file, &scanline(&slice).svg())?;
-        page += &format!("![a line through {name}]({file})\n\n");
+        let [values, errors] = scanlines(&slice);
+        for (what, plot) in [("line", values), ("errors", errors)] {
+            let file = format!("fig-05-{}-{what}.svg", name.replace(' ', "-"));
+            plan.write(&file, &plot.svg())?;
+            page += &format!("![{what}, {name}]({file})\n\n");
+        }
         rows.push(pictures(&slice)?);
     }
     montage::save(&plan.output.join("fig-05-slices.png"), &montage::above(&rows)?, 0.0)?;
-    Ok(format!("{page}The middle lines of the slices, above. The errors, Σ|L̂ − L|/ΣL over all pixels:\n\n{table}\n"))
+    Ok(format!(
+        "{page}Along the middle lines of the slices: radiance, and how far it is from the truth; in even fog, then in smoke. The errors, Σ|L̂ − L|/ΣL over all pixels:\n\n{table}\n"
+    ))
 }
 
 fn pictures(slice: &Slice) -> Result<fogbow_std::film::Image, Failure> {
@@ -202,28 +206,28 @@ fn pictures(slice: &Slice) -> Result<fogbow_std::film::Image, Failure> {
     montage::beside(&all)
 }
 
-fn scanline(slice: &Slice) -> Plot<'static> {
-    let middle = slice.edge / 2;
-    let line = |name, colour, values: &[f32]| {
-        let at = |x: u32| values.get((middle * slice.edge + x) as usize).copied().unwrap_or_default();
-        let points = (0..slice.edge).map(|x| {
-            let place = extrapolation::place(slice.edge, x, middle);
-            [f64::from(place.x), f64::from(at(x))]
-        });
-        Line { name, colour, points: points.collect() }
+/// The middle row: what the records make of it, and by how much that is wrong.
+fn scanlines(slice: &Slice) -> [Plot<'static>; 2] {
+    let row = |values: &[f32]| -> Vec<[f64; 2]> {
+        let y = slice.edge / 2;
+        let at = |x: u32| values.get((y * slice.edge + x) as usize).copied().unwrap_or_default();
+        (0..slice.edge).map(|x| [f64::from(extrapolation::place(slice.edge, x, y).x), f64::from(at(x))]).collect()
     };
-    let colours = [ORANGE, GREEN, BLUE];
-    let mut lines: Vec<Line<'_>> = WAYS
-        .iter()
-        .zip(&slice.carried)
-        .zip(colours)
-        .map(|(((name, _), values), colour)| line(name, colour, values))
-        .collect();
-    lines.push(line("truth", BLACK, &slice.truth));
-    let of_line = || lines.iter().flat_map(|l| &l.points).map(|p| p[1]).filter(|l| *l > 0.0);
-    let power = |l: f64, round: fn(f64) -> f64| 10_f64.powf(round(l.log10()));
-    let y =
-        [power(of_line().fold(f64::INFINITY, f64::min), f64::floor), power(of_line().fold(0.0, f64::max), f64::ceil)];
+    let truth = row(&slice.truth);
+    let (mut values, mut errors) = (Vec::new(), Vec::new());
+    values.push(Line { name: "truth", colour: GREY, width: 4.0, points: truth.clone() });
+    for (((name, _), carried), colour) in WAYS.iter().zip(&slice.carried).zip([ORANGE, GREEN, BLUE]) {
+        let points = row(carried);
+        let relative = points.iter().zip(&truth).map(|(p, t)| [p[0], (p[1] / t[1] - 1.0).abs()]).collect();
+        values.push(Line { name, colour, width: 1.2, points });
+        errors.push(Line { name, colour, width: 1.2, points: relative });
+    }
+    let all = || values.iter().flat_map(|l| &l.points).map(|p| p[1]).filter(|l| *l > 0.0);
+    let y = [all().fold(f64::INFINITY, f64::min) / 1.1, all().fold(0.0, f64::max) * 1.1];
     let half = f64::from(extrapolation::HALF);
-    Plot { across: "position (m)", upwards: "radiance", x: [-half, half], y, lines }
+    let (across, x) = ("position (m)", [-half, half]);
+    [
+        Plot { across, upwards: "radiance", x, y, lines: values },
+        Plot { across, upwards: "relative error", x, y: [1e-4, 1.0], lines: errors },
+    ]
 }

@@ -10,6 +10,7 @@ const TOP: f64 = 26.0;
 const BOTTOM: f64 = 40.0;
 
 /// Colours of lines that also those tell apart who see few (Okabe and Ito 2008).
+pub(super) const GREY: &str = "#bbbbbb";
 pub(super) const BLACK: &str = "#000000";
 pub(super) const BLUE: &str = "#0072b2";
 pub(super) const ORANGE: &str = "#d55e00";
@@ -19,7 +20,9 @@ pub(super) const GREEN: &str = "#009e73";
 pub(super) struct Line<'a> {
     pub(super) name: &'a str,
     pub(super) colour: &'a str,
-    /// What is not finite leaves a gap.
+    /// Stroke (pixels).
+    pub(super) width: f64,
+    /// What is not positive leaves a gap.
     pub(super) points: Vec<[f64; 2]>,
 }
 
@@ -28,7 +31,6 @@ pub(super) struct Plot<'a> {
     pub(super) across: &'a str,
     pub(super) upwards: &'a str,
     pub(super) x: [f64; 2],
-    /// Powers of ten make good limits.
     pub(super) y: [f64; 2],
     pub(super) lines: Vec<Line<'a>>,
 }
@@ -54,10 +56,16 @@ impl Plot<'_> {
         let _ = write!(
             svg,
             "<clipPath id=\"frame\"><rect x=\"{LEFT}\" y=\"{TOP}\" width=\"{w}\" height=\"{h}\"/></clipPath>\n\
-             <g fill=\"none\" stroke-width=\"1.4\" stroke-linejoin=\"round\" clip-path=\"url(#frame)\">\n"
+             <g fill=\"none\" stroke-linejoin=\"round\" clip-path=\"url(#frame)\">\n"
         );
         for line in &self.lines {
-            let _ = writeln!(svg, "<path stroke=\"{}\" d=\"{}\"/>", line.colour, self.path(&line.points));
+            let _ = writeln!(
+                svg,
+                "<path stroke=\"{}\" stroke-width=\"{}\" d=\"{}\"/>",
+                line.colour,
+                line.width,
+                self.path(&line.points)
+            );
         }
         let _ = write!(
             svg,
@@ -99,16 +107,20 @@ impl Plot<'_> {
                 (x * 1e3).round() / 1e3
             );
         }
-        let (first, last) = (self.y[0].log10().ceil() as i32, self.y[1].log10().floor() as i32);
-        for power in first..=last {
-            let [_, at] = self.place([self.x[0], 10_f64.powi(power)]);
-            let _ = write!(
+        let (first, last) = (self.y[0].log10().floor() as i32, self.y[1].log10().ceil() as i32);
+        let mantissas: &[f64] = if last - first > 3 { &[1.0] } else { &[1.0, 2.0, 5.0] };
+        let ticks = (first..=last).flat_map(|power| mantissas.iter().map(move |m| m * 10_f64.powi(power)));
+        // A little room for rounding.
+        for tick in ticks.filter(|t| (self.y[0] * 0.999..=self.y[1] * 1.001).contains(t)) {
+            let [_, at] = self.place([self.x[0], tick]);
+            let _ = writeln!(
                 svg,
                 "<path d=\"M{LEFT} {at:.1}H{}\" stroke=\"#ddd\"/>\
-                 <text x=\"{}\" y=\"{:.1}\" text-anchor=\"end\">10<tspan dy=\"-4\" font-size=\"9\">{power}</tspan></text>\n",
+                 <text x=\"{}\" y=\"{:.1}\" text-anchor=\"end\">{}</text>",
                 WIDTH - RIGHT,
-                LEFT - 4.0,
-                at + 5.0
+                LEFT - 5.0,
+                at + 4.0,
+                (tick * 1e6).round() / 1e6,
             );
         }
     }
