@@ -77,7 +77,7 @@ pub fn homogeneous(edge: u32) -> Slice {
 #[must_use]
 pub fn heterogeneous(edge: u32) -> Slice {
     let shape =
-        FractalNoise { frequency: 1.6, octaves: 3, offset: 0.25, amplitude: 0.8, seed: 3, ..Default::default() };
+        FractalNoise { frequency: 1.1, octaves: 2, offset: 0.25, amplitude: 0.8, seed: 3, ..Default::default() };
     let smoke = Noise::new(shape, Spectrum::ZERO, Spectrum::splat(5.0), Phase::ISOTROPIC);
     slice(edge, &smoke.expect("constants"))
 }

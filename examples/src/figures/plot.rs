@@ -73,9 +73,9 @@ impl Plot<'_> {
         );
         let mut x = LEFT;
         for line in &self.lines {
-            let _ = write!(
+            let _ = writeln!(
                 svg,
-                "<path d=\"M{x} 13h20\" stroke=\"{}\" stroke-width=\"2\"/><text x=\"{}\" y=\"17\">{}</text>\n",
+                "<path d=\"M{x} 13h20\" stroke=\"{}\" stroke-width=\"2\"/><text x=\"{}\" y=\"17\">{}</text>",
                 line.colour,
                 x + 25.0,
                 line.name
@@ -99,10 +99,10 @@ impl Plot<'_> {
         for k in 0..=10 {
             let x = self.x[0] + (self.x[1] - self.x[0]) * f64::from(k) / 10.0;
             let [at, _] = self.place([x, self.y[0]]);
-            let _ = write!(
+            let _ = writeln!(
                 svg,
                 "<path d=\"M{at:.1} {TOP}V{bottom}\" stroke=\"#ddd\"/>\
-                 <text x=\"{at:.1}\" y=\"{}\" text-anchor=\"middle\">{}</text>\n",
+                 <text x=\"{at:.1}\" y=\"{}\" text-anchor=\"middle\">{}</text>",
                 bottom + 15.0,
                 (x * 1e3).round() / 1e3
             );

@@ -16,9 +16,7 @@ pub(super) fn seen(points: &[Vec3], camera: &Camera, [width, height]: [u32; 2]) 
     for point in points {
         if let Some(film) = camera.film(*point) {
             let at = [film.x * width as f32, film.y * height as f32];
-            if at[0] >= 0.0 && at[1] >= 0.0 {
-                montage::set(&mut image, at[0] as u32, at[1] as u32, INK);
-            }
+            dot(&mut image, at, 1);
         }
     }
     Ok(image)
@@ -31,9 +29,16 @@ pub(super) fn section(points: &[Vec3], heights: [f32; 2], low: Vec3, high: Vec3,
     let mut image = montage::made(width, height, |_, _| Spectrum::ONE)?;
     for point in points.iter().filter(|p| (heights[0]..heights[1]).contains(&p.y)) {
         let at = [(point.x - low.x) * scale, (point.z - low.z) * scale];
-        if at[0] >= 0.0 && at[1] >= 0.0 {
-            montage::set(&mut image, at[0] as u32, at[1] as u32, INK);
-        }
+        dot(&mut image, at, 3);
     }
     Ok(image)
+}
+
+/// A square of `size` pixels.
+fn dot(image: &mut Image, [x, y]: [f32; 2], size: u32) {
+    if x >= 0.0 && y >= 0.0 {
+        for i in 0..size * size {
+            montage::set(image, x as u32 + i % size, y as u32 + i / size, INK);
+        }
+    }
 }
