@@ -305,6 +305,9 @@ fn turns_of_the_normal_agree_with_differences() {
         let back = (Vec3::Z - axis * 0.05).normalize();
         let difference = mean(tilted).0 - mean(back).0;
         let expected = turn.dot(tilted - back);
-        assert!((difference - expected).abs() < 0.0008 * value, "{axis}: {difference} instead of {expected} of {value}");
+        assert!(
+            (difference - expected).abs() < 0.0008 * value,
+            "{axis}: {difference} instead of {expected} of {value}"
+        );
     }
 }
