@@ -281,7 +281,7 @@ pub(super) fn road(plan: &Plan) -> Result<String, Failure> {
     // A record of single scattering marches to every one of the lights, and there is one around each: a point of the
     // picture that connects to one light at a time is cheaper.
     let pair = pair(plan, &scene_of(plan, "foggy-road"), size, &["--single", "direct"])?;
-    montage::save(&plan.output.join("fig-10-road.png"), &with_insets(&pair, [0.5, 0.6])?, 0.0)?;
+    montage::save(&plan.output.join("fig-10-road.png"), &with_insets(&pair, [0.42, 0.65])?, 0.0)?;
     Ok(format!(
         "## Fig. 10: a road in fog\n\n![road](fig-10-road.png)\n\nTwo cars in patchy fog with 60 lights; below left caching, \
          right path tracing. Unlike J's, light straight from the lights is connected to and not cached. The comparison with \
