@@ -52,14 +52,13 @@ impl Camera {
         Ray::new(self.eye + across * self.near, across.normalize())
     }
 
-    /// Where on the film a point is seen, in the coordinates of [`Camera::ray`]; `None` if it lies behind. May lie
-    /// outside the film.
+    /// Where on the film `point` is seen, beyond its borders too; `None` behind the near plane.
     #[must_use]
-    pub fn film(&self, point: Vec3) -> Option<Vec2> {
-        let offset = point - self.eye;
-        let depth = offset.dot(self.forward);
-        let along = |axis: Vec3| 0.5 * offset.dot(axis) / (depth * axis.length_squared());
-        (depth > self.near).then(|| Vec2::new(0.5 + along(self.right), 0.5 - along(self.up)))
+    pub fn project(&self, point: Vec3) -> Option<Vec2> {
+        let towards = point - self.eye;
+        let depth = towards.dot(self.forward);
+        let along = |axis: Vec3| towards.dot(axis) / (axis.length_squared() * depth);
+        (depth > self.near).then(|| Vec2::new(0.5 + 0.5 * along(self.right), 0.5 - 0.5 * along(self.up)))
     }
 
     /// Where it stands (m).
@@ -115,6 +114,16 @@ mod tests {
         assert!((half(FovAxis::Smaller, 100, 200, 1.0, 0.5) - 30.0).abs() < 1e-3);
         assert!((half(FovAxis::Larger, 100, 200, 0.5, 0.0) - 30.0).abs() < 1e-3);
         assert!((half(FovAxis::Diagonal, 200, 100, 1.0, 0.0) - 30.0).abs() < 1e-3);
+    }
+
+    #[test]
+    fn a_point_is_seen_where_its_ray_leaves() {
+        let camera = Camera::new(&sensor(60.0, FovAxis::X, 200, 100), 200, 100);
+        for film in [Vec2::new(0.1, 0.9), Vec2::new(0.7, 0.2), Vec2::new(1.3, -0.4)] {
+            let seen = camera.project(camera.ray(film).at(3.0)).unwrap();
+            assert!((seen - film).length() < 1e-5, "{film}: {seen}");
+        }
+        assert_eq!(camera.project(Vec3::new(0.0, 0.0, 5.0)), None);
     }
 
     #[test]

@@ -1,5 +1,8 @@
 //! The program as users call it: exit codes, files, messages.
 
+#[path = "program/radiance_cache.rs"]
+mod radiance_cache;
+
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 

@@ -5,11 +5,14 @@
 //! one of the same round now covers. First the cache on surfaces, because light from surfaces enters all
 //! others.
 
+mod file;
+
 use core::fmt;
 
+use fogbow::cache::bytes::Crc;
 use fogbow::cache::{
-    Cache, Caches, Estimator, EyeSettings, Facing, Limits, Place, Reader, Reading, Record, SurfaceCache, VolumeCache,
-    places,
+    Cache, Caches, Estimator, Extrapolation, EyeSettings, Facing, Limits, Place, Reader, Reading, Record, SurfaceCache,
+    VolumeCache, clamp_gradient, places,
 };
 use fogbow::host::{Medium, Scene};
 use fogbow::math::{Ray, Vec3};
@@ -17,10 +20,13 @@ use fogbow::sampling::Generator;
 use fogbow::sampling::uniform::mix;
 use fogbow::sh::{Coefficient, coefficient_count};
 use fogbow::single_scatter::Sums;
+use fogbow::spectrum::Gradient;
 use rayon::iter::{IntoParallelIterator, IntoParallelRefIterator, ParallelIterator};
 
 use crate::progress::Control;
 use crate::stats::{Seconds, Stopwatch};
+
+pub use file::{FileError, Problem, decode, encode, load, save};
 
 /// One cache's share of quality and effort.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -36,9 +42,9 @@ pub struct Effort {
 }
 
 impl Effort {
-    /// For records that serve the making of others: twice the tolerance, samples divided.
-    fn coarser(self, fewer: u32) -> Self {
-        Self { tolerance: 1.5 * self.tolerance, samples: (self.samples / fewer).max(16), ..self }
+    /// For records that serve the making of others.
+    fn coarser(self, tolerance: f32, fewer: u32) -> Self {
+        Self { tolerance: tolerance * self.tolerance, samples: (self.samples / fewer).max(16), ..self }
     }
 }
 
@@ -53,6 +59,8 @@ pub struct Settings {
     pub multiple: Option<Effort>,
     /// Indirect irradiance on surfaces.
     pub irradiance: Option<Effort>,
+    /// How records are carried to other points.
+    pub extrapolation: Extrapolation,
     /// Eye rays that say where records are needed.
     pub rays: u32,
     /// Share of every radius that spheres overlap by.
@@ -67,7 +75,44 @@ pub struct Settings {
     pub seed: u64,
 }
 
-/// Filled caches.
+impl Default for Settings {
+    /// No caches; what else is good for pictures.
+    fn default() -> Self {
+        Self {
+            single: None,
+            surface: None,
+            multiple: None,
+            irradiance: None,
+            extrapolation: Extrapolation::ExponentialMean,
+            rays: 16384,
+            margin: 0.15,
+            pixels: (1.5, 64.0),
+            round: 64,
+            threads: 0,
+            seed: 0,
+        }
+    }
+}
+
+impl Settings {
+    /// How a cache made with `effort` is read.
+    #[must_use]
+    pub fn reading(&self, effort: &Effort) -> Reading {
+        Reading { extrapolation: self.extrapolation, ..Reading::new(effort.tolerance) }
+    }
+
+    /// Of the records on surfaces that light all other records.
+    fn coarse_irradiance(&self) -> Option<Effort> {
+        self.irradiance.map(|effort| effort.coarser(3.0, 1))
+    }
+
+    /// Of the records at which random walks of the final ones end.
+    fn coarse_multiple(&self) -> Option<Effort> {
+        self.multiple.map(|effort| effort.coarser(1.5, 1))
+    }
+}
+
+/// Filled caches. They may be filled again for another view, and then gain what is missing.
 #[derive(Debug)]
 pub struct RadianceCaches {
     /// What they were filled with.
@@ -80,6 +125,12 @@ pub struct RadianceCaches {
     pub multiple: Option<VolumeCache<'static>>,
     /// As [`Settings::irradiance`].
     pub irradiance: Option<SurfaceCache<'static>>,
+    /// Serves the making of [`RadianceCaches::multiple`] alone.
+    pub coarse_multiple: Option<VolumeCache<'static>>,
+    /// Serves the making of all others.
+    pub coarse_irradiance: Option<SurfaceCache<'static>>,
+    /// Marks of the views that were filled to the end: for them nothing is missing.
+    pub views: Vec<u64>,
 }
 
 /// Names of the caches, in the order of [`RadianceCaches::counts`].
@@ -96,20 +147,23 @@ impl RadianceCaches {
             surface: volume(settings.surface),
             multiple: volume(settings.multiple),
             irradiance: settings.irradiance.map(|_| Cache::growing(1)),
+            coarse_multiple: volume(settings.coarse_multiple()),
+            coarse_irradiance: settings.coarse_irradiance().map(|_| Cache::growing(1)),
+            views: Vec::new(),
         }
     }
 
     /// The caches, to be read.
     #[must_use]
     pub fn reader(&self) -> Caches<'_> {
-        fn read<'a, C>(cache: &'a Option<C>, effort: Option<Effort>) -> Option<Reader<'a, C>> {
-            Some(Reader { cache: cache.as_ref()?, reading: Reading::new(effort?.tolerance) })
+        fn read<'a, C>(settings: &Settings, cache: &'a Option<C>, effort: Option<Effort>) -> Option<Reader<'a, C>> {
+            Some(Reader { cache: cache.as_ref()?, reading: settings.reading(&effort?) })
         }
         Caches {
-            single: read(&self.single, self.settings.single),
-            surface: read(&self.surface, self.settings.surface),
-            multiple: read(&self.multiple, self.settings.multiple),
-            irradiance: read(&self.irradiance, self.settings.irradiance),
+            single: read(&self.settings, &self.single, self.settings.single),
+            surface: read(&self.settings, &self.surface, self.settings.surface),
+            multiple: read(&self.settings, &self.multiple, self.settings.multiple),
+            irradiance: read(&self.settings, &self.irradiance, self.settings.irradiance),
         }
     }
 
@@ -120,6 +174,14 @@ impl RadianceCaches {
         let surface = self.irradiance.as_ref().map_or((0, 0), |c| (c.len(), c.bytes()));
         [volume(&self.single), volume(&self.surface), volume(&self.multiple), surface]
     }
+
+    /// The same of the caches that serve the making of others: multiple scattering, irradiance.
+    #[must_use]
+    pub fn coarse_counts(&self) -> [(usize, usize); 2] {
+        let volume = self.coarse_multiple.as_ref().map_or((0, 0), |c| (c.len(), c.bytes()));
+        let surface = self.coarse_irradiance.as_ref().map_or((0, 0), |c| (c.len(), c.bytes()));
+        [volume, surface]
+    }
 }
 
 /// What filling took.
@@ -129,6 +191,8 @@ pub struct Outcome {
     pub computed: [u64; 4],
     /// Time by cache.
     pub seconds: [Seconds; 4],
+    /// Time to find the places that eye rays ask for, and which of them no record covers.
+    pub search: Seconds,
     /// Whether the host asked to stop.
     pub cancelled: bool,
 }
@@ -150,8 +214,8 @@ impl fmt::Display for FillError {
 
 impl core::error::Error for FillError {}
 
-/// By how much fewer samples the records have that only light other records.
-const FIRST_SAMPLES: u32 = 4;
+/// By how much fewer walks the very first records are made of.
+const FIRST_WALKS: u32 = 4;
 
 /// Rays of the first batch; each next one has twice as many, up to [`LAST_BATCH`].
 const FIRST_BATCH: u32 = 64;
@@ -206,7 +270,10 @@ trait Fill: Sync {
     fn is_covered(&self, place: &Place, reading: &Reading) -> bool;
     fn guess(&self, place: &Place) -> Option<f32>;
     fn add(&mut self, record: Record, attached: Self::Attached) -> bool;
+    fn count(&self) -> usize;
     fn finish(&mut self);
+    fn record(&self, number: usize) -> (Place, f32);
+    fn replace(&mut self, number: usize, sums: &Sums, gradient: &Gradient, attached: Self::Attached);
 }
 
 impl Fill for VolumeCache<'_> {
@@ -221,8 +288,18 @@ impl Fill for VolumeCache<'_> {
         // Storage that grows is never full.
         self.insert(record, &higher) == Ok(true)
     }
+    fn count(&self) -> usize {
+        self.len()
+    }
     fn finish(&mut self) {
         let _ = Cache::finish(self);
+    }
+    fn record(&self, number: usize) -> (Place, f32) {
+        let record = &self.records()[number];
+        (Place { point: record.position, normal: None, is_seen: true }, record.radius)
+    }
+    fn replace(&mut self, number: usize, sums: &Sums, gradient: &Gradient, higher: Vec<Coefficient>) {
+        self.revise(number as u32, sums.value, gradient, &higher);
     }
 }
 
@@ -237,10 +314,84 @@ impl Fill for SurfaceCache<'_> {
     fn add(&mut self, record: Record, facing: Facing) -> bool {
         self.insert(record, &[facing]) == Ok(true)
     }
+    fn count(&self) -> usize {
+        self.len()
+    }
     fn finish(&mut self) {
         let _ = Cache::finish(self);
     }
+    fn record(&self, number: usize) -> (Place, f32) {
+        let record = &self.records()[number];
+        let normal = self.attached(number as u32).first().map(|facing| facing.normal);
+        (Place { point: record.position, normal, is_seen: false }, record.radius)
+    }
+    fn replace(&mut self, number: usize, sums: &Sums, gradient: &Gradient, facing: Facing) {
+        self.revise(number as u32, sums.value, gradient, &[facing]);
+    }
 }
+
+/// What lights all final records.
+fn lighting<'a>(
+    cache: &'a Option<SurfaceCache<'static>>,
+    settings: &Settings,
+) -> Option<(&'a SurfaceCache<'a>, Reading)> {
+    Some((cache.as_ref()?, settings.reading(&settings.coarse_irradiance()?)))
+}
+
+/// How often the first records are estimated anew from each other: every time most of their noise goes.
+const REVISIONS: u64 = 2;
+
+/// What light a record in the medium holds.
+#[derive(Clone, Copy)]
+enum Part {
+    Single,
+    Surface,
+    Multiple,
+}
+
+/// An estimate for a record in the medium.
+fn scattered<M: Medium + ?Sized, S: Scene + ?Sized>(
+    cache: &VolumeCache<'_>,
+    estimator: &Estimator<'_, M, S>,
+    samples: u32,
+    place: &Place,
+    rng: &mut Generator,
+    part: Part,
+) -> (Sums, Vec<Coefficient>) {
+    let mut higher = vec![Coefficient::ZERO; cache.stride()];
+    let phase = estimator.phase(place.point);
+    let sums = match part {
+        Part::Single => estimator.single(place.point, &phase, &mut higher, rng),
+        Part::Surface => estimator.surface(place.point, &phase, samples, &mut higher, rng),
+        Part::Multiple => estimator.multiple(place.point, &phase, samples, &mut higher, rng),
+    };
+    (sums, higher)
+}
+
+/// An estimate for a record on a surface.
+fn irradiance<M: Medium + ?Sized, S: Scene + ?Sized>(
+    estimator: &Estimator<'_, M, S>,
+    samples: u32,
+    place: &Place,
+    rng: &mut Generator,
+) -> (Sums, Facing) {
+    estimator.irradiance(place.point, place.normal.unwrap_or(Vec3::Z), samples, rng)
+}
+
+/// Puts revised estimates in the place of the old ones, from a record on.
+fn put<C: Fill>(cache: &mut Option<C>, effort: Option<Effort>, from: usize, revised: Revised<C::Attached>) -> u64 {
+    let (Some(cache), Some(effort)) = (cache, effort) else { return 0 };
+    let count = revised.len() as u64;
+    for (number, (sums, attached)) in (from..).zip(revised) {
+        // Within its radius a record changes by a factor of e to the tolerance at most.
+        let reach = cache.record(number).1 / effort.tolerance;
+        cache.replace(number, &sums, &clamp_gradient(&sums.gradient, sums.value, reach), attached);
+    }
+    count
+}
+
+/// Estimates for the records of a cache, in their order.
+type Revised<A> = Vec<(Sums, A)>;
 
 impl<M, S, F> Filler<'_, M, S, F>
 where
@@ -250,106 +401,187 @@ where
 {
     fn fill(&self, caches: &mut RadianceCaches) -> Outcome {
         let mut outcome = Outcome::default();
-        let all = self.all_places();
+        let view = self.view();
+        if caches.views.contains(&view) {
+            return outcome;
+        }
+        let clock = Stopwatch::start();
+        let all = self.all_places(caches);
         let settings = self.settings;
         let everywhere = |place: &Place| place.normal.is_some();
         let in_medium = |place: &Place| place.normal.is_none();
         let in_sight = |place: &Place| place.normal.is_some() && place.is_seen;
-
-        // What lights everything else: coarse, because whoever asks sees many records at once.
-        let coarse = settings.irradiance.map(|effort| {
-            let effort = effort.coarser(FIRST_SAMPLES);
-            let mut cache: SurfaceCache<'static> = Cache::growing(1);
-            let clock = Stopwatch::start();
-            outcome.computed[3] += self.irradiance(&mut cache, &effort, 4, &all, everywhere, self.estimator);
-            outcome.seconds[3] = clock.elapsed();
-            (cache, Reading::new(effort.tolerance))
-        });
-        let surfaces = coarse.as_ref().map(|(cache, reading)| (cache, *reading));
-        let estimator = Estimator { surfaces, ..*self.estimator };
-        if let (Some(cache), Some(effort)) = (&mut caches.single, settings.single) {
-            let clock = Stopwatch::start();
-            outcome.computed[0] = self.rounds(cache, &effort, 0, &all, in_medium, |cache, place, rng| {
-                let mut higher = vec![Coefficient::ZERO; cache.stride()];
-                (estimator.single(place.point, &estimator.phase(place.point), &mut higher, rng), higher)
-            });
-            outcome.seconds[0] = clock.elapsed();
+        outcome.search = clock.elapsed();
+        if all.iter().all(Vec::is_empty) {
+            caches.views.push(view);
+            return outcome;
         }
+
+        let before = [
+            caches.coarse_irradiance.as_ref().map_or(0, Fill::count),
+            caches.surface.as_ref().map_or(0, Fill::count),
+            caches.coarse_multiple.as_ref().map_or(0, Fill::count),
+        ];
+        // What lights everything else: coarse, because whoever asks sees many records at once. Made by
+        // whole walks, and few, because it is revised with what those have told.
+        if let (Some(cache), Some(effort)) = (&mut caches.coarse_irradiance, settings.coarse_irradiance()) {
+            let clock = Stopwatch::start();
+            outcome.computed[3] += self.rounds(cache, &effort, 4, &all, everywhere, |cache, place, rng| {
+                let surfaces = Some((cache, settings.reading(&effort)));
+                let estimator = Estimator { surfaces, ..*self.estimator };
+                irradiance(&estimator, (effort.samples / FIRST_WALKS).max(16), place, rng)
+            });
+            outcome.seconds[3] = clock.elapsed();
+        }
+        let estimator = Estimator { surfaces: lighting(&caches.coarse_irradiance, settings), ..*self.estimator };
         if let (Some(cache), Some(effort)) = (&mut caches.surface, settings.surface) {
             let clock = Stopwatch::start();
-            outcome.computed[1] = self.rounds(cache, &effort, 1, &all, in_medium, |cache, place, rng| {
-                let mut higher = vec![Coefficient::ZERO; cache.stride()];
-                let phase = estimator.phase(place.point);
-                (estimator.surface(place.point, &phase, effort.samples, &mut higher, rng), higher)
+            outcome.computed[1] += self.rounds(cache, &effort, 1, &all, in_medium, |cache, place, rng| {
+                scattered(cache, &estimator, effort.samples, place, rng, Part::Surface)
             });
             outcome.seconds[1] = clock.elapsed();
         }
-        let surface = caches.surface.as_ref().zip(settings.surface).map(|(c, e)| (c, Reading::new(e.tolerance)));
-        if let (Some(cache), Some(effort)) = (&mut caches.multiple, settings.multiple) {
+        if let (Some(cache), Some(effort)) = (&mut caches.coarse_multiple, settings.coarse_multiple()) {
             let clock = Stopwatch::start();
-            // The first records come from whole walks. The final ones end theirs at those.
-            let mut first: VolumeCache<'static> = Cache::growing(cache.stride());
-            let rough = effort.coarser(1);
-            outcome.computed[2] = self.multiple(&mut first, &rough, 5, &all, surface, None, &estimator);
-            let known = Some((&first, Reading::new(rough.tolerance)));
-            outcome.computed[2] += self.multiple(cache, &effort, 2, &all, surface, known, &estimator);
+            let surface = caches.surface.as_ref().zip(settings.surface).map(|(c, e)| (c, settings.reading(&e)));
+            outcome.computed[2] += self.rounds(cache, &effort, 5, &all, in_medium, |cache, place, rng| {
+                let scattered_light = surface.map(|surface| [surface, (cache, settings.reading(&effort))]);
+                let estimator = Estimator { scattered: scattered_light, ..estimator };
+                scattered(cache, &estimator, (effort.samples / FIRST_WALKS).max(16), place, rng, Part::Multiple)
+            });
             outcome.seconds[2] = clock.elapsed();
         }
-        let multiple = caches.multiple.as_ref().zip(settings.multiple).map(|(c, e)| (c, Reading::new(e.tolerance)));
+        for pass in 0..REVISIONS {
+            self.revise(caches, before, pass, &mut outcome);
+        }
+
+        let estimator = Estimator { surfaces: lighting(&caches.coarse_irradiance, settings), ..*self.estimator };
+        if let (Some(cache), Some(effort)) = (&mut caches.single, settings.single) {
+            let clock = Stopwatch::start();
+            outcome.computed[0] = self.rounds(cache, &effort, 0, &all, in_medium, |cache, place, rng| {
+                scattered(cache, &estimator, effort.samples, place, rng, Part::Single)
+            });
+            outcome.seconds[0] = clock.elapsed();
+        }
+        let surface = caches.surface.as_ref().zip(settings.surface).map(|(c, e)| (c, settings.reading(&e)));
+        if let (Some(cache), Some(effort)) = (&mut caches.multiple, settings.multiple) {
+            let clock = Stopwatch::start();
+            let coarse = caches.coarse_multiple.as_ref().zip(settings.coarse_multiple());
+            let known = surface.zip(coarse).map(|(s, (c, e))| [s, (c, settings.reading(&e))]);
+            let estimator = Estimator { scattered: known, ..estimator };
+            outcome.computed[2] += self.rounds(cache, &effort, 2, &all, in_medium, |cache, place, rng| {
+                scattered(cache, &estimator, effort.samples, place, rng, Part::Multiple)
+            });
+            outcome.seconds[2] = outcome.seconds[2] + clock.elapsed();
+        }
+        let multiple = caches.multiple.as_ref().zip(settings.multiple).map(|(c, e)| (c, settings.reading(&e)));
         if let (Some(cache), Some(effort)) = (&mut caches.irradiance, settings.irradiance) {
             let clock = Stopwatch::start();
-            let scattered = surface.zip(multiple).map(|(surface, multiple)| [surface, multiple]);
-            let estimator = Estimator { scattered, ..estimator };
-            outcome.computed[3] += self.irradiance(cache, &effort, 3, &all, in_sight, &estimator);
+            let known = surface.zip(multiple).map(|(surface, multiple)| [surface, multiple]);
+            let estimator = Estimator { scattered: known, ..estimator };
+            outcome.computed[3] += self.rounds(cache, &effort, 3, &all, in_sight, |_, place, rng| {
+                irradiance(&estimator, effort.samples, place, rng)
+            });
             outcome.seconds[3] = outcome.seconds[3] + clock.elapsed();
         }
         outcome.cancelled = self.control.is_cancelled();
+        if !outcome.cancelled {
+            caches.views.push(view);
+        }
         outcome
     }
 
-    fn irradiance(
-        &self,
-        cache: &mut SurfaceCache<'_>,
-        effort: &Effort,
-        stream: u64,
-        all: &[Vec<Wanted>],
-        is_for: impl Fn(&Place) -> bool,
-        estimator: &Estimator<'_, M, S>,
-    ) -> u64 {
-        self.rounds(cache, effort, stream, all, is_for, |cache, place, rng| {
-            let own = Some((cache, Reading::new(effort.tolerance)));
-            let estimator = Estimator { surfaces: estimator.surfaces.or(own), ..*estimator };
-            estimator.irradiance(place.point, place.normal.unwrap_or(Vec3::Z), effort.samples, rng)
-        })
+    /// A mark of where the eye rays go and how densely places are asked for.
+    fn view(&self) -> u64 {
+        let Settings { rays, margin, pixels, round, seed, .. } = *self.settings;
+        let EyeSettings { density, lights_visible, indirect } = *self.eye;
+        let mut crc = Crc::new();
+        let mut add = |numbers: &[f32]| numbers.iter().for_each(|n| crc.add(&n.to_bits().to_le_bytes()));
+        add(&[margin, pixels.0, pixels.1, self.pixel, density, f32::from(lights_visible), f32::from(indirect)]);
+        for at in [[0.5, 0.5], [0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.3, 0.6]] {
+            let ray = (self.eye_ray)(at);
+            add(&ray.origin.to_array());
+            add(&ray.direction.to_array());
+        }
+        for number in [u64::from(rays), u64::from(round), seed] {
+            crc.add(&number.to_le_bytes());
+        }
+        crc.value()
     }
 
-    fn multiple(
-        &self,
-        cache: &mut VolumeCache<'_>,
-        effort: &Effort,
-        stream: u64,
-        all: &[Vec<Wanted>],
-        surface: Option<(&VolumeCache<'_>, Reading)>,
-        known: Option<(&VolumeCache<'_>, Reading)>,
-        estimator: &Estimator<'_, M, S>,
-    ) -> u64 {
-        let is_for = |place: &Place| place.normal.is_none();
-        self.rounds(cache, effort, stream, all, is_for, |cache, place, rng| {
-            let own = (cache, Reading::new(effort.tolerance));
-            let scattered = surface.map(|surface| [surface, known.unwrap_or(own)]);
-            let estimator = Estimator { scattered, ..*estimator };
-            let mut higher = vec![Coefficient::ZERO; cache.stride()];
-            let phase = estimator.phase(place.point);
-            (estimator.multiple(place.point, &phase, effort.samples, &mut higher, rng), higher)
-        })
+    /// Whether the final caches have all that is asked for at a place.
+    fn is_covered(&self, caches: &RadianceCaches, place: &Place) -> bool {
+        fn check<C: Fill>(cache: &Option<C>, effort: Option<Effort>, margin: f32, place: &Place) -> bool {
+            let (Some(cache), Some(effort)) = (cache, effort) else { return true };
+            cache.is_covered(place, &Reading { margin, ..Reading::new(effort.tolerance) })
+        }
+        let Settings { single, surface, multiple, irradiance, margin, .. } = *self.settings;
+        match place.normal {
+            None => {
+                check(&caches.single, single, margin, place)
+                    && check(&caches.surface, surface, margin, place)
+                    && check(&caches.multiple, multiple, margin, place)
+            }
+            Some(_) => check(&caches.irradiance, irradiance, margin, place),
+        }
     }
 
-    /// Every place that eye rays ask for, in batches from coarse to fine.
-    fn all_places(&self) -> Vec<Vec<Wanted>> {
+    /// Estimates the first records once more, with everything they know of each other; from those numbers on.
+    fn revise(&self, caches: &mut RadianceCaches, from: [usize; 3], pass: u64, outcome: &mut Outcome) {
+        let settings = self.settings;
+        let (on_surfaces, light, coarse) = (settings.coarse_irradiance(), settings.surface, settings.coarse_multiple());
+        let surface = caches.surface.as_ref().zip(light).map(|(c, e)| (c, settings.reading(&e)));
+        let multiple = caches.coarse_multiple.as_ref().zip(coarse).map(|(c, e)| (c, settings.reading(&e)));
+        let known = surface.zip(multiple).map(|(surface, multiple)| [surface, multiple]);
+        let estimator =
+            Estimator { surfaces: lighting(&caches.coarse_irradiance, settings), scattered: known, ..*self.estimator };
+        let mut clock = Stopwatch::start();
+        let new_irradiance =
+            self.revised(&caches.coarse_irradiance, on_surfaces, from[0], 3 * pass, |_, e, place, rng| {
+                irradiance(&estimator, e.samples, place, rng)
+            });
+        outcome.seconds[3] = outcome.seconds[3] + clock.elapsed();
+        clock = Stopwatch::start();
+        let new_surface = self.revised(&caches.surface, light, from[1], 3 * pass + 1, |cache, e, place, rng| {
+            scattered(cache, &estimator, e.samples, place, rng, Part::Surface)
+        });
+        outcome.seconds[1] = outcome.seconds[1] + clock.elapsed();
+        clock = Stopwatch::start();
+        let new_multiple =
+            self.revised(&caches.coarse_multiple, coarse, from[2], 3 * pass + 2, |cache, e, place, rng| {
+                scattered(cache, &estimator, e.samples, place, rng, Part::Multiple)
+            });
+        outcome.seconds[2] = outcome.seconds[2] + clock.elapsed();
+        outcome.computed[3] += put(&mut caches.coarse_irradiance, on_surfaces, from[0], new_irradiance);
+        outcome.computed[1] += put(&mut caches.surface, light, from[1], new_surface);
+        outcome.computed[2] += put(&mut caches.coarse_multiple, coarse, from[2], new_multiple);
+    }
+
+    fn revised<C: Fill>(
+        &self,
+        cache: &Option<C>,
+        effort: Option<Effort>,
+        from: usize,
+        stream: u64,
+        compute: impl Fn(&C, &Effort, &Place, &mut Generator) -> (Sums, C::Attached) + Sync,
+    ) -> Revised<C::Attached> {
+        let (Some(cache), Some(effort)) = (cache, effort) else { return Vec::new() };
+        if self.control.is_cancelled() {
+            return Vec::new();
+        }
+        let seed = mix(self.settings.seed ^ mix(stream + 16));
+        let estimate =
+            |number: usize| compute(cache, &effort, &cache.record(number).0, &mut Generator::new(seed ^ number as u64));
+        (from..cache.count()).into_par_iter().map(estimate).collect()
+    }
+
+    /// Every place that eye rays ask for and `caches` do not cover, in batches from coarse to fine.
+    fn all_places(&self, caches: &RadianceCaches) -> Vec<Vec<Wanted>> {
         let (mut batches, mut from, mut size) = (Vec::new(), 0, FIRST_BATCH);
         while from < self.settings.rays {
             let until = self.settings.rays.min(from + size);
-            let found: Vec<Vec<Wanted>> = (from..until).into_par_iter().map(|number| self.places_of(number)).collect();
+            let found: Vec<Vec<Wanted>> =
+                (from..until).into_par_iter().map(|number| self.places_of(number, caches)).collect();
             batches.push(found.concat());
             from = until;
             size = LAST_BATCH.min(size * 2);
@@ -357,7 +589,7 @@ where
         batches
     }
 
-    fn places_of(&self, number: u32) -> Vec<Wanted> {
+    fn places_of(&self, number: u32, caches: &RadianceCaches) -> Vec<Wanted> {
         // The plane filled evenly by multiples of the plastic number (Roberts 2018).
         let turn = |step: f64| {
             let x = 0.5 + step * f64::from(number + 1);
@@ -366,7 +598,15 @@ where
         let ray = (self.eye_ray)([turn(0.754_877_666_246_692_8), turn(0.569_840_290_998_053_3)]);
         let mut rng = Generator::new(mix(self.settings.seed ^ 0x70_1a_ce) ^ u64::from(number));
         let mut found = Vec::new();
+        // Surfaces that light a place come right after it, and are of no use if nothing is made there.
+        let mut is_open = false;
         places(&ray, &self.estimator.world, self.eye, &mut rng, |place| {
+            if place.is_seen {
+                is_open = !self.is_covered(caches, &place);
+            }
+            if !is_open {
+                return;
+            }
             found.push(Wanted { place, distance: place.point.distance(ray.origin) });
         });
         found
@@ -382,7 +622,9 @@ where
         is_for: impl Fn(&Place) -> bool,
         compute: impl Fn(&C, &Place, &mut Generator) -> (Sums, C::Attached) + Sync,
     ) -> u64 {
-        let reading = Reading { margin: self.settings.margin, ..Reading::new(effort.tolerance) };
+        let reading = Reading { margin: self.settings.margin, ..self.settings.reading(effort) };
+        // Records added later must not share the random numbers of the first.
+        let start = if cache.count() == 0 { 0 } else { mix(cache.count() as u64) };
         let mut computed = 0_u64;
         for batch in batches {
             let mut open: Vec<Wanted> = batch.iter().filter(|wanted| is_for(&wanted.place)).copied().collect();
@@ -393,8 +635,8 @@ where
                     break;
                 }
                 let chosen = self.choose(frozen, effort, &open);
-                let first = computed;
-                let numbered: Vec<(u64, Wanted)> = (first..).zip(chosen).collect();
+                let numbered: Vec<(u64, Wanted)> =
+                    chosen.into_iter().enumerate().map(|(i, w)| (start.wrapping_add(computed + i as u64), w)).collect();
                 computed += numbered.len() as u64;
                 let records: Vec<(Place, Option<Record>, C::Attached)> = numbered
                     .par_iter()

@@ -27,6 +27,9 @@ const MIN_COSINE: f32 = 0.05;
 /// A number whose multiples, wrapped, are even beside a golden-ratio lattice: the third coordinate.
 const THIRD: f32 = 0.414_213_56;
 
+/// Highest degree read where a walk ends: a phase function still to come smooths what is finer.
+const KNOWN_DEGREE: usize = 3;
+
 /// Direction `j` of `count`, of which every other one is aimed at lights, and the density (sr⁻¹) of the mixture.
 fn aimed(
     aims: &Aims,
@@ -41,7 +44,7 @@ fn aimed(
         return (direction, pdf(direction));
     }
     let share = (count / 2) as f32 / count as f32;
-    let direction = if j % 2 == 0 {
+    let direction = if j.is_multiple_of(2) {
         sample(single_scatter::lattice(j / 2, count.div_ceil(2), shift))
     } else {
         aims.sample(single_scatter::lattice(j / 2, count / 2, shift))
@@ -136,7 +139,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
         let share = 1.0 / paths.max(1) as f32;
         let aims = Aims::new(point, self.world.lights);
         self.expanded(phase, higher, |into| {
-            let mut cones = Cones::default();
+            let (mut cones, mut halves) = (Cones::default(), Halves::default());
             for j in 0..paths {
                 let uniformly = |u| warp::uniform_sphere(u);
                 let (to_light, pdf) = aimed(&aims, j, paths, shift, uniformly, |_| warp::uniform_sphere_pdf());
@@ -145,9 +148,14 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
                 let u = third + THIRD * j as f32;
                 let light = self.walked(&walk, ray, pdf, u - libm::floorf(u), rng) * share;
                 let incoming = Incoming { to_light, light };
-                cones.add(to_light, &incoming.scatter_directional(into.moments, into.coefficients));
+                let mean = incoming.scatter_directional(into.moments, into.coefficients);
+                cones.add(to_light, &mean);
+                halves.add(j, &mean.gradient);
             }
-            cones.sums()
+            let (mut sums, trust) = (cones.sums(), halves.trust());
+            sums.gradient = sums.gradient * trust;
+            into.coefficients.iter_mut().for_each(|c| c.gradient = c.gradient * trust);
+            sums
         })
     }
 
@@ -157,7 +165,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
         let outgoing = |ray: &Ray, hit: &Hit| self.outgoing(ray, hit, &mut child);
         let known = |point: Vec3, to_eye: Vec3, _: &Properties| {
             let [surface, multiple] = self.scattered.as_ref()?;
-            let basis = Basis::new(to_eye, surface.0.degree().max(multiple.0.degree()));
+            let basis = Basis::new(to_eye, surface.0.degree().max(multiple.0.degree()).min(KNOWN_DEGREE));
             let mut light = multiple.0.lookup_with_gradient(point, &basis, &multiple.1)?;
             light += surface.0.lookup_with_gradient(point, &basis, &surface.1)?;
             Some(light)
@@ -175,6 +183,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
     /// ```
     pub fn irradiance(&self, point: Vec3, normal: Vec3, paths: u32, rng: &mut impl Rng) -> (Sums, Facing) {
         let (mut sums, mut scattered, mut turn) = (Sums::default(), Cones::default(), Gradient::ZERO);
+        let mut halves = Halves::default();
         let mut child = Generator::child(rng);
         let (frame, walk, shift, third) = (Frame::around(normal), self.walker(), uniform2(rng), uniform(rng));
         let share = 1.0 / paths.max(1) as f32;
@@ -207,9 +216,11 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
             let light = self.walked(&walk, ray, 1.0, u - libm::floorf(u), rng) * weight;
             scattered.add(to_light, &light);
             total += light;
+            halves.add(j, &total.gradient);
             turn += Gradient::outer(total.radiance, to_light / cosine.max(MIN_COSINE));
         }
         sums.merge(&scattered.sums());
+        sums.gradient = sums.gradient * halves.trust();
         (sums, Facing { normal, turn })
     }
 
@@ -313,5 +324,38 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
         let sums = estimate(&mut into);
         higher.copy_from_slice(&all[1..=higher.len()]);
         sums
+    }
+}
+
+/// How far an estimated gradient can be believed: as far as two halves of its samples agree.
+///
+/// ```text
+/// t = g₁·g₂ / ‖(g₁ + g₂)/2‖², in [0, 1], per channel
+/// ```
+///
+/// The product is an unbiased estimate of the true square, the norm is too large by the noise.
+/// Unbelieved, noise in gradients would brighten whatever is extrapolated with them, because
+/// the exponential of noise is more than 1 in the mean.
+#[derive(Debug, Clone, Copy, Default)]
+struct Halves([Gradient; 2]);
+
+impl Halves {
+    /// Adds the gradient of sample `j`; of every four neighbours, two go to either half.
+    #[inline]
+    fn add(&mut self, j: u32, gradient: &Gradient) {
+        self.0[(j as usize >> 1) & 1] += *gradient;
+    }
+
+    fn trust(&self) -> Spectrum {
+        let [a, b] = self.0;
+        // Scaled, so that squares stay in the range of f32.
+        let largest = a.norm().max(b.norm());
+        let dot = |a: &Gradient, b: &Gradient| {
+            let part = |a: Spectrum, b: Spectrum| a.ratio(largest) * b.ratio(largest);
+            part(a.x, b.x) + part(a.y, b.y) + part(a.z, b.z)
+        };
+        let sum = a + b;
+        let square = dot(&sum, &sum) * 0.25;
+        dot(&a, &b).zip(square, |ab, ss| if ss > 0.0 { (ab / ss).clamp(0.0, 1.0) } else { 0.0 })
     }
 }

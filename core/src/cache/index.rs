@@ -185,7 +185,7 @@ impl<'s> Index<'s> {
     /// [`bytes`](Self::bytes) tells. `entries` and `spheres` serve [`rebuild`](Self::rebuild) alone.
     ///
     /// ```
-    /// # use fogbow::cache::{Index, Node, index::Block};
+    /// # use fogbow::cache::{Block, Index, Node};
     /// # use fogbow::math::Vec3;
     /// let (mut nodes, mut entries) = ([Node::default(); 8], [0; 48]);
     /// let (mut spheres, mut blocks) = ([[0.0; 4]; 8], [Block::default(); 48]);

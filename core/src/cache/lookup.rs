@@ -95,7 +95,7 @@ impl VolumeCache<'_> {
             blend.add(weight(d), value, gradient.along(point - record.position));
         };
         self.visit(point, &mut add);
-        blend.value().or_else(|| self.gap(point, basis, reading))
+        blend.value().or_else(|| self.gap(point, basis, reading)).map(|light| light.max(Spectrum::ZERO))
     }
 
     /// Between the spheres, the nearest count.
@@ -174,7 +174,7 @@ impl SurfaceCache<'_> {
             let turned = facing.turn.along(normal - facing.normal);
             blend.add(weight(d), record.value, record.change(point) + turned);
         });
-        blend.value().or_else(|| self.gap(point, normal, reading))
+        blend.value().or_else(|| self.gap(point, normal, reading)).map(|light| light.max(Spectrum::ZERO))
     }
 
     /// Between the spheres, the nearest count.

@@ -25,8 +25,10 @@
 //! | `aim` | where random walks start towards |
 //! | `estimate` | [`Estimator`]: what records are made of |
 //! | `eye` | [`places`] and [`radiance`] of eye rays |
+//! | [`bytes`] | caches as bytes, to be saved |
 
 mod aim;
+pub mod bytes;
 mod estimate;
 mod extrapolate;
 mod eye;

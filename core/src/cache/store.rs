@@ -7,6 +7,7 @@ use super::index::Index;
 use super::radius::neighbour_clamped;
 use super::{Facing, Record};
 use crate::sh::Coefficient;
+use crate::spectrum::{Gradient, Spectrum};
 use crate::storage::{Full, List};
 
 /// Records not yet in the index: looked at one by one, so only few; but every rebuild costs as much as
@@ -123,6 +124,39 @@ impl<'s, E: Pod> Cache<'s, E> {
         self.records.push(record)?;
         let loose = self.len() as u32 - self.index.len();
         if loose > LOOSE.max(self.index.len() / 16) { self.rebuild().map(|()| true) } else { Ok(true) }
+    }
+
+    /// Replaces what a record says of the light, by an estimate that knows more than the first could. Its
+    /// place and radius stay, and with them what decides how much it counts: a radius that comes from
+    /// the same noise as the value would favour values that are too small. `false` where there is no
+    /// such record or the estimate is no number.
+    pub fn revise(&mut self, record: u32, value: Spectrum, gradient: &Gradient, attached: &[E]) -> bool {
+        let (i, stride) = (record as usize, self.stride);
+        let Some(old) = self.records.as_mut_slice().get_mut(i) else { return false };
+        let new = Record { value, gradient: *gradient, ..*old };
+        if !new.is_valid() || attached.len() != stride {
+            return false;
+        }
+        *old = new;
+        if let Some(slots) = self.attached.as_mut_slice().get_mut(i * stride..(i + 1) * stride) {
+            slots.copy_from_slice(attached);
+        }
+        true
+    }
+
+    /// Forgets all records and keeps the memory.
+    pub fn clear(&mut self) {
+        self.records.clear();
+        self.attached.clear();
+        // Of no spheres, an index needs no room.
+        let _ = (self.index.rebuild(0, |_| (Vec3::ZERO, 0.0)), self.wide.rebuild(0, |_| (Vec3::ZERO, 0.0)));
+    }
+
+    /// Appends a record as it is: one that was in a cache already, with radii clamped then. It is seen
+    /// after [`Cache::finish`].
+    pub(super) fn restore(&mut self, record: Record, attached: impl Iterator<Item = E>) -> Result<(), Full> {
+        self.records.push(record)?;
+        attached.into_iter().try_for_each(|element| self.attached.push(element))
     }
 
     /// After filling, before many look-ups: brings all records into the index, and prepares for points in

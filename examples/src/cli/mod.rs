@@ -7,6 +7,7 @@ mod figures;
 mod output;
 mod plume;
 mod radiance_cache;
+mod records;
 pub(crate) mod render;
 mod report;
 
@@ -18,6 +19,7 @@ pub use compare::CompareArguments;
 pub use figures::{FiguresArguments, Paper};
 pub use plume::PlumeArguments;
 pub use radiance_cache::{CacheArguments, Kind, Single};
+pub use records::RecordsArguments;
 pub use render::{Method, RenderArguments};
 
 /// Light in fog, smoke and clouds.
@@ -34,6 +36,8 @@ pub struct Arguments {
 pub enum Command {
     /// Renders a Mitsuba 3 scene.
     Render(RenderArguments),
+    /// Draws where the records of radiance caches lie.
+    Records(RecordsArguments),
     /// Says how far an image is from a reference.
     Compare(CompareArguments),
     /// Writes an animation: a plume of smoke, a volume and a scene per frame.
@@ -55,6 +59,7 @@ pub enum Ending {
 pub fn run(arguments: Arguments) -> ExitCode {
     let result = match arguments.command {
         Command::Render(arguments) => render::run(&arguments),
+        Command::Records(arguments) => records::run(&arguments),
         Command::Compare(arguments) => compare::run(&arguments),
         Command::Plume(arguments) => plume::run(&arguments),
         Command::Figures(arguments) => figures::run(&arguments),

@@ -37,6 +37,11 @@ pub(super) fn positive(text: &str) -> Result<f64, String> {
     }
 }
 
+/// A number that is not infinite.
+pub(super) fn finite(text: &str) -> Result<f32, String> {
+    text.parse::<f32>().ok().filter(|value| value.is_finite()).ok_or_else(|| "must be a finite number".to_owned())
+}
+
 /// `x,y,z x,y,z`: an origin and a target.
 pub(super) fn camera(text: &str) -> Result<[[f64; 3]; 2], String> {
     let number = |text: &str| text.trim().parse().ok().filter(|v: &f64| v.is_finite());

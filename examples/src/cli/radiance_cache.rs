@@ -1,7 +1,10 @@
 //! `fogbow render --method radiance-cache`.
 
+use std::path::{Path, PathBuf};
+
 use clap::{Args, ValueEnum};
-use fogbow::cache::{Estimator, EyeSettings, Limits, radiance};
+use fogbow::cache::bytes::Crc;
+use fogbow::cache::{Estimator, Extrapolation, EyeSettings, Limits, Seen, radiance};
 use fogbow::host::Medium;
 use fogbow::light::Light;
 use fogbow::math::{Ray, Vec2};
@@ -12,12 +15,14 @@ use fogbow::sampling::uniform2;
 use fogbow::transmittance::thickness::Steps;
 use fogbow_std::film::Film;
 use fogbow_std::progress::Control;
-use fogbow_std::radiance_cache::{self as cache, Effort, RadianceCaches};
-use fogbow_std::stats::{CountingMedium, CountingScene};
+use fogbow_std::radiance_cache::{self as cache, Effort, Problem, RadianceCaches};
+use fogbow_std::stats::{CountingMedium, CountingScene, Seconds, Stopwatch};
 use fogbow_std::tiles::{self, Outcome};
 
 use super::{Failure, output};
 use crate::camera::Camera;
+use crate::error::SceneError;
+use crate::scene_file::fingerprint;
 use crate::world::{WithMedium, World};
 
 /// Of `--method radiance-cache`.
@@ -39,9 +44,75 @@ pub struct CacheArguments {
     /// Caches not to use: their light is estimated anew at every point; may be repeated.
     #[arg(long, value_name = "CACHE", value_enum)]
     pub uncached: Vec<Kind>,
+    /// How records are carried to other points [default: exponential-mean in homogeneous media, else linear].
+    #[arg(long, value_enum)]
+    pub extrapolation: Option<Carrying>,
     /// How light straight from the lights is scattered once.
     #[arg(long, value_enum, default_value_t = Single::Auto)]
     pub single: Single,
+    /// Starts from the records in this file, and adds only what is missing: made by --cache-out for the same scene
+    /// and the same options; the camera may be another.
+    #[arg(long, value_name = "FILE")]
+    pub cache_in: Option<PathBuf>,
+    /// Writes all records, for --cache-in; may be the same file.
+    #[arg(long, value_name = "FILE")]
+    pub cache_out: Option<PathBuf>,
+}
+
+impl CacheArguments {
+    /// # Errors
+    /// A file that cannot be written: better before a long render than after it.
+    pub(super) fn check(&self) -> Result<(), String> {
+        self.cache_out.as_deref().map_or(Ok(()), output::check_place)
+    }
+
+    /// What caches in files are for: all that changes the light of a scene, and not the camera.
+    pub(super) fn tag(&self, scene: &Path, paths: &path::Settings) -> Result<u64, SceneError> {
+        if self.cache_in.is_none() && self.cache_out.is_none() {
+            return Ok(0);
+        }
+        let mut crc = Crc::new();
+        crc.add(&fingerprint(scene)?.to_le_bytes());
+        let path::Settings { max_scatterings, roulette_after, lights_visible } = *paths;
+        for number in [max_scatterings, roulette_after, u32::from(lights_visible)] {
+            crc.add(&number.to_le_bytes());
+        }
+        Ok(crc.value())
+    }
+
+    fn load(&self, settings: cache::Settings, tag: u64) -> Result<RadianceCaches, String> {
+        let Some(file) = &self.cache_in else { return Ok(RadianceCaches::new(settings)) };
+        cache::load(file, settings, tag).map_err(|error| match error.problem {
+            Problem::Tag { .. } => {
+                format!("{}: was made for another scene, or with another --max-depth", file.display())
+            }
+            _ => error.to_string(),
+        })
+    }
+}
+
+/// How records are carried to other points.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Carrying {
+    /// Exponentially, mixed by their mean.
+    ExponentialMean,
+    /// Exponentially, mixed by their geometric mean: as Jarosz et al. do.
+    Exponential,
+    /// Along the gradient.
+    Linear,
+    /// Unchanged.
+    Constant,
+}
+
+impl From<Carrying> for Extrapolation {
+    fn from(carrying: Carrying) -> Self {
+        match carrying {
+            Carrying::ExponentialMean => Self::ExponentialMean,
+            Carrying::Exponential => Self::Exponential,
+            Carrying::Linear => Self::Linear,
+            Carrying::Constant => Self::Constant,
+        }
+    }
 }
 
 /// A cache.
@@ -74,6 +145,19 @@ fn named(text: &str) -> Result<(Kind, f64), String> {
     Ok((Kind::from_str(kind, false)?, output::positive(value)?))
 }
 
+/// # Errors
+/// A limit on scatterings between one and none: a record does not know how often its light was scattered.
+pub(super) fn check_depth(paths: &path::Settings) -> Result<(), String> {
+    match paths.max_scatterings {
+        0 | 1 | u32::MAX => Ok(()),
+        limit => Err(format!(
+            "radiance caching knows paths of depth 1, of depth 2, or without limit: not {}; leave --max-depth out, \
+             or max_depth of the scene at -1, or take --method path",
+            u64::from(limit) + 1
+        )),
+    }
+}
+
 /// Number of lights from which on single scattering is cached.
 const MANY_LIGHTS: usize = 12;
 
@@ -87,6 +171,8 @@ pub(super) struct CacheJob<'a> {
     pub(super) settings: &'a tiles::Settings,
     pub(super) control: &'a Control<'a>,
     pub(super) arguments: &'a CacheArguments,
+    /// See [`CacheArguments::tag`].
+    pub(super) tag: u64,
 }
 
 /// What caching did besides the picture.
@@ -94,6 +180,8 @@ pub(super) struct CacheJob<'a> {
 pub(super) struct Cached {
     pub(super) caches: RadianceCaches,
     pub(super) filled: cache::Outcome,
+    /// Time to read and write them.
+    pub(super) files: [Seconds; 2],
     pub(super) render: Outcome,
 }
 
@@ -118,12 +206,15 @@ impl CacheJob<'_> {
             Single::Direct => false,
             Single::Cached => true,
         };
+        // Gradients through changing extinction are noisy, and exponentials of noise are too bright.
+        let carrying = if self.world.media().is_homogeneous() { Carrying::ExponentialMean } else { Carrying::Linear };
         cache::Settings {
             single: if cached { effort(Kind::Single, 0.2, 16.0, degree(1, 0.0), 0.1) } else { None },
-            surface: effort(Kind::Surface, 2.0, 256.0, degree(1, 1.0), 0.1),
+            surface: effort(Kind::Surface, 2.0, 256.0, degree(1, 1.5), 0.1),
             multiple: effort(Kind::Multiple, 1.0, 512.0, degree(2, 0.0), 0.1),
             irradiance: effort(Kind::Irradiance, 0.35, 256.0, 0, 0.1),
             rays: 16384,
+            extrapolation: arguments.extrapolation.unwrap_or(carrying).into(),
             margin: 0.15,
             pixels: (1.5, 64.0),
             round: 64,
@@ -133,7 +224,7 @@ impl CacheJob<'_> {
     }
 }
 
-/// The least degree beyond which an expansion holds less than a twentieth of the phase function, applied
+/// The least degree beyond which an expansion holds less than a sixtieth of the phase function, applied
 /// `power` times, to light whose own expansion falls off like `1/(l + 1)^damping`.
 fn degree_for(phase: &Phase, power: i32, damping: f32) -> usize {
     let energy = |l: usize| {
@@ -144,7 +235,7 @@ fn degree_for(phase: &Phase, power: i32, damping: f32) -> usize {
     let mut rest = total;
     for l in 0..=fogbow::sh::MAX_DEGREE {
         rest -= energy(l);
-        if rest <= 0.0025 * total {
+        if rest <= 2.5e-4 * total {
             return l;
         }
     }
@@ -166,7 +257,7 @@ impl WithMedium for CacheJob<'_> {
             lights_visible: self.paths.lights_visible,
             indirect: self.paths.max_scatterings > 1,
         };
-        let steps = Steps::Length(medium.resolution());
+        let steps = Steps::Length(3.0 * medium.resolution());
         let estimator = Estimator {
             world: PathWorld { medium, scene: self.world, lights: self.lights },
             surfaces: None,
@@ -181,8 +272,15 @@ impl WithMedium for CacheJob<'_> {
         let (width, height) = (self.film.width() as f32, self.film.height() as f32);
         let ray = |at: [f32; 2]| -> Ray { self.camera.ray(Vec2::from(at)) };
         let apart = ray([0.5, 0.5]).direction.angle_between(ray([0.5 + 1.0 / width, 0.5]).direction);
-        let mut caches = RadianceCaches::new(settings);
+        let clock = Stopwatch::start();
+        let mut caches = self.arguments.load(settings, self.tag)?;
+        let loaded = clock.elapsed();
         let filled = cache::fill(&mut caches, &estimator, &eye, apart, self.control, ray)?;
+        let clock = Stopwatch::start();
+        if let Some(file) = &self.arguments.cache_out {
+            cache::save(file, &caches, self.tag)?;
+        }
+        let files = [loaded, clock.elapsed()];
         let has_layers = self.film.layers().len() > 1;
         let reader = caches.reader();
         let render = tiles::render(self.film, self.settings, self.control, |sample, rng, layers| {
@@ -201,7 +299,12 @@ impl WithMedium for CacheJob<'_> {
             };
             let jitter = uniform2(rng);
             let film = Vec2::new((sample.x as f32 + jitter.x) / width, (sample.y as f32 + jitter.y) / height);
-            let seen = radiance(&self.camera.ray(film), &estimator, &reader, &eye, rng);
+            let ray = self.camera.ray(film);
+            let seen = if self.paths.max_scatterings == 0 {
+                Seen { emitted: path::radiance(&ray, &estimator.world, &self.paths, rng).emitted, ..Seen::default() }
+            } else {
+                radiance(&ray, &estimator, &reader, &eye, rng)
+            };
             sample.tally.look_up(seen.lookups, seen.misses);
             if has_layers {
                 let parts = [
@@ -218,6 +321,6 @@ impl WithMedium for CacheJob<'_> {
                 *total = seen.total();
             }
         })?;
-        Ok(Cached { caches, filled, render })
+        Ok(Cached { caches, filled, files, render })
     }
 }

@@ -17,7 +17,7 @@ use fogbow_std::radiance_cache::{NAMES, RadianceCaches};
 use fogbow_std::stats::{CountingMedium, CountingScene, Statistics};
 use fogbow_std::tiles::{self, Outcome, Reason, RenderError};
 
-use super::radiance_cache::{CacheArguments, CacheJob};
+use super::radiance_cache::{CacheArguments, CacheJob, check_depth};
 use super::report::{Bar, Report};
 use super::{Ending, Failure, output};
 use crate::camera::Camera;
@@ -130,6 +130,10 @@ pub(crate) fn render(arguments: &RenderArguments) -> Result<Rendered, Failure> {
     if let Some([origin, target]) = arguments.camera {
         scene = scene.seen_from(origin, target).map_err(|reason| format!("--camera: {reason}"))?;
     }
+    let paths = path_settings(&scene, arguments.max_depth);
+    if arguments.method == Method::RadianceCache {
+        check_depth(&paths)?;
+    }
     let mut storage = Storage::new(&scene);
     let world = statistics.time("build", || World::new(&scene, &mut storage))?;
     let (width, height) = arguments.size.unwrap_or((scene.sensor.width, scene.sensor.height));
@@ -167,7 +171,6 @@ pub(crate) fn render(arguments: &RenderArguments) -> Result<Rendered, Failure> {
     };
     let lights = world.lights();
     let camera = world.camera_for(width, height);
-    let paths = path_settings(&scene, arguments.max_depth);
     let (film_of, settings_of, control_of) = (&mut film, &settings, &control);
     let mut cached = None;
     let outcome = match arguments.method {
@@ -190,6 +193,7 @@ pub(crate) fn render(arguments: &RenderArguments) -> Result<Rendered, Failure> {
                 settings: settings_of,
                 control: control_of,
                 arguments: &arguments.cache,
+                tag: arguments.cache.tag(&arguments.scene, &paths)?,
             })?;
             let outcome = done.render;
             cached = Some(done);
@@ -202,6 +206,16 @@ pub(crate) fn render(arguments: &RenderArguments) -> Result<Rendered, Failure> {
             statistics.add(&format!("fill {name}"), cached.filled.seconds[i]);
             statistics.bytes.push((format!("cache {name}"), cached.caches.counts()[i].1 as u64));
             statistics.records.push(((*name).to_owned(), cached.caches.counts()[i].0 as u64));
+        }
+        statistics.add("fill search", cached.filled.search);
+        for (i, name) in ["read caches", "write caches"].into_iter().enumerate() {
+            statistics.add(name, cached.files[i]);
+        }
+        for (name, (records, bytes)) in
+            ["coarse multiple", "coarse irradiance"].iter().zip(cached.caches.coarse_counts())
+        {
+            statistics.bytes.push((format!("cache {name}"), bytes as u64));
+            statistics.records.push(((*name).to_owned(), records as u64));
         }
         statistics.records.push(("computed".to_owned(), cached.filled.computed.iter().sum()));
     }
@@ -231,6 +245,11 @@ fn outputs(arguments: &RenderArguments) -> Result<Vec<PathBuf>, Failure> {
     if let Some(file) = &arguments.stats {
         output::check_place(file)?;
     }
+    let caches = &arguments.cache;
+    if arguments.method == Method::Path && (caches.cache_in.is_some() || caches.cache_out.is_some()) {
+        return Err("--cache-in and --cache-out need --method radiance-cache".into());
+    }
+    caches.check()?;
     if !arguments.exposure.is_finite() {
         return Err("--exposure must be a finite number".into());
     }
@@ -238,7 +257,7 @@ fn outputs(arguments: &RenderArguments) -> Result<Vec<PathBuf>, Failure> {
 }
 
 /// Mitsuba counts the segments of a path, the path tracer its scatterings.
-fn path_settings(scene: &SceneFile, max_depth: Option<u32>) -> path::Settings {
+pub(super) fn path_settings(scene: &SceneFile, max_depth: Option<u32>) -> path::Settings {
     let depth = max_depth.or(scene.integrator.max_depth);
     path::Settings {
         max_scatterings: depth.map_or(u32::MAX, |d| d.saturating_sub(1)),

@@ -82,7 +82,7 @@ impl Report<'_> {
         if counters.non_finite > 0 {
             eprintln!("warning: {} samples were no finite numbers and count as black", counters.non_finite);
         }
-        for file in self.outputs {
+        for file in self.outputs.iter().chain(&self.arguments.cache.cache_out) {
             eprintln!("wrote {}", file.display());
         }
     }

@@ -14,7 +14,7 @@ const INK: Spectrum = Spectrum([0.0; 3]);
 pub(super) fn seen(points: &[Vec3], camera: &Camera, [width, height]: [u32; 2]) -> Result<Image, Failure> {
     let mut image = montage::made(width, height, |_, _| Spectrum::ONE)?;
     for point in points {
-        if let Some(film) = camera.film(*point) {
+        if let Some(film) = camera.project(*point) {
             let at = [film.x * width as f32, film.y * height as f32];
             dot(&mut image, at, 1);
         }

@@ -19,6 +19,7 @@
 mod description;
 mod element;
 mod emitters;
+mod fingerprint;
 mod materials;
 mod media;
 mod places;
@@ -34,6 +35,7 @@ pub use description::{
     Container, Emitter, FovAxis, Geometry, Integrator, Material, Matter, MediumDescription, Place, SceneFile, Sensor,
     Shape,
 };
+pub use fingerprint::fingerprint;
 pub use sensor::MAX_PIXELS;
 
 use crate::error::{SceneError, read_file};
@@ -60,13 +62,17 @@ impl SceneFile {
     /// # Errors
     /// As [`SceneFile::read`].
     pub fn parse(file: &Path, text: &str) -> Result<Self, SceneError> {
-        let options = roxmltree::ParsingOptions { nodes_limit: MAX_NODES, ..Default::default() };
-        let document = roxmltree::Document::parse_with_options(text, options)
-            .map_err(|e| file_error(file, Some(e.pos().row), format!("is not well-formed XML: {e}")))?;
+        let document = document(file, text)?;
         let mut context = Context { file: file.to_owned(), defaults: BTreeMap::new(), ids: HashMap::new() };
         collect(&document, &mut context)?;
         read_scene(Element { node: document.root_element(), context: &context })
     }
+}
+
+fn document<'a>(file: &Path, text: &'a str) -> Result<roxmltree::Document<'a>, SceneError> {
+    let options = roxmltree::ParsingOptions { nodes_limit: MAX_NODES, ..Default::default() };
+    roxmltree::Document::parse_with_options(text, options)
+        .map_err(|e| file_error(file, Some(e.pos().row), format!("is not well-formed XML: {e}")))
 }
 
 fn file_error(file: &Path, line: Option<u32>, reason: String) -> SceneError {

@@ -94,6 +94,12 @@ impl<'a> Media<'a> {
         })
     }
 
+    /// Whether there is at most one medium, the same everywhere in its container.
+    #[must_use]
+    pub fn is_homogeneous(&self) -> bool {
+        matches!(self, Self::None | Self::Homogeneous(_))
+    }
+
     /// The phase functions there are.
     #[must_use]
     pub fn phases(&self) -> Vec<Phase> {

@@ -6,6 +6,7 @@
 
 #![no_std]
 
+mod caching;
 mod digest;
 mod estimates;
 mod media;

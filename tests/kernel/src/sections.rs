@@ -12,7 +12,7 @@ use fogbow::spectrum::{Gradient, Hessian, Spectrum};
 use fogbow::storage::List;
 use fogbow::surface::Surface;
 
-use crate::{Digest, Section, estimates, media, walks};
+use crate::{Digest, Section, caching, estimates, media, walks};
 
 /// Every section, lowest layer first.
 pub const SECTIONS: &[Section] = &[
@@ -32,6 +32,7 @@ pub const SECTIONS: &[Section] = &[
     Section { name: "march", run: estimates::march },
     Section { name: "multiple_scatter", run: estimates::multiple_scatter },
     Section { name: "path", run: walks::path },
+    Section { name: "cache", run: caching::cache },
 ];
 
 /// Inputs of each section: enough to pass through every branch, few enough for a browser.

@@ -1,0 +1,438 @@
+//! Caches as bytes: to be saved, sent, and read elsewhere with the same bits.
+//!
+//! Little endian on every target, without gaps:
+//!
+//! | offset | bytes | what |
+//! |---|---|---|
+//! | 0 | 8 | [`MAGIC`] |
+//! | 8 | 4 | [`VERSION`] |
+//! | 12 | 4 | [`Kind`]: 1 in a medium, 2 on surfaces |
+//! | 16 | 4 | stride `s`: attachments per record, `(degree + 1)² − 1` in a medium, 1 on surfaces |
+//! | 20 | 4 | number of records `n` |
+//! | 24 | 8 | tag: what the cache was made for, a number of the host's choice |
+//! | 32 | 8 | [`Crc`] of bytes 0 to 32 and of all from 40 on |
+//! | 40 | 64 n | records: position, radius, value (r, g, b), gradient (along x: r, g, b; along y; along z) as `f32` |
+//! | 40 + 64 n | 48 n s | attachments, record after record: 12 `f32` each, [`Coefficient`] or [`Facing`] |
+//!
+//! The index is not stored: it is built anew, and gives the same answers because it depends on the
+//! records and their order alone. So a cache read back gives the bits that the one written gave after
+//! [`Cache::finish`].
+//!
+//! What is truncated, foreign or damaged is refused with a [`BytesError`] that names the first check that failed.
+//! The checksum finds every damage within 64 neighbouring bits, and any other but for one in 2⁶⁴.
+//!
+//! ```
+//! use fogbow::cache::{Cache, Record, VolumeCache, bytes};
+//! # use fogbow::{math::Vec3, spectrum::{Gradient, Spectrum}};
+//! # #[cfg(feature = "alloc")] {
+//! let mut cache: VolumeCache = Cache::growing(0);
+//! let record = Record { position: Vec3::X, radius: 0.5, value: Spectrum::ONE, gradient: Gradient::ZERO };
+//! cache.insert(record, &[])?;
+//!
+//! let mut file = Vec::new();
+//! let Ok(()) = bytes::write(&cache, 7, |part| Ok::<_, core::convert::Infallible>(file.extend(part)));
+//! assert_eq!(file.len(), bytes::byte_count(&cache));
+//!
+//! let mut copy: VolumeCache = Cache::growing(0);
+//! bytes::read_into(&file, 7, &mut copy)?;
+//! assert_eq!(copy.records(), cache.records());
+//!
+//! file[99] ^= 1;
+//! assert_eq!(bytes::read_into(&file, 7, &mut copy), Err(bytes::BytesError::Checksum));
+//! # }
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+use core::fmt;
+
+use bytemuck::Pod;
+
+use super::store::Cache;
+use super::{Facing, Record};
+use crate::sh::{self, Coefficient};
+use crate::storage::Full;
+
+/// The first bytes: not text, and damaged by whatever changes ends of lines.
+pub const MAGIC: [u8; 8] = *b"\x89FOGBOW\n";
+
+/// Of the layout above.
+pub const VERSION: u32 = 1;
+
+/// Length of a [`Header`] (bytes).
+pub const HEADER_BYTES: usize = 40;
+
+/// Most attachments a record may have: those of an expansion of [`sh::MAX_DEGREE`].
+const MAX_STRIDE: u32 = sh::MAX_COEFFICIENTS as u32 - 1;
+
+/// Which cache.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(u32)]
+pub enum Kind {
+    /// [`VolumeCache`](super::VolumeCache).
+    Volume = 1,
+    /// [`SurfaceCache`](super::SurfaceCache).
+    Surface = 2,
+}
+
+impl fmt::Display for Kind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Volume => "records in a medium",
+            Self::Surface => "records on surfaces",
+        })
+    }
+}
+
+/// What may be attached to records that are written as bytes: made of `f32` and nothing else.
+pub trait Attachment: Pod {
+    /// The kind of cache it makes.
+    const KIND: Kind;
+    /// Whether it can belong to a record that was computed.
+    fn is_valid(&self) -> bool;
+}
+
+impl Attachment for Coefficient {
+    const KIND: Kind = Kind::Volume;
+    fn is_valid(&self) -> bool {
+        self.value.0.iter().all(|c| c.is_finite()) && self.gradient.is_finite()
+    }
+}
+
+impl Attachment for Facing {
+    const KIND: Kind = Kind::Surface;
+    fn is_valid(&self) -> bool {
+        // Normals of hosts are unit vectors up to rounding; what is far from it is damage.
+        (self.normal.length_squared() - 1.0).abs() < 1e-2 && self.turn.is_finite()
+    }
+}
+
+/// Why bytes are not the cache asked for. The variants are in the order of the checks.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum BytesError {
+    /// Fewer bytes than a header.
+    NoHeader {
+        /// How many there are.
+        found: usize,
+    },
+    /// Other first bytes: something else altogether.
+    Magic,
+    /// Of another version than [`VERSION`].
+    Version(u32),
+    /// A kind that is not known.
+    UnknownKind(u32),
+    /// A stride or a number of records that no cache has.
+    Size {
+        /// Attachments per record.
+        stride: u32,
+        /// Records.
+        count: u32,
+    },
+    /// Not as many bytes as the header says.
+    Length {
+        /// How many there are.
+        found: usize,
+        /// How many the header says.
+        due: usize,
+    },
+    /// Damaged.
+    Checksum,
+    /// The other kind of cache.
+    Kind {
+        /// What it is.
+        found: Kind,
+        /// What was asked for.
+        due: Kind,
+    },
+    /// Another number of attachments: expansions of another degree.
+    Stride {
+        /// Attachments per record.
+        found: u32,
+        /// As many as were asked for.
+        due: u32,
+    },
+    /// Made for something else.
+    Tag {
+        /// What it was made for.
+        found: u64,
+        /// What was asked for.
+        due: u64,
+    },
+    /// A record that is not valid, see [`Record::is_valid`].
+    Record(u32),
+    /// An attachment that is not valid, of this record.
+    Attachment(u32),
+    /// The cache's lent storage is too small.
+    Full,
+}
+
+impl From<Full> for BytesError {
+    fn from(_: Full) -> Self {
+        Self::Full
+    }
+}
+
+impl fmt::Display for BytesError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match *self {
+            Self::NoHeader { found } => write!(f, "ends after {found} bytes, before its header of {HEADER_BYTES} does"),
+            Self::Magic => f.write_str("is not a radiance cache: other first bytes"),
+            Self::Version(found) => write!(f, "has version {found} of the format; {VERSION} is known"),
+            Self::UnknownKind(found) => write!(f, "holds a cache of unknown kind {found}"),
+            Self::Size { stride, count } => {
+                write!(f, "claims {count} records with {stride} attachments each, which no cache has")
+            }
+            Self::Length { found, due } if found < due => {
+                write!(f, "is cut off: {due} bytes are due, {found} are there")
+            }
+            Self::Length { found, due } => write!(f, "goes on after its end: {due} bytes are due, {found} are there"),
+            Self::Checksum => f.write_str("is damaged: the checksum is another"),
+            Self::Kind { found, due } => write!(f, "holds {found} where {due} are due"),
+            Self::Stride { found, due } => {
+                write!(f, "has {found} attachments per record where {due} are due: expansions of another degree")
+            }
+            Self::Tag { found, due } => write!(f, "was made for something else (tag {found:016x}, not {due:016x})"),
+            Self::Record(index) => write!(f, "has a record that is not valid: number {index}"),
+            Self::Attachment(index) => write!(f, "has an attachment that is not valid: of record {index}"),
+            Self::Full => f.write_str("has more records than the lent storage holds"),
+        }
+    }
+}
+
+impl core::error::Error for BytesError {}
+
+/// What the first [`HEADER_BYTES`] say.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Header {
+    /// Which cache.
+    pub kind: Kind,
+    /// Attachments per record.
+    pub stride: u32,
+    /// Records.
+    pub count: u32,
+    /// What it was made for.
+    pub tag: u64,
+    /// Of all but itself.
+    pub checksum: u64,
+}
+
+impl Header {
+    /// Reads the header alone, to learn how much follows; the checksum is not compared.
+    ///
+    /// # Errors
+    /// What is wrong with it.
+    pub fn read(bytes: &[u8]) -> Result<Self, BytesError> {
+        let header = bytes.first_chunk::<HEADER_BYTES>().ok_or(BytesError::NoHeader { found: bytes.len() })?;
+        if !header.starts_with(&MAGIC) {
+            return Err(BytesError::Magic);
+        }
+        let word = |at: usize| u32::from_le_bytes([header[at], header[at + 1], header[at + 2], header[at + 3]]);
+        let long = |at: usize| u64::from(word(at)) | u64::from(word(at + 4)) << 32;
+        if word(8) != VERSION {
+            return Err(BytesError::Version(word(8)));
+        }
+        let kind = match word(12) {
+            1 => Kind::Volume,
+            2 => Kind::Surface,
+            unknown => return Err(BytesError::UnknownKind(unknown)),
+        };
+        let header = Self { kind, stride: word(16), count: word(20), tag: long(24), checksum: long(32) };
+        let size = BytesError::Size { stride: header.stride, count: header.count };
+        if header.stride > MAX_STRIDE {
+            return Err(size);
+        }
+        header.total().map(|_| header).ok_or(size)
+    }
+
+    /// Length of all of it, header included (bytes). `usize::MAX` where that is too small.
+    #[must_use]
+    pub fn byte_count(&self) -> usize {
+        self.total().unwrap_or(usize::MAX)
+    }
+
+    fn total(&self) -> Option<usize> {
+        let attached = size_of::<Coefficient>().checked_mul(self.stride as usize)?;
+        let each = size_of::<Record>().checked_add(attached)?;
+        each.checked_mul(self.count as usize)?.checked_add(HEADER_BYTES)
+    }
+}
+
+/// How many bytes [`write()`] writes.
+#[must_use]
+pub fn byte_count<E: Attachment>(cache: &Cache<'_, E>) -> usize {
+    HEADER_BYTES + size_of_val(cache.records()) + size_of_val(cache.attachments())
+}
+
+/// Writes `cache`, part after part, to `sink`. `tag` says what it was made for: whoever reads it must give the same.
+///
+/// Write it after [`Cache::finish`] if the copy's answers must be the same to the last bit.
+///
+/// # Errors
+/// The first of `sink`.
+pub fn write<E: Attachment, F>(
+    cache: &Cache<'_, E>,
+    tag: u64,
+    mut sink: impl FnMut(&[u8]) -> Result<(), F>,
+) -> Result<(), F> {
+    let mut header = [0; HEADER_BYTES];
+    header[..8].copy_from_slice(&MAGIC);
+    // Numbers of records are `u32` everywhere in a cache, and strides are small.
+    let words = [VERSION, E::KIND as u32, cache.stride() as u32, cache.len() as u32];
+    for (to, word) in header[8..24].chunks_exact_mut(4).zip(words) {
+        to.copy_from_slice(&word.to_le_bytes());
+    }
+    header[24..32].copy_from_slice(&tag.to_le_bytes());
+    let mut crc = Crc::new();
+    crc.add(&header[..32]);
+    let mut add = |bytes: &[u8]| {
+        crc.add(bytes);
+        Ok::<(), core::convert::Infallible>(())
+    };
+    let (Ok(()), Ok(())) = (elements(cache.records(), &mut add), elements(cache.attachments(), &mut add));
+    header[32..].copy_from_slice(&crc.value().to_le_bytes());
+    sink(&header)?;
+    elements(cache.records(), &mut sink)?;
+    elements(cache.attachments(), &mut sink)
+}
+
+/// Replaces what `cache` holds by what was written as `bytes` with the same `tag`, and brings it into the index.
+///
+/// # Errors
+/// The first check that fails. The cache is then as before, or empty after [`BytesError::Full`].
+pub fn read_into<E: Attachment>(bytes: &[u8], tag: u64, cache: &mut Cache<'_, E>) -> Result<(), BytesError> {
+    let header = Header::read(bytes)?;
+    let due = header.byte_count();
+    if bytes.len() != due {
+        return Err(BytesError::Length { found: bytes.len(), due });
+    }
+    let (head, body) = bytes.split_at(HEADER_BYTES);
+    let mut crc = Crc::new();
+    crc.add(&head[..32]);
+    crc.add(body);
+    if crc.value() != header.checksum {
+        return Err(BytesError::Checksum);
+    }
+    if header.kind != E::KIND {
+        return Err(BytesError::Kind { found: header.kind, due: E::KIND });
+    }
+    if header.stride as usize != cache.stride() {
+        return Err(BytesError::Stride { found: header.stride, due: cache.stride() as u32 });
+    }
+    if header.tag != tag {
+        return Err(BytesError::Tag { found: header.tag, due: tag });
+    }
+    let stride = header.stride as usize;
+    let (records, attached) = body.split_at(header.count as usize * size_of::<Record>());
+    let records = records.chunks_exact(size_of::<Record>());
+    let attached_to = |i: usize| attached.chunks_exact(size_of::<E>()).skip(i * stride).take(stride).map(element::<E>);
+    for (i, record) in records.clone().enumerate() {
+        if !element::<Record>(record).is_valid() {
+            return Err(BytesError::Record(i as u32));
+        }
+        if !attached_to(i).all(|e| e.is_valid()) {
+            return Err(BytesError::Attachment(i as u32));
+        }
+    }
+    cache.clear();
+    let fill = || {
+        for (i, record) in records.enumerate() {
+            cache.restore(element(record), attached_to(i))?;
+        }
+        cache.finish()
+    };
+    let filled = fill();
+    if filled.is_err() {
+        cache.clear();
+    }
+    Ok(filled?)
+}
+
+/// Elements in little-endian bytes, one at a time.
+fn elements<T: Pod, F>(all: &[T], sink: &mut impl FnMut(&[u8]) -> Result<(), F>) -> Result<(), F> {
+    if cfg!(target_endian = "little") {
+        return if all.is_empty() { Ok(()) } else { sink(bytemuck::cast_slice(all)) };
+    }
+    bytemuck::cast_slice::<T, u32>(all).iter().try_for_each(|word| sink(&word.to_le_bytes()))
+}
+
+/// The element in as many little-endian bytes.
+fn element<T: Pod>(bytes: &[u8]) -> T {
+    let mut value = T::zeroed();
+    let words: &mut [u32] = bytemuck::cast_slice_mut(core::slice::from_mut(&mut value));
+    for (word, bytes) in words.iter_mut().zip(bytes.as_chunks::<4>().0) {
+        *word = u32::from_le_bytes(*bytes);
+    }
+    value
+}
+
+/// CRC-64/XZ (ECMA-182, reflected): finds every change within 64 neighbouring bits.
+///
+/// ```
+/// # use fogbow::cache::bytes::Crc;
+/// let mut crc = Crc::new();
+/// crc.add(b"123456789");
+/// assert_eq!(crc.value(), 0x995d_c9bb_df19_39fa);
+/// ```
+#[derive(Debug, Clone, Copy)]
+pub struct Crc(u64);
+
+/// For eight bytes at once: `TABLES[k][b]` is what byte `b` with `k` bytes behind it becomes.
+static TABLES: [[u64; 256]; 8] = tables();
+
+const fn tables() -> [[u64; 256]; 8] {
+    let mut tables = [[0; 256]; 8];
+    let mut byte = 0;
+    while byte < 256 {
+        let mut value = byte as u64;
+        let mut bit = 0;
+        while bit < 8 {
+            value = if value & 1 == 1 { value >> 1 ^ 0xc96c_5795_d787_0f42 } else { value >> 1 };
+            bit += 1;
+        }
+        tables[0][byte] = value;
+        byte += 1;
+    }
+    let mut behind = 1;
+    while behind < 8 {
+        byte = 0;
+        while byte < 256 {
+            let value = tables[behind - 1][byte];
+            tables[behind][byte] = value >> 8 ^ tables[0][(value & 0xff) as usize];
+            byte += 1;
+        }
+        behind += 1;
+    }
+    tables
+}
+
+impl Default for Crc {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Crc {
+    /// Of nothing yet.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self(!0)
+    }
+
+    /// Adds what comes next.
+    pub fn add(&mut self, bytes: &[u8]) {
+        let (eights, rest) = bytes.as_chunks::<8>();
+        for eight in eights {
+            let mixed = (self.0 ^ u64::from_le_bytes(*eight)).to_le_bytes();
+            self.0 = mixed.iter().zip(TABLES.iter().rev()).fold(0, |sum, (&b, table)| sum ^ table[b as usize]);
+        }
+        for &byte in rest {
+            self.0 = self.0 >> 8 ^ TABLES[0][((self.0 ^ u64::from(byte)) & 0xff) as usize];
+        }
+    }
+
+    /// Of all that was added.
+    #[must_use]
+    pub const fn value(&self) -> u64 {
+        !self.0
+    }
+}

@@ -1,0 +1,226 @@
+#!/usr/bin/env python3
+"""Holds radiance caching against references and against path tracing: long runs, not part of CI.
+
+    FOGBOW_REFERENCE=FOLDER python3 tests/acceptance/cache.py accuracy    [SCENE...]
+    FOGBOW_REFERENCE=FOLDER python3 tests/acceptance/cache.py speed       [SCENE...] [--size 128|512] [--store FOLDER]
+    FOGBOW_REFERENCE=FOLDER python3 tests/acceptance/cache.py flicker     [--frames N] [--store FOLDER]
+    FOGBOW_REFERENCE=FOLDER python3 tests/acceptance/cache.py reuse       [--size WxH]
+    FOGBOW_REFERENCE=FOLDER python3 tests/acceptance/cache.py determinism [SCENE...]
+    FOGBOW_REFERENCE=FOLDER python3 tests/acceptance/cache.py cost        [SCENE...]
+
+FOLDER and what must be built and installed: see ground.py. SCENE is a name in public/. CPU seconds are those of all
+phases of filling and of the rendering, without reading, building the tree and writing. --store keeps long renders.
+
+accuracy     default settings: relRMSE_c <= 3 % (6 % in spot-shafts, nave-shafts, lantern and their -ss), |bias| <= 1 %,
+             no 16x16 block off by more than 5 %. `ref` is the mean standard error of the reference's own blocks; where
+             the worst block lies within 3 combined standard errors the line says `noise`, and the block still counts.
+speed        CPU seconds to 2 % relRMSE_c, by the cheapest rung of LADDER that reaches it (the error is the root mean
+             square of three seeds), against path tracing and the peer, whose seconds to 2 % are c^2 / 0.02^2 of runs of
+             64 (at 512x512: 16) samples in turns. At least 50 times faster than the slower, and than our own path tracing.
+             At 512x512 no reference is stored. The truth is then two independent path traced renders A and B, and the
+             squared error of an image I the mean of (I - A)(I - B): their noise, being independent, drops out.
+flicker      a fresh cache with other seeds for each of 12 frames of `fogbow plume`: the variance over frames of (frame -
+             converged frame), at most a quarter of path tracing's at equal CPU time. Converged frames come in two
+             halves as above, so that their noise drops out of the variance.
+reuse        the walk through the atrium, every frame with the cache of the one before (--cache-in, --cache-out): every
+             later frame takes at most a third of the first one's CPU seconds.
+determinism  the same bytes of .pfm and .exr with 1, 2 and 7 threads, and from a cache saved and loaded.
+cost         CPU time of a record and of a look-up, their ratio (100 to 1000 in Jarosz et al. 2008), and the share of
+             look-ups in the render. A look-up is what the render takes more than one of --max-depth 2, which marches to
+             the same points and connects the same lights, divided by the number of look-ups.
+
+Exit status 1 when a line fails.
+"""
+import argparse, os, subprocess, sys, tempfile
+import numpy as np
+from common import Halves, Stored, compare, cpu, every_scene, halves, peer_run, render, verdict
+import common
+
+CACHED = ("--method", "radiance-cache")
+SHARP = ("spot-shafts", "nave-shafts", "lantern")  # borders of light no wider than a pixel, heavy tails
+CORNELL = [f"cornell-{medium}-{phase}" for medium in ("homog", "hetero") for phase in ("iso", "hg06")]
+
+# --tolerance (of all caches; None: defaults), --paths, --spp; the cheapest first.
+LADDER = [
+    (None, 128, 16),
+    (None, 256, 16),
+    (None, 256, 32),
+    (None, 512, 32),
+    (None, 512, 64),
+    (0.5, 512, 64),
+    (0.35, 1024, 64),
+    (0.25, 1024, 128),
+]
+
+
+def accuracy(scenes, _):
+    failures = 0
+    for scene in scenes or every_scene():
+        mean, error, kind = compare.load_ref(scene)
+        image, statistics = render(scene, *CACHED, "--seed", 1)
+        result = compare.stats(image, mean, error)
+        bound = 0.06 if scene.removesuffix("-ss") in SHARP else 0.03
+        misses = [name for name, is_missed in [
+            ("relRMSE_c", result["relRMSE_c"] > bound),
+            ("bias", abs(result["bias"]) > 0.01),
+            ("block", result["block_rel_max"] > 0.05),
+            ("non_finite", statistics["counts"]["non_finite"] > 0),
+        ] if is_missed]
+        noise = " noise" if "block" in misses and kind != "exact" and result["block_sigma_max"] <= 3 else ""
+        failures += bool(misses)
+        print(f"{scene:24s} {verdict(not misses)} relRMSE_c {100 * result['relRMSE_c']:.2f} % (floor {100 * result['floor']:.2f})  "
+              f"bias {100 * result['bias']:+.2f} %  worst block {100 * result['block_rel_max']:.1f} % ({result['block_sigma_max']:.1f} s.e., "
+              f"rms {100 * result['block_rel_rms']:.2f} %, ref {100 * result['block_rel_ref_se']:.2f} %)  "
+              f"{cpu(statistics, ['fill']):.2f} + {cpu(statistics, ['render']):.2f} CPU s  {' '.join(misses)}{noise}", flush=True)
+    return failures
+
+
+def settings(rung):
+    tolerance, paths, samples = rung
+    return (*CACHED, *([] if tolerance is None else ["--tolerance", tolerance]), "--paths", paths, "--spp", samples)
+
+
+def climb(scene, truth, size, goal):
+    """The first rung whose error is at most `goal`; -> its CPU seconds or None"""
+    for rung in LADDER:
+        squares, seconds = [], []
+        for seed in (1, 2, 3):
+            image, statistics = render(scene, *settings(rung), "--seed", seed, *size)
+            squares.append(truth.relative_square(image))
+            seconds.append(cpu(statistics))
+            if squares[0] > (1.3 * goal) ** 2:
+                break  # hopeless
+        error = np.sqrt(max(np.mean(squares), 0))
+        print(f"    tolerance {rung[0] or 'default'}, {rung[1]} paths, {rung[2]} samples: {100 * error:.2f} % in {np.mean(seconds):.2f} CPU s", flush=True)
+        if len(squares) == 3 and error <= goal:
+            return np.mean(seconds)
+    return None
+
+
+def speed(scenes, arguments):
+    failures, goal, side = 0, 0.02, int(arguments.size or 128)
+    size, samples = ("--size", f"{side}x{side}"), {128: 64, 512: 16}[side]
+    for scene in scenes or CORNELL:
+        if side == 128:
+            truth = Stored(scene)
+        else:
+            truth = Halves(*halves(arguments.store, f"{scene}-{side}", scene, 512, *size))
+        paths, peers = [], []
+        for turn in range(2):
+            image, statistics = render(scene, "--method", "path", "--spp", samples, "--seed", 100 + turn, *size)
+            paths.append((truth.relative_square(image), cpu(statistics)))
+            image, seconds = peer_run(scene, samples, 200 + turn, side)
+            peers.append((truth.relative_square(image), seconds))
+        path, peer = (np.mean([square for square, _ in runs]) * np.mean([time for _, time in runs]) / goal**2 for runs in (paths, peers))
+        ours = climb(scene, truth, size, goal)
+        passes = ours is not None and path >= 50 * ours and peer >= 50 * ours
+        failures += not passes
+        text = "2 % not reached" if ours is None else f"{ours:.2f} CPU s: {path / ours:.0f} and {peer / ours:.0f} times as fast"
+        print(f"{scene:24s} {verdict(passes)} to 2 % at {side}x{side}: path tracing {path:.0f}, peer {peer:.0f}, caching {text}", flush=True)
+    return failures
+
+
+def flicker(_, arguments):
+    size = ("--size", arguments.size or "128x96")
+    frames = os.path.join(arguments.store, "plume")
+    subprocess.run([common.PROGRAM, "plume", "--frames", str(arguments.frames), "-o", frames, "--quiet"], check=True)
+    cached, traced, truths = [], [], []
+    times = {"cached": 0.0, "traced": 0.0}
+    for frame in range(arguments.frames):
+        scene = os.path.join(frames, f"plume-{frame:02d}.xml")
+        truths.append(halves(arguments.store, f"plume-{frame:02d}-{size[1]}", scene, arguments.spp, *size))
+        image, statistics = render(scene, *CACHED, "--seed", 1000 + frame, *size)
+        cached.append(image)
+        times["cached"] += cpu(statistics)
+        if frame == 0:
+            _, trial = render(scene, "--method", "path", "--spp", 8, *size)
+            samples = max(round(8 * cpu(statistics) / cpu(trial)), 1)
+        image, statistics = render(scene, "--method", "path", "--spp", samples, "--seed", 2000 + frame, *size)
+        traced.append(image)
+        times["traced"] += cpu(statistics)
+    mean = np.mean(truths, (0, 1))
+    scale = compare.smooth(mean) ** 2 + 0.01 * mean.mean() ** 2
+
+    def variance(images):
+        apart = [np.array(images) - np.array([halves[i] for halves in truths]) for i in (0, 1)]
+        first, second = (a - a.mean(0) for a in apart)
+        return np.mean((first * second).sum(0) / (len(images) - 1) / scale)
+
+    # A path tracer's variance falls with its time: brought to the very same.
+    path = variance(traced) * times["traced"] / times["cached"]
+    ratio = variance(cached) / path
+    print(f"plume {verdict(ratio <= 0.25)} relative variance over {arguments.frames} frames at {times['cached'] / arguments.frames:.2f} CPU s each: "
+          f"caching {variance(cached):.3e}, path tracing {path:.3e} ({samples} samples), ratio {ratio:.3f}")
+    return ratio > 0.25
+
+
+def reuse(_, arguments):
+    scenes = os.path.join(common.ROOT, "examples", "scenes")
+    with open(os.path.join(scenes, "atrium-walk.txt")) as file:
+        walk = file.read().splitlines()
+    size = ("--size", arguments.size) if arguments.size else ()
+    failures, first = 0, None
+    with tempfile.TemporaryDirectory() as folder:
+        cache = os.path.join(folder, "walk.cache")
+        for number, camera in enumerate(walk):
+            known = ("--cache-in", cache) if number else ()
+            _, statistics = render(os.path.join(scenes, "atrium.xml"), *CACHED, "--camera", camera, "--seed", number, *size,
+                                   *known, "--cache-out", cache)
+            seconds = cpu(statistics)
+            first = first or seconds
+            passes = number == 0 or seconds <= first / 3
+            failures += not passes
+            print(f"frame {number:2d} {verdict(passes)} {seconds:.2f} CPU s ({seconds / first:.2f} of the first): filling {cpu(statistics, ['fill']):.2f}, "
+                  f"{statistics['records']['computed']} records computed, rendering {cpu(statistics, ['render']):.2f}", flush=True)
+    return failures
+
+
+def determinism(scenes, _):
+    failures = 0
+    for scene in scenes or ["cornell-hetero-hg06", "spot-shafts", "room-plume"]:
+        few = (*CACHED, "--size", "64x64", "--spp", 4, "--paths", 64)
+        with tempfile.TemporaryDirectory() as folder:
+            cache = os.path.join(folder, "scene.cache")
+            runs = {f"{threads} threads": ("--threads", threads) for threads in (1, 2, 7)}
+            runs["saved"] = ("--cache-out", cache)
+            runs["loaded"] = ("--cache-in", cache)
+            expected = None
+            for run, options in runs.items():
+                files = {}
+                try:
+                    render(scene, *few, *options, files=files)
+                except subprocess.CalledProcessError as error:
+                    files = {"": f"exit code {error.returncode}"}
+                expected = expected or files
+                passes = files == expected
+                failures += not passes
+                print(f"{scene:24s} {verdict(passes)} {run} {files.get('', '')}", flush=True)
+    return failures
+
+
+def cost(scenes, _):
+    for scene in scenes or CORNELL + ["spot-shafts", "room-plume", "nave-shafts"]:
+        _, whole = render(scene, *CACHED)
+        _, single = render(scene, *CACHED, "--max-depth", 2)
+        records, counts = whole["records"], whole["counts"]
+        record = cpu(whole, ["fill"]) / max(records["computed"], 1)
+        lookups = cpu(whole, ["render"]) - cpu(single, ["render"])
+        lookup = lookups / max(counts["cache_lookups"], 1)
+        kept = ", ".join(f"{name} {count}" for name, count in records.items() if name != "computed" and count)
+        print(f"{scene:24s} record {1e6 * record:.0f} us ({records['computed']} computed; kept: {kept})  look-up {1e9 * lookup:.0f} ns "
+              f"({counts['cache_lookups'] / 1e6:.1f} million, {100 * counts['cache_misses'] / max(counts['cache_lookups'], 1):.2f} % missed)  "
+              f"ratio {record / lookup:.0f}  look-ups {100 * lookups / cpu(whole, ['render']):.0f} % of {cpu(whole, ['render']):.2f} CPU s", flush=True)
+    return 0
+
+
+if __name__ == "__main__":
+    what = {f.__name__: f for f in (accuracy, speed, flicker, reuse, determinism, cost)}
+    parser = argparse.ArgumentParser(usage=__doc__)
+    parser.add_argument("what", choices=what)
+    parser.add_argument("scenes", nargs="*", metavar="SCENE")
+    parser.add_argument("--size")
+    parser.add_argument("--frames", type=int, default=12)
+    parser.add_argument("--spp", type=int, default=512)
+    parser.add_argument("--store", default=os.path.join(tempfile.gettempdir(), "fogbow-acceptance"))
+    arguments = parser.parse_args()
+    sys.exit(min(int(what[arguments.what](arguments.scenes, arguments)), 1))
