@@ -7,6 +7,7 @@
 //! | [`world`] | the host: surfaces, lights and media, ready for rays |
 //! | [`camera`] | the pinhole camera |
 //! | [`plume`] | an animation of smoke |
+//! | [`figures`] | figures of papers, rebuilt |
 //! | [`compare`] | how far two images are apart |
 //! | [`cli`] | the command line |
 
@@ -16,6 +17,7 @@ pub mod camera;
 pub mod cli;
 pub mod compare;
 pub mod error;
+pub mod figures;
 pub mod mesh;
 pub mod picture;
 pub mod plume;

@@ -142,6 +142,24 @@ fn a_plume_is_a_folder_of_scenes_that_render() {
 }
 
 #[test]
+fn figures_come_with_a_page_that_shows_them_all() {
+    let folder = Folder::new("figures");
+    let output = folder.run(&["figures", "jarosz", "--quick", "--only", "4", "--only", "5", "-o", "a/b"]);
+    assert_eq!(output.status.code(), Some(0), "{}", said(&output));
+    let page = std::fs::read_to_string(folder.0.join("a/b/README.md")).unwrap();
+    let mut shown = 0;
+    for entry in std::fs::read_dir(folder.0.join("a/b")).unwrap() {
+        let name = entry.unwrap().file_name().to_string_lossy().into_owned();
+        shown += usize::from(name != "README.md");
+        assert!(name == "README.md" || page.contains(&format!("]({name})")), "{name} is not on the page");
+    }
+    assert_eq!(shown, page.matches("](fig-").count());
+    let output = folder.run(&["figures", "jarosz", "--only", "8", "--scenes", "nowhere", "-o", "c"]);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(said(&output).contains("atrium.xml"), "{}", said(&output));
+}
+
+#[test]
 fn the_same_bits_come_from_any_number_of_threads() {
     let folder = Folder::new("threads");
     let mut images = Vec::new();

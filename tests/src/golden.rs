@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 
 use serde_json::{Map, Value, json};
 
+use fogbow::cache::{Blend, Extrapolation, Limits, exponent_limit, valid_radius, weight};
 use fogbow::light::{Falloff, Source};
 use fogbow::math::{Ray, Vec3};
 use fogbow::multiple_scatter::Weight;
@@ -24,12 +25,10 @@ use crate::hosts::{Analytic, Field};
 pub const NOT_YET: &[&str] = &[
     "bias_compensation",
     "covariance_ops",
-    "extrapolation",
     "hg_covariance",
     "image_covariance",
     "sampling_metrics",
     "scattering_covariance",
-    "valid_radius",
     "volumetric_covariance",
     "vpl",
 ];
@@ -148,6 +147,8 @@ pub fn outputs(topic: &str, input: &Map<String, Value>) -> Option<Value> {
         "sh_basis" => sh_basis(&input),
         "sh_phase" => sh_phase(&input),
         "truncated_exponential" => truncated(&input),
+        "valid_radius" => radius(&input),
+        "extrapolation" => extrapolation(&input),
         _ => return None,
     })
 }
@@ -182,6 +183,18 @@ impl<'a> Input<'a> {
     }
     fn vector(&self, key: &str) -> Vec3 {
         Vec3::from(self.doubles(key).map(|c| c as f32))
+    }
+    fn colour(&self, key: &str) -> Spectrum {
+        Spectrum(self.doubles(key).map(|c| c as f32))
+    }
+    /// A vector per channel.
+    fn slope(&self, key: &str) -> Gradient {
+        let list = self.get(key).as_array().unwrap_or_else(|| panic!("{key:?} is no list"));
+        let channel = |c: usize| {
+            let component = |i: usize| list[c][i].as_f64().expect("a number") as f32;
+            Vec3::new(component(0), component(1), component(2))
+        };
+        Gradient::from_channels(channel(0), channel(1), channel(2))
     }
     /// Normalised on input, once, in `f64`.
     fn direction(&self, key: &str) -> Vec3 {
@@ -375,4 +388,29 @@ fn sh_phase(input: &Input<'_>) -> Value {
 fn truncated(input: &Input<'_>) -> Value {
     let sample = truncated_exponential(input.number("xi"), input.number("sigma"), input.number("d"));
     json!({ "t": sample.distance, "pdf": sample.pdf, "weight": sample.weight })
+}
+
+fn radius(input: &Input<'_>) -> Value {
+    let mut sums = Sums::default();
+    for sample in input.objects("samples") {
+        let contribution = Contribution { radiance: sample.colour("L"), gradient: sample.slope("grad") };
+        sums.add(&contribution, sample.get("visible").as_bool().expect("true or false"));
+    }
+    let raw = valid_radius(&sums, input.number("eps"));
+    let limits = Limits { min: input.number("r_min"), max: input.number("r_max") };
+    json!({ "raw": raw, "radius": limits.clamp(raw) })
+}
+
+fn extrapolation(input: &Input<'_>) -> Value {
+    let x = input.vector("x");
+    // The vectors stay below the least limit of exponents.
+    let mut blend = Blend::new(Extrapolation::Exponential, exponent_limit(0.0));
+    for entry in input.objects("entries") {
+        let offset = x - entry.vector("x");
+        let d = 1.0 - offset.length() / entry.number("r");
+        if d > 0.0 {
+            blend.add(weight(d), entry.colour("L"), entry.slope("grad").along(offset));
+        }
+    }
+    json!({ "weight": blend.weight(), "L": blend.value().map(|l| l.0) })
 }

@@ -3,11 +3,12 @@
 //! Exit codes: 0 done, 1 stopped early, 2 bad input.
 
 mod compare;
+mod figures;
 mod output;
 mod plume;
 mod radiance_cache;
 mod records;
-mod render;
+pub(crate) mod render;
 mod report;
 
 use std::process::ExitCode;
@@ -15,6 +16,7 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 
 pub use compare::CompareArguments;
+pub use figures::{FiguresArguments, Paper};
 pub use plume::PlumeArguments;
 pub use radiance_cache::{CacheArguments, Kind, Single};
 pub use records::RecordsArguments;
@@ -40,6 +42,8 @@ pub enum Command {
     Compare(CompareArguments),
     /// Writes an animation: a plume of smoke, a volume and a scene per frame.
     Plume(PlumeArguments),
+    /// Rebuilds the figures of a paper, with a page that explains them.
+    Figures(FiguresArguments),
 }
 
 /// How a command ended well enough to leave a result.
@@ -58,6 +62,7 @@ pub fn run(arguments: Arguments) -> ExitCode {
         Command::Records(arguments) => records::run(&arguments),
         Command::Compare(arguments) => compare::run(&arguments),
         Command::Plume(arguments) => plume::run(&arguments),
+        Command::Figures(arguments) => figures::run(&arguments),
     };
     match result {
         Ok(Ending::Done) => ExitCode::SUCCESS,
@@ -70,4 +75,4 @@ pub fn run(arguments: Arguments) -> ExitCode {
 }
 
 /// Any error, to be shown.
-type Failure = Box<dyn core::error::Error>;
+pub(crate) type Failure = Box<dyn core::error::Error>;

@@ -13,7 +13,7 @@ use fogbow::sampling::uniform2;
 use fogbow_std::film::Film;
 use fogbow_std::image::write_film;
 use fogbow_std::progress::{Control, Progress};
-use fogbow_std::radiance_cache::NAMES;
+use fogbow_std::radiance_cache::{NAMES, RadianceCaches};
 use fogbow_std::stats::{CountingMedium, CountingScene, Statistics};
 use fogbow_std::tiles::{self, Outcome, Reason, RenderError};
 
@@ -96,8 +96,35 @@ const CACHE_SAMPLES: u32 = 32;
 /// Set by Ctrl-C.
 static STOP: AtomicBool = AtomicBool::new(false);
 
+/// A finished render.
+#[derive(Debug)]
+pub(crate) struct Rendered {
+    pub(crate) film: Film,
+    pub(crate) outcome: Outcome,
+    pub(crate) statistics: Statistics,
+    pub(crate) camera: Camera,
+    /// Of radiance caching.
+    pub(crate) caches: Option<RadianceCaches>,
+}
+
 pub(super) fn run(arguments: &RenderArguments) -> Result<Ending, Failure> {
     let outputs = outputs(arguments)?;
+    let Rendered { film, outcome, mut statistics, .. } = render(arguments)?;
+    statistics.time("write", || outputs.iter().try_for_each(|file| write_film(file, &film, arguments.exposure)))?;
+
+    let size = (film.width(), film.height());
+    let report = Report { arguments, outputs: &outputs, outcome: &outcome, statistics: &statistics, size };
+    if let Some(file) = &arguments.stats {
+        std::fs::write(file, report.json()).map_err(|e| format!("{}: cannot be written: {e}", file.display()))?;
+    }
+    if !arguments.quiet {
+        report.print();
+    }
+    Ok(if outcome.reason == Reason::Cancelled { Ending::Stopped } else { Ending::Done })
+}
+
+/// Renders; writes nothing.
+pub(crate) fn render(arguments: &RenderArguments) -> Result<Rendered, Failure> {
     let mut statistics = Statistics::default();
     let mut scene = statistics.time("read", || SceneFile::read(&arguments.scene))?;
     if let Some([origin, target]) = arguments.camera {
@@ -194,17 +221,7 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<Ending, Failure> {
     }
     statistics.add("render", outcome.seconds);
     statistics.counters = outcome.counters;
-    statistics.time("write", || outputs.iter().try_for_each(|file| write_film(file, &film, arguments.exposure)))?;
-
-    let report =
-        Report { arguments, outputs: &outputs, outcome: &outcome, statistics: &statistics, size: (width, height) };
-    if let Some(file) = &arguments.stats {
-        std::fs::write(file, report.json()).map_err(|e| format!("{}: cannot be written: {e}", file.display()))?;
-    }
-    if !arguments.quiet {
-        report.print();
-    }
-    Ok(if outcome.reason == Reason::Cancelled { Ending::Stopped } else { Ending::Done })
+    Ok(Rendered { film, outcome, statistics, camera, caches: cached.map(|c| c.caches) })
 }
 
 /// The files to write, all of them checked.

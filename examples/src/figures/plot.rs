@@ -1,0 +1,143 @@
+//! Line plots as SVG.
+
+use core::fmt::Write;
+
+const WIDTH: f64 = 640.0;
+const HEIGHT: f64 = 300.0;
+const LEFT: f64 = 56.0;
+const RIGHT: f64 = 12.0;
+const TOP: f64 = 26.0;
+const BOTTOM: f64 = 40.0;
+
+/// Colours of lines that also those tell apart who see few (Okabe and Ito 2008).
+pub(super) const GREY: &str = "#bbbbbb";
+pub(super) const BLACK: &str = "#000000";
+pub(super) const BLUE: &str = "#0072b2";
+pub(super) const ORANGE: &str = "#d55e00";
+pub(super) const GREEN: &str = "#009e73";
+
+/// A line.
+pub(super) struct Line<'a> {
+    pub(super) name: &'a str,
+    pub(super) colour: &'a str,
+    /// Stroke (pixels).
+    pub(super) width: f64,
+    /// What is not positive leaves a gap.
+    pub(super) points: Vec<[f64; 2]>,
+}
+
+/// A plot with a logarithmic upward axis.
+pub(super) struct Plot<'a> {
+    pub(super) across: &'a str,
+    pub(super) upwards: &'a str,
+    pub(super) x: [f64; 2],
+    pub(super) y: [f64; 2],
+    pub(super) lines: Vec<Line<'a>>,
+}
+
+impl Plot<'_> {
+    fn place(&self, [x, y]: [f64; 2]) -> [f64; 2] {
+        let across = (x - self.x[0]) / (self.x[1] - self.x[0]);
+        let up = (y / self.y[0]).ln() / (self.y[1] / self.y[0]).ln();
+        [LEFT + across * (WIDTH - LEFT - RIGHT), HEIGHT - BOTTOM - up * (HEIGHT - TOP - BOTTOM)]
+    }
+
+    /// The plot as a file's text.
+    pub(super) fn svg(&self) -> String {
+        let mut svg = format!(
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {WIDTH} {HEIGHT}\" width=\"{WIDTH}\" \
+             height=\"{HEIGHT}\" font-family=\"sans-serif\" font-size=\"12\">\n\
+             <rect width=\"{WIDTH}\" height=\"{HEIGHT}\" fill=\"white\"/>\n"
+        );
+        self.grid(&mut svg);
+        let (bottom, right) = (HEIGHT - BOTTOM, WIDTH - RIGHT);
+        let (w, h) = (right - LEFT, bottom - TOP);
+        // Writing to a string cannot fail.
+        let _ = write!(
+            svg,
+            "<clipPath id=\"frame\"><rect x=\"{LEFT}\" y=\"{TOP}\" width=\"{w}\" height=\"{h}\"/></clipPath>\n\
+             <g fill=\"none\" stroke-linejoin=\"round\" clip-path=\"url(#frame)\">\n"
+        );
+        for line in &self.lines {
+            let _ = writeln!(
+                svg,
+                "<path stroke=\"{}\" stroke-width=\"{}\" d=\"{}\"/>",
+                line.colour,
+                line.width,
+                self.path(&line.points)
+            );
+        }
+        let _ = write!(
+            svg,
+            "</g>\n<rect x=\"{LEFT}\" y=\"{TOP}\" width=\"{w}\" height=\"{h}\" fill=\"none\" stroke=\"#444\"/>\n"
+        );
+        let mut x = LEFT;
+        for line in &self.lines {
+            let _ = writeln!(
+                svg,
+                "<path d=\"M{x} 13h20\" stroke=\"{}\" stroke-width=\"2\"/><text x=\"{}\" y=\"17\">{}</text>",
+                line.colour,
+                x + 25.0,
+                line.name
+            );
+            x += 45.0 + 6.6 * line.name.chars().count() as f64;
+        }
+        let (middle, centre) = (0.5 * (LEFT + right), 0.5 * (TOP + bottom));
+        let _ = write!(
+            svg,
+            "<text x=\"{middle}\" y=\"{}\" text-anchor=\"middle\">{}</text>\n\
+             <text transform=\"translate(13 {centre}) rotate(-90)\" text-anchor=\"middle\">{}</text>\n</svg>\n",
+            HEIGHT - 6.0,
+            self.across,
+            self.upwards
+        );
+        svg
+    }
+
+    fn grid(&self, svg: &mut String) {
+        let bottom = HEIGHT - BOTTOM;
+        for k in 0..=10 {
+            let x = self.x[0] + (self.x[1] - self.x[0]) * f64::from(k) / 10.0;
+            let [at, _] = self.place([x, self.y[0]]);
+            let _ = writeln!(
+                svg,
+                "<path d=\"M{at:.1} {TOP}V{bottom}\" stroke=\"#ddd\"/>\
+                 <text x=\"{at:.1}\" y=\"{}\" text-anchor=\"middle\">{}</text>",
+                bottom + 15.0,
+                (x * 1e3).round() / 1e3
+            );
+        }
+        let (first, last) = (self.y[0].log10().floor() as i32, self.y[1].log10().ceil() as i32);
+        let mantissas: &[f64] = if last - first > 3 { &[1.0] } else { &[1.0, 2.0, 5.0] };
+        let ticks = (first..=last).flat_map(|power| mantissas.iter().map(move |m| m * 10_f64.powi(power)));
+        // A little room for rounding.
+        for tick in ticks.filter(|t| (self.y[0] * 0.999..=self.y[1] * 1.001).contains(t)) {
+            let [_, at] = self.place([self.x[0], tick]);
+            let _ = writeln!(
+                svg,
+                "<path d=\"M{LEFT} {at:.1}H{}\" stroke=\"#ddd\"/>\
+                 <text x=\"{}\" y=\"{:.1}\" text-anchor=\"end\">{}</text>",
+                WIDTH - RIGHT,
+                LEFT - 5.0,
+                at + 4.0,
+                (tick * 1e6).round() / 1e6,
+            );
+        }
+    }
+
+    fn path(&self, points: &[[f64; 2]]) -> String {
+        let mut path = String::new();
+        let mut pen = 'M';
+        for point in points {
+            let [x, y] = self.place(*point);
+            if point[1] > 0.0 && y.is_finite() {
+                // Far outside the frame it does not matter how far.
+                let _ = write!(path, "{pen}{x:.1} {:.1}", y.clamp(-1e4, 1e4));
+                pen = 'L';
+            } else {
+                pen = 'M';
+            }
+        }
+        path
+    }
+}

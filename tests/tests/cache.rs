@@ -1,0 +1,484 @@
+//! The radiance cache: radii, records, mixtures and look-ups. What fills it: `cache_light.rs`.
+
+use fogbow::cache::{
+    Basis, Blend, Cache, Extrapolation, Facing, Limits, Reading, Record, SurfaceCache, VolumeCache, clamp_gradient,
+    exponent_limit, log_gradient_radius, neighbour_clamped, valid_radius, weight,
+};
+use fogbow::math::Vec3;
+use fogbow::sh::Coefficient;
+use fogbow::single_scatter::{Contribution, Sums};
+use fogbow::spectrum::{Gradient, Spectrum};
+use proptest::prelude::*;
+
+const KINDS: [Extrapolation; 4] =
+    [Extrapolation::Exponential, Extrapolation::ExponentialMean, Extrapolation::Linear, Extrapolation::Constant];
+
+/// The same cases in every run.
+fn config() -> ProptestConfig {
+    ProptestConfig {
+        rng_seed: proptest::test_runner::RngSeed::Fixed(1),
+        failure_persistence: None,
+        ..ProptestConfig::default()
+    }
+}
+
+/// Wider than anything a test asks for.
+const WIDE: Limits = Limits { min: 0.0, max: f32::MAX };
+
+fn sums(samples: &[(Contribution, bool)]) -> Sums {
+    let mut sums = Sums::default();
+    samples.iter().for_each(|(light, visible)| sums.add(light, *visible));
+    sums
+}
+
+fn light(radiance: f32, slope: Vec3) -> Contribution {
+    Contribution { radiance: Spectrum::splat(radiance), gradient: Gradient::outer(Spectrum::ONE, slope) }
+}
+
+fn vector(size: f32) -> impl Strategy<Value = Vec3> {
+    [-size..size, -size..size, -size..size].prop_map(Vec3::from)
+}
+
+fn colour() -> impl Strategy<Value = Spectrum> {
+    [0.01..5.0_f32, 0.01..5.0_f32, 0.01..5.0_f32].prop_map(Spectrum)
+}
+
+fn gradient(size: f32) -> impl Strategy<Value = Gradient> {
+    [vector(size), vector(size), vector(size)].prop_map(|[r, g, b]| Gradient::from_channels(r, g, b))
+}
+
+fn contributions() -> impl Strategy<Value = Vec<(Contribution, bool)>> {
+    let one = (colour(), gradient(3.0), any::<bool>())
+        .prop_map(|(radiance, gradient, visible)| (Contribution { radiance, gradient }, visible));
+    prop::collection::vec(one, 1..6)
+}
+
+proptest! {
+    #![proptest_config(config())]
+
+    #[test]
+    fn radii_do_not_depend_on_the_brightness_of_the_scene(samples in contributions(), tolerance in 0.01..2.0_f32) {
+        let expected = valid_radius(&sums(&samples), tolerance).unwrap();
+        for scale in [1e-30, 1e30] {
+            let scaled: Vec<_> = samples
+                .iter()
+                .map(|(l, v)| (Contribution { radiance: l.radiance * scale, gradient: l.gradient * scale }, *v))
+                .collect();
+            let got = valid_radius(&sums(&scaled), tolerance).unwrap();
+            prop_assert!((got - expected).abs() <= 1e-5 * expected, "{scale:e}: {got} instead of {expected}");
+        }
+    }
+
+    #[test]
+    fn radii_shrink_as_the_scene_does(samples in contributions(), scale in 0.01..100.0_f32) {
+        let shrunk: Vec<_> = samples.iter().map(|(l, v)| (Contribution { gradient: l.gradient * scale, ..*l }, *v)).collect();
+        let (a, b) = (valid_radius(&sums(&samples), 0.3).unwrap(), valid_radius(&sums(&shrunk), 0.3).unwrap());
+        prop_assert!((a - b * scale).abs() <= 1e-5 * a);
+    }
+
+    #[test]
+    fn radii_are_proportional_to_the_tolerance(samples in contributions(), tolerance in 0.01..2.0_f32) {
+        let sums = sums(&samples);
+        let (once, twice) = (valid_radius(&sums, tolerance).unwrap(), valid_radius(&sums, 2.0 * tolerance).unwrap());
+        prop_assert!((twice - 2.0 * once).abs() <= 1e-6 * twice);
+    }
+
+    /// `‖Σ∇L_j‖ ≤ Σ‖∇L_j‖`: what Eq. 34 gains over the logarithmic gradient is safety.
+    #[test]
+    fn radii_never_exceed_those_of_the_logarithmic_gradient(samples in contributions()) {
+        let sums = sums(&samples);
+        let plain = log_gradient_radius(sums.value, &sums.gradient, 0.3);
+        prop_assert!(valid_radius(&sums, 0.3).unwrap() <= plain * (1.0 + 1e-5) || sums.value.is_black());
+    }
+
+    #[test]
+    fn no_record_may_be_carried_by_more_than_its_tolerance(samples in contributions(), tolerance in 0.0..1.0_f32) {
+        let sums = sums(&samples);
+        let limits = Limits { min: 0.05, max: 2.0 };
+        let Some(record) = Record::new(Vec3::ZERO, &sums, tolerance, limits) else { return Ok(()) };
+        prop_assert!((0.05..=2.0).contains(&record.radius));
+        // Where the least radius wins, the clamped gradient allows a factor of e.
+        let bound = if record.radius > 0.05 { tolerance } else { tolerance.max(1.0) };
+        for c in 0..3 {
+            let exponent = record.gradient.norm()[c] * record.radius;
+            prop_assert!(exponent <= bound * record.value[c] * (1.0 + 1e-4), "{exponent} of {:?}", record.value);
+        }
+    }
+
+    #[test]
+    fn clamped_gradients_keep_their_direction(value in colour(), slope in gradient(30.0), radius in 0.01..2.0_f32) {
+        let clamped = clamp_gradient(&slope, value, radius);
+        for c in 0..3 {
+            let (before, after) = (slope.channel(c), clamped.channel(c));
+            prop_assert!(after.length() * radius <= value[c] * (1.0 + 1e-5));
+            prop_assert!(after.length() <= before.length() * (1.0 + 1e-5));
+            prop_assert!(before.cross(after).length() <= 1e-4 * before.length_squared());
+            prop_assert!(before.dot(after) >= 0.0);
+        }
+    }
+
+    /// A record that comes in reaches no farther than its neighbours allow, and none grows by it.
+    #[test]
+    fn neighbours_bound_each_other(places in prop::collection::vec((vector(1.0), 0.01..3.0_f32), 2..40)) {
+        let mut cache: VolumeCache<'_> = Cache::growing(0);
+        for (position, radius) in places {
+            let before: Vec<f32> = cache.records().iter().map(|r| r.radius).collect();
+            cache.insert(record(position, radius), &[]).unwrap();
+            let (newest, others) = cache.records().split_last().unwrap();
+            for (other, before) in others.iter().zip(before) {
+                prop_assert!(newest.radius <= other.radius + newest.position.distance(other.position) + 1e-5);
+                prop_assert!(other.radius <= before && newest.radius <= radius);
+            }
+        }
+    }
+
+    #[test]
+    fn limits_on_the_screen_stay_within_those_of_the_world(
+        least in 0.0..4.0_f32, more in 0.0..100.0_f32, distance in 0.0..1e4_f32, pixel in 1e-5..0.1_f32,
+    ) {
+        let world = Limits { min: 0.01, max: 2.0 };
+        let screen = world.on_screen(least, least + more, pixel, distance);
+        prop_assert!(world.min <= screen.min && screen.min <= screen.max && screen.max <= world.max, "{screen:?}");
+        let nearest = (least * pixel * distance).clamp(world.min, screen.max);
+        prop_assert!((screen.min - nearest).abs() <= 1e-6 * nearest, "{screen:?}");
+    }
+}
+
+#[test]
+fn undefined_radii_have_defined_answers() {
+    assert_eq!(valid_radius(&Sums::default(), 0.5), None, "no light at all");
+    assert_eq!(valid_radius(&sums(&[(light(1.0, Vec3::ZERO), true)]), 0.5), None, "no gradient");
+    assert_eq!(valid_radius(&sums(&[(light(0.0, Vec3::X), true)]), 0.5), Some(0.0), "black, but it could change");
+    let hidden = [(light(2.0, Vec3::X), false)];
+    assert_eq!(valid_radius(&sums(&hidden), 0.5), Some(1.0), "occluded: the unshadowed estimate remains");
+    let limits = Limits { min: 0.1, max: 4.0 };
+    assert_eq!((limits.clamp(None), limits.clamp(Some(0.0)), limits.clamp(Some(9.0))), (4.0, 0.1, 4.0));
+}
+
+#[test]
+fn with_tolerance_0_nothing_is_reused() {
+    let sums = sums(&[(light(1.0, Vec3::X), true)]);
+    assert_eq!(valid_radius(&sums, 0.0), Some(0.0));
+    assert_eq!(Record::new(Vec3::ZERO, &sums, 0.0, WIDE), None, "a record without extent");
+    let least = Limits { min: 0.25, max: 1.0 };
+    assert_eq!(Record::new(Vec3::ZERO, &sums, 0.0, least).unwrap().radius, 0.25);
+}
+
+#[test]
+fn energies_far_from_1_make_records_like_any_other() {
+    for scale in [1e-30_f32, 1.0, 1e30] {
+        let sums = sums(&[(light(2.0 * scale, Vec3::X * scale), true)]);
+        let record = Record::new(Vec3::ZERO, &sums, 0.5, Limits { min: 0.1, max: 4.0 }).unwrap();
+        assert_eq!(record.radius, 1.0);
+        let mut cache: VolumeCache<'_> = Cache::growing(0);
+        assert_eq!(cache.insert(record, &[]), Ok(true));
+        for extrapolation in KINDS {
+            let reading = Reading { extrapolation, ..Reading::new(0.5) };
+            let got = cache.lookup(Vec3::X * 0.5, &Basis::new(Vec3::Z, 0), &reading).unwrap() / scale;
+            let expected = match extrapolation {
+                Extrapolation::Exponential | Extrapolation::ExponentialMean => 2.0 * 0.25_f32.exp(),
+                Extrapolation::Linear => 2.5,
+                Extrapolation::Constant => 2.0,
+            };
+            assert!((got[0] - expected).abs() < 1e-4 * expected, "{extrapolation:?}, {scale:e}: {got:?}");
+        }
+    }
+}
+
+#[test]
+fn a_neighbour_tells_of_what_a_record_missed() {
+    assert_eq!(neighbour_clamped(3.0, Vec3::ZERO, (Vec3::X, 0.5)), 1.5);
+    assert_eq!(neighbour_clamped(1.0, Vec3::ZERO, (Vec3::X, 0.5)), 1.0);
+}
+
+#[test]
+fn records_that_are_no_numbers_are_left_out() {
+    let mut cache: VolumeCache<'_> = Cache::growing(0);
+    let good = record(Vec3::ZERO, 1.0);
+    let nan = Spectrum::splat(f32::NAN);
+    for bad in [
+        Record { radius: 0.0, ..good },
+        Record { radius: f32::NAN, ..good },
+        Record { radius: f32::INFINITY, ..good },
+        Record { position: Vec3::splat(f32::NAN), ..good },
+        Record { value: nan, ..good },
+        Record { value: Spectrum::splat(-1.0), ..good },
+        Record { gradient: Gradient::outer(nan, Vec3::X), ..good },
+    ] {
+        assert_eq!(cache.insert(bad, &[]), Ok(false), "{bad:?}");
+    }
+    assert_eq!(cache.insert(good, &[Coefficient::ZERO]), Ok(false), "one attachment too many");
+    assert!(cache.is_empty());
+}
+
+fn record(position: Vec3, radius: f32) -> Record {
+    Record { position, radius, value: Spectrum::ONE, gradient: Gradient::ZERO }
+}
+
+/// The weight of a record at a share of its radius.
+fn at_share(share: f32) -> f32 {
+    weight(1.0 - share)
+}
+
+proptest! {
+    #![proptest_config(config())]
+
+    #[test]
+    fn one_record_carries_an_exponential_field_exactly(
+        value in colour(), slope in vector(1.0), offset in vector(0.5), share in 0.0..0.99_f32,
+    ) {
+        for extrapolation in [Extrapolation::Exponential, Extrapolation::ExponentialMean] {
+            let mut blend = Blend::new(extrapolation, 4.0);
+            blend.add(at_share(share), value, Gradient::outer(value, slope).along(offset));
+            let (got, truth) = (blend.value().unwrap(), value * slope.dot(offset).exp());
+            // The mean goes straight on where the exponent is above 1: more than any tolerance in use.
+            if extrapolation == Extrapolation::Exponential || slope.dot(offset) < 1.0 {
+                for c in 0..3 {
+                    prop_assert!((got[c] - truth[c]).abs() <= 2e-5 * truth[c], "{extrapolation:?}: {got:?}, {truth:?}");
+                }
+            }
+        }
+    }
+
+    /// Any number of records of one exponential field say the same.
+    #[test]
+    fn mixtures_are_exact_in_exponential_fields(
+        slope in vector(0.5), point in vector(0.4), others in prop::collection::vec(vector(0.5), 1..8),
+    ) {
+        let field = |p: Vec3| Spectrum::new(1.0, 0.3, 2.0) * slope.dot(p).exp();
+        let mut cache: VolumeCache<'_> = Cache::growing(0);
+        for position in others {
+            let value = field(position);
+            cache.insert(Record { position, radius: 2.0, value, gradient: Gradient::outer(value, slope) }, &[]).unwrap();
+        }
+        let reading = Reading { extrapolation: Extrapolation::Exponential, ..Reading::new(1.0) };
+        let got = cache.lookup(point, &Basis::new(Vec3::Z, 0), &reading).unwrap();
+        for c in 0..3 {
+            prop_assert!((got[c] / field(point)[c] - 1.0).abs() < 1e-4, "{got:?}");
+        }
+    }
+
+    #[test]
+    fn a_mixture_lies_between_its_parts(values in prop::collection::vec((colour(), 0.01..1.0_f32), 1..8)) {
+        for kind in KINDS {
+            let mut blend = Blend::new(kind, 4.0);
+            values.iter().for_each(|(value, weight)| blend.add(*weight, *value, Spectrum::ZERO));
+            let mixture = blend.value().unwrap();
+            for c in 0..3 {
+                let low = values.iter().map(|(v, _)| v[c]).fold(f32::MAX, f32::min);
+                let high = values.iter().map(|(v, _)| v[c]).fold(0.0, f32::max);
+                prop_assert!(low * 0.9999 <= mixture[c] && mixture[c] <= high * 1.0001, "{kind:?}: {mixture:?}");
+            }
+        }
+    }
+
+    /// Where another record covers it, the edge of a record cannot be seen.
+    #[test]
+    fn the_edge_of_a_record_is_smooth_where_another_covers(value in colour(), slope in gradient(1.0)) {
+        let mut cache: VolumeCache<'_> = Cache::growing(0);
+        cache.insert(record(Vec3::ZERO, 2.0), &[]).unwrap();
+        let steep = clamp_gradient(&slope, value, 0.5);
+        cache.insert(Record { position: Vec3::X, radius: 0.5, value, gradient: steep }, &[]).unwrap();
+        prop_assert_eq!(cache.records()[0].radius, 1.5, "clamped by its neighbour");
+        for extrapolation in KINDS {
+            let reading = Reading { extrapolation, ..Reading::new(1.0) };
+            let at = |x: f32| cache.lookup(Vec3::new(x, 0.1, 0.0), &Basis::new(Vec3::Z, 0), &reading).unwrap();
+            let edge = 1.0 - (0.25_f32 - 0.01).sqrt();
+            let (outside, inside) = (at(edge - 1e-4), at(edge + 1e-4));
+            for c in 0..3 {
+                prop_assert!((inside[c] - outside[c]).abs() < 1e-3, "{extrapolation:?}: {inside:?} {outside:?}");
+            }
+        }
+    }
+
+    /// Finite records make finite mixtures, whatever the size and sign of what they hold.
+    #[test]
+    fn mixtures_of_finite_records_are_numbers(
+        parts in prop::collection::vec((0.0..1.0_f32, wild(), wild()), 1..5), tolerance in 0.0..10.0_f32,
+    ) {
+        for kind in KINDS {
+            let mut blend = Blend::new(kind, exponent_limit(tolerance));
+            for &(weight, value, change) in &parts {
+                blend.add(weight, Spectrum::splat(value), Spectrum::splat(change));
+            }
+            let Some(mixture) = blend.value() else { continue };
+            prop_assert!(!mixture[0].is_nan(), "{kind:?}: {mixture:?}");
+            if matches!(kind, Extrapolation::Exponential | Extrapolation::ExponentialMean) {
+                prop_assert!(mixture[0] >= 0.0, "{kind:?}: {mixture:?}");
+            }
+        }
+    }
+}
+
+/// A number of any sign, up to 10³⁰ in size: sums of a few stay finite.
+fn wild() -> impl Strategy<Value = f32> {
+    prop_oneof![
+        Just(0.0_f32),
+        (-38.0..30.0_f32, any::<bool>()).prop_map(|(e, s)| {
+            let size = 10.0_f32.powf(e);
+            if s { size } else { -size }
+        })
+    ]
+}
+
+#[test]
+fn a_black_record_darkens_by_its_weight_and_no_more() {
+    for (kind, expected) in [(Extrapolation::Exponential, 1.5), (Extrapolation::ExponentialMean, 1.5)] {
+        let mut blend = Blend::new(kind, 4.0);
+        blend.add(0.25, Spectrum::new(0.0, 2.0, 0.0), Spectrum::ZERO);
+        blend.add(0.75, Spectrum::new(2.0, 2.0, 0.0), Spectrum::ZERO);
+        let mixture = blend.value().unwrap();
+        assert!((mixture[0] - expected).abs() < 1e-6 && (mixture[1] - 2.0).abs() < 1e-6, "{kind:?}: {mixture:?}");
+        assert_eq!(mixture[2], 0.0, "{kind:?}");
+        assert_eq!(blend.weight(), 1.0);
+    }
+}
+
+#[test]
+fn negative_channels_never_come_out() {
+    for kind in [Extrapolation::Exponential, Extrapolation::ExponentialMean] {
+        let mut blend = Blend::new(kind, 4.0);
+        blend.add(1.0, Spectrum::splat(-0.5), Spectrum::splat(10.0));
+        assert_eq!(blend.value(), Some(Spectrum::ZERO), "{kind:?}");
+    }
+    assert_eq!(Blend::new(Extrapolation::Exponential, 4.0).value(), None, "nothing took part");
+}
+
+#[test]
+fn steep_slopes_of_nearly_black_directions_do_not_explode() {
+    let limit = exponent_limit(0.1);
+    assert_eq!(limit, 4.0);
+    let mut blend = Blend::new(Extrapolation::Exponential, limit);
+    blend.add(1.0, Spectrum::splat(1e-6), Spectrum::splat(1.0));
+    assert!(blend.value().unwrap()[0] < 1e-6 * 55.0, "{blend:?}");
+    let mut blend = Blend::new(Extrapolation::ExponentialMean, limit);
+    blend.add(1.0, Spectrum::splat(1e-6), Spectrum::splat(1.0));
+    assert!(blend.value().unwrap()[0] < 2.8, "no farther than the slope goes, times e: {blend:?}");
+}
+
+/// Records at random places, with expansions.
+fn scattered(count: usize, stride: usize) -> VolumeCache<'static> {
+    let mut cache: VolumeCache<'static> = Cache::growing(stride);
+    let mut unit = random();
+    for _ in 0..count {
+        let position = Vec3::new(unit(), unit(), unit());
+        let value = Spectrum::new(unit(), unit(), unit()) + Spectrum::splat(0.1);
+        let slope = Vec3::new(unit(), unit(), unit()) - 0.5;
+        let gradient = Gradient::outer(value, slope);
+        let higher: Vec<_> = (0..stride)
+            .map(|_| Coefficient { value: value * (0.2 * unit()), gradient: gradient * (0.2 * unit()) })
+            .collect();
+        cache.insert(Record { position, radius: 0.05 + 0.3 * unit(), value, gradient }, &higher).unwrap();
+    }
+    cache
+}
+
+/// Numbers in [0, 1).
+fn random() -> impl FnMut() -> f32 {
+    let mut rng = fogbow::sampling::Generator::new(5);
+    move || fogbow::sampling::uniform(&mut rng)
+}
+
+#[test]
+fn lookups_equal_brute_force_before_and_after_indexing() {
+    for degree in [0, 2] {
+        let mut cache = scattered(300, (degree + 1) * (degree + 1) - 1);
+        for finished in [false, true] {
+            if finished {
+                cache.finish().unwrap();
+            }
+            let mut unit = random();
+            let mut covered = 0;
+            for _ in 0..400 {
+                let point = Vec3::new(unit(), unit(), unit()) * 1.2 - 0.1;
+                let to_eye = (Vec3::new(unit(), unit(), unit()) - 0.5).normalize();
+                let basis = Basis::new(to_eye, degree);
+                for extrapolation in KINDS {
+                    let reading = Reading { extrapolation, ..Reading::new(0.5) };
+                    let expected = brute(&cache, point, to_eye, &reading);
+                    assert_eq!(cache.covers(point, &reading), expected.is_some());
+                    let Some(expected) = expected else { continue };
+                    covered += 1;
+                    let got = cache.lookup(point, &basis, &reading).unwrap();
+                    for c in 0..3 {
+                        let scale = expected[c].abs() + 1e-3;
+                        assert!((got[c] - expected[c]).abs() < 2e-4 * scale, "{got:?} instead of {expected:?}");
+                    }
+                }
+            }
+            assert!(covered > 400, "{covered}");
+        }
+    }
+}
+
+/// Eq. 35 over all records, one by one.
+fn brute(cache: &VolumeCache<'_>, point: Vec3, to_eye: Vec3, reading: &Reading) -> Option<Spectrum> {
+    let mut blend = Blend::new(reading.extrapolation, exponent_limit(reading.tolerance));
+    let mut y = [0.0; 9];
+    let y = &mut y[..=cache.stride()];
+    fogbow::sh::evaluate(to_eye, cache.degree(), y);
+    for (i, record) in cache.records().iter().enumerate() {
+        let share = record.position.distance(point) / record.radius;
+        if share < 1.0 {
+            let (mut value, mut gradient) = (record.value, record.gradient);
+            for (c, y) in cache.attached(i as u32).iter().zip(&y[1..]) {
+                value += c.value * *y;
+                gradient += c.gradient * *y;
+            }
+            blend.add(weight(1.0 - share), value, gradient.along(point - record.position));
+        }
+    }
+    blend.value()
+}
+
+#[test]
+fn gaps_are_filled_by_the_nearest_once_filling_is_done() {
+    let mut cache: VolumeCache<'_> = Cache::growing(0);
+    cache.insert(record(Vec3::ZERO, 1.0), &[]).unwrap();
+    let (basis, reading) = (Basis::new(Vec3::Z, 0), Reading::new(0.5));
+    let at = |cache: &VolumeCache<'_>, x: f32| cache.lookup(Vec3::X * x, &basis, &reading);
+    assert_eq!(at(&cache, 1.5), None);
+    cache.finish().unwrap();
+    assert!(at(&cache, 1.5).is_some() && !cache.covers(Vec3::X * 1.5, &reading));
+    assert_eq!(at(&cache, 2.5), None);
+}
+
+#[test]
+fn while_filling_the_margin_of_every_record_does_not_count() {
+    let mut cache: VolumeCache<'_> = Cache::growing(0);
+    cache.insert(record(Vec3::ZERO, 1.0), &[]).unwrap();
+    let reading = Reading { margin: 0.25, ..Reading::new(0.5) };
+    assert!(cache.covers(Vec3::X * 0.7, &reading) && !cache.covers(Vec3::X * 0.8, &reading));
+}
+
+/// A record on the floor whose irradiance rises along +x by half per metre.
+fn floor() -> SurfaceCache<'static> {
+    let mut cache: SurfaceCache<'static> = Cache::growing(1);
+    let gradient = Gradient::outer(Spectrum::splat(0.5), Vec3::X);
+    let facing = Facing { normal: Vec3::Y, turn: Gradient::outer(Spectrum::splat(0.8), Vec3::X) };
+    cache.insert(Record { gradient, ..record(Vec3::ZERO, 1.0) }, &[facing]).unwrap();
+    cache
+}
+
+#[test]
+fn surface_records_count_on_their_own_plane_and_side() {
+    let (floor, reading) = (floor(), Reading::new(0.5));
+    let covers = |point: Vec3, normal: Vec3| floor.covers(point, normal, &reading);
+    assert!(covers(Vec3::X * 0.9, Vec3::Y));
+    assert!(!covers(Vec3::X * 1.1, Vec3::Y), "beyond the radius");
+    assert!(!covers(Vec3::ZERO, -Vec3::Y), "the ceiling of the floor below");
+    assert!(!covers(Vec3::ZERO, Vec3::X), "the wall beside");
+    assert!(covers(Vec3::ZERO, Vec3::new(0.2, 1.0, 0.0).normalize()), "a surface that bends");
+    assert!(!covers(Vec3::new(0.0, 0.3, 0.0), Vec3::Y), "a step above");
+    assert!(covers(Vec3::new(0.0, 0.1, 0.0), Vec3::Y), "a bump");
+}
+
+#[test]
+fn irradiance_changes_with_position_and_normal() {
+    let floor = floor();
+    let reading = Reading { extrapolation: Extrapolation::Linear, ..Reading::new(0.5) };
+    let at = |point: Vec3, normal: Vec3| floor.lookup(point, normal, &reading).unwrap()[0];
+    assert!((at(Vec3::X * 0.5, Vec3::Y) - 1.25).abs() < 1e-6);
+    let tilted = Vec3::new(0.2, 1.0, 0.0).normalize();
+    assert!((at(Vec3::ZERO, tilted) - (1.0 + 0.8 * tilted.x)).abs() < 1e-5);
+}

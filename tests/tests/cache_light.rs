@@ -1,0 +1,313 @@
+//! What the radiance cache is filled with, where the light is known.
+
+use fogbow::cache::{
+    Cache, Caches, Estimator, Extrapolation, EyeSettings, Reader, Reading, Record, VolumeCache, radiance,
+};
+use fogbow::host::{Empty, Medium, Scene};
+use fogbow::light::{Light, PointLight};
+use fogbow::math::{Ray, Vec2, Vec3, float::PI};
+use fogbow::medium::Homogeneous;
+use fogbow::multiple_scatter;
+use fogbow::path::{self, World};
+use fogbow::phase::{Lobe, Phase};
+use fogbow::sampling::{Generator, uniform2, warp};
+use fogbow::sh::{self, Coefficient};
+use fogbow::single_scatter::Sums;
+use fogbow::spectrum::{Gradient, Spectrum};
+use fogbow::surface::Surface;
+use fogbow::transmittance::thickness::Steps;
+use fogbow_tests::analytic::INFINITE_MEDIUM_MULTIPLE;
+use fogbow_tests::estimate::estimate;
+use fogbow_tests::hosts::{Ball, Complaining};
+
+fn estimator<'a, M: Medium, S: Scene>(medium: &'a M, scene: &'a S, lights: &'a [Light<'a>]) -> Estimator<'a, M, S> {
+    Estimator {
+        world: World { medium, scene, lights },
+        surfaces: None,
+        scattered: None,
+        walk: multiple_scatter::Settings::new(Steps::Gauss(8)),
+        paths: path::Settings::default(),
+        light_samples: 4,
+    }
+}
+
+fn fog(absorption: f32, scattering: f32, phase: impl Into<Phase>) -> Homogeneous {
+    Homogeneous::new(Spectrum::splat(absorption), Spectrum::splat(scattering), phase).unwrap()
+}
+
+/// The mean over directions and its value in one direction.
+fn expanded(degree: usize, to_eye: Vec3, estimate: impl FnOnce(&mut [Coefficient]) -> Sums) -> (Sums, Spectrum) {
+    let mut higher = vec![Coefficient::ZERO; sh::coefficient_count(degree) - 1];
+    let sums = estimate(&mut higher);
+    let mut y = vec![0.0; sh::coefficient_count(degree)];
+    sh::evaluate(to_eye, degree, &mut y);
+    let towards = higher.iter().zip(&y[1..]).fold(sums.value, |sum, (c, y)| sum + c.value * *y);
+    (sums, towards)
+}
+
+const SKY: [f64; 3] = [1.0, 2.0, 3.0];
+
+fn sky() -> [Light<'static>; 1] {
+    [Light::Constant(Spectrum::new(1.0, 2.0, 3.0))]
+}
+
+/// A ball of fog that absorbs nothing, under a sky of radiance 1, 2, 3: scattered light is as bright as the sky in
+/// all directions, whatever was scattered how often.
+#[test]
+fn light_in_a_furnace_is_as_bright_as_the_sky() {
+    use fogbow::medium::{Placed, Region};
+    let point = Vec3::new(0.2, -0.1, 0.4);
+    for (phase, degree) in [(Phase::ISOTROPIC, 0), (Lobe::HenyeyGreenstein { g: 0.5 }.into(), 3)] {
+        let medium = Placed::new(fog(0.0, 1.2, phase), Region::sphere(Vec3::ZERO, 1.0).unwrap());
+        let medium = Complaining::new(medium);
+        let lights = sky();
+        let make = estimator(&medium, &Empty, &lights);
+        let seen = estimate(1500, |rng| {
+            let to_eye = warp::uniform_sphere(uniform2(rng));
+            let (_, single) = expanded(degree, to_eye, |higher| make.single(point, &phase, higher, rng));
+            let (_, multiple) = expanded(degree, to_eye, |higher| make.multiple(point, &phase, 16, higher, rng));
+            single + multiple
+        });
+        seen.assert_is(SKY, 2e-5, &format!("{phase:?}"));
+    }
+}
+
+/// A white ball in such fog is as bright as the sky, too.
+#[test]
+fn white_bodies_in_a_furnace_are_as_bright_as_the_sky() {
+    let body = Ball { centre: Vec3::ZERO, radius: 0.5, surface: Surface::Lambert { reflectance: Spectrum::ONE } };
+    let medium = {
+        use fogbow::medium::{Placed, Region};
+        Placed::new(fog(0.0, 0.8, Phase::ISOTROPIC), Region::sphere(Vec3::ZERO, 1.5).unwrap())
+    };
+    let lights = sky();
+    let scene = Complaining::new(body);
+    let make = estimator(&medium, &scene, &lights);
+    // In the fog beside it: light from the sky, from the ball, and scattered light make up the sky.
+    let beside = Vec3::new(0.0, 0.9, 0.0);
+    let seen = estimate(3000, |rng| {
+        let single = make.single(beside, &Phase::ISOTROPIC, &mut [], rng).value;
+        let surface = make.surface(beside, &Phase::ISOTROPIC, 4, &mut [], rng).value;
+        single + surface + make.multiple(beside, &Phase::ISOTROPIC, 4, &mut [], rng).value
+    });
+    seen.assert_is(SKY, 2e-4, "in the fog");
+    // On it: irradiance straight from the sky, and indirect.
+    let (at, normal) = (Vec3::Y * 0.5, Vec3::Y);
+    let hit = fogbow::host::Hit { distance: 1.0, normal, surface: body.surface, light: None };
+    let seen = estimate(3000, |rng| {
+        let direct = make.direct(at, &hit, &mut Generator::child(rng));
+        (direct + make.irradiance(at, normal, 4, rng).0.value) / PI
+    });
+    seen.assert_is(SKY, 2e-4, "on the ball");
+}
+
+/// Inside a closed hollow ball without anything in it whose wall reflects half of what it gets, with a lamp in the
+/// middle: direct irradiance E, indirect E ρ/(1 − ρ).
+#[test]
+fn irradiance_in_a_hollow_ball_is_a_geometric_series() {
+    let wall =
+        Ball { centre: Vec3::ZERO, radius: 2.0, surface: Surface::Lambert { reflectance: Spectrum::splat(0.5) } };
+    let vacuum = fog(0.0, 0.0, Phase::ISOTROPIC);
+    let intensity = Spectrum::new(4.0, 8.0, 12.0);
+    let lights = [Light::Point(PointLight::new(Vec3::ZERO, intensity).unwrap())];
+    let make = estimator(&vacuum, &wall, &lights);
+    let (at, normal) = (Vec3::X * 2.0, Vec3::NEG_X);
+    let hit = fogbow::host::Hit { distance: 1.0, normal, surface: wall.surface, light: None };
+    let truth = [1.0, 2.0, 3.0];
+    estimate(200, |rng| make.direct(at, &hit, &mut Generator::child(rng))).assert_is(truth, 1e-5, "direct");
+    estimate(3000, |rng| make.irradiance(at, normal, 4, rng).0.value).assert_is(truth, 1e-4, "indirect, by paths");
+    // The same where a cache on the surfaces knows it already.
+    let mut cache: fogbow::cache::SurfaceCache<'_> = Cache::growing(1);
+    for k in 0..400 {
+        let outward = warp::uniform_sphere(Vec2::new(k as f32 / 400.0, (k as f32 * 0.618_034).fract()));
+        let record = Record {
+            position: outward * 2.0,
+            radius: 1.0,
+            value: Spectrum::new(1.0, 2.0, 3.0),
+            gradient: Gradient::ZERO,
+        };
+        let facing = fogbow::cache::Facing { normal: -outward, turn: Gradient::ZERO };
+        cache.insert(record, &[facing]).unwrap();
+    }
+    cache.finish().unwrap();
+    let make = Estimator { surfaces: Some((&cache, Reading::new(0.5))), ..make };
+    // Every wall is equally bright: no noise at all but in the densities of directions.
+    let seen = estimate(100, |rng| make.irradiance(at, normal, 64, rng).0.value);
+    seen.assert_is(truth, 2e-3, "indirect, by the cache");
+}
+
+/// `L_s = p I e^(−σr)/r²`, with the exact phase function instead of an expansion cut off at degree 8.
+#[test]
+fn single_scattering_of_a_lamp_is_its_closed_form() {
+    let lamp = Vec3::new(1.0, 0.5, -0.3);
+    let lights = [Light::Point(PointLight::new(lamp, Spectrum::new(1.0, 2.0, 3.0)).unwrap())];
+    let phase: Phase = Lobe::HenyeyGreenstein { g: 0.4 }.into();
+    let medium = fog(0.3, 0.9, phase);
+    let make = estimator(&medium, &Empty, &lights);
+    let r = f64::from(lamp.length());
+    let irradiance = (-1.2 * r).exp() / (r * r);
+    for to_eye in [Vec3::Z, -lamp.normalize(), lamp.normalize()] {
+        let (sums, towards) =
+            expanded(8, to_eye, |higher| make.single(Vec3::ZERO, &phase, higher, &mut Generator::new(1)));
+        let cosine = f64::from(-lamp.normalize().dot(to_eye));
+        let g = 0.4_f64;
+        let p = (1.0 - g * g) / (4.0 * std::f64::consts::PI * (1.0 + g * g - 2.0 * g * cosine).powf(1.5));
+        let mean = irradiance / (4.0 * std::f64::consts::PI);
+        for c in 0..3 {
+            let scale = SKY[c];
+            assert!((f64::from(sums.value[c]) / (mean * scale) - 1.0).abs() < 1e-5);
+            // The rest of the series: Σ_{l>8} (2l+1) gˡ/4π.
+            assert!((f64::from(towards[c]) - p * irradiance * scale).abs() < 0.02 * mean * scale, "{towards:?}");
+        }
+        // Towards the lamp by σ + 2/r.
+        let slope = sums.gradient.channel(0);
+        let expected = lamp.normalize() * (mean * (1.2 + 2.0 / r)) as f32;
+        assert!((slope - expected).length() < 1e-4 * expected.length(), "{slope} instead of {expected}");
+        // One lamp has no saddle points: both radii agree.
+        let plain = fogbow::cache::log_gradient_radius(sums.value, &sums.gradient, 0.3);
+        let radius = fogbow::cache::valid_radius(&sums, 0.3).unwrap();
+        assert!((radius - plain).abs() < 1e-5 * plain && (f64::from(radius) * (1.2 + 2.0 / r) - 0.3).abs() < 1e-4);
+    }
+}
+
+#[test]
+fn multiple_scattering_in_an_endless_medium_is_that_of_the_transport_equation() {
+    let lights = [Light::Point(PointLight::from_flux(Vec3::ZERO, Spectrum::ONE).unwrap())];
+    let medium = fog(0.2, 0.8, Phase::ISOTROPIC);
+    let make = estimator(&medium, &Empty, &lights);
+    let truth = [INFINITE_MEDIUM_MULTIPLE; 3];
+    let point = Vec3::new(1.5, 0.0, 0.0);
+    estimate(3000, |rng| make.multiple(point, &Phase::ISOTROPIC, 16, &mut [], rng).value)
+        .assert_is(truth, 2e-3, "by walks");
+    // Walks that end at records that tell the truth tell it, too.
+    let known = radial_cache(&make);
+    let surface: VolumeCache<'_> = uniform_cache(Spectrum::ZERO);
+    let scattered = Some([(&surface, Reading::new(0.5)), (&known, Reading::new(0.5))]);
+    let make = Estimator { scattered, ..make };
+    estimate(1000, |rng| make.multiple(point, &Phase::ISOTROPIC, 16, &mut [], rng).value).assert_is(
+        truth,
+        0.03,
+        "by walks that end at records",
+    );
+}
+
+/// Records of multiple scattering on shells around the lamp.
+fn radial_cache<M: Medium, S: Scene>(make: &Estimator<'_, M, S>) -> VolumeCache<'static> {
+    let mut cache: VolumeCache<'static> = Cache::growing(0);
+    for shell in 0..26 {
+        let r = 0.3 * 1.12_f32.powi(shell);
+        let mut all = Sums::default();
+        for k in 0..8 {
+            all.merge(&make.multiple(Vec3::X * r, &Phase::ISOTROPIC, 512, &mut [], &mut Generator::new(k)));
+        }
+        let (value, slope) = (all.value / 8.0, Spectrum::splat(all.gradient.x[0] / 8.0));
+        for k in 0..320 {
+            let outward = warp::uniform_sphere(Vec2::new((k as f32 + 0.5) / 320.0, (k as f32 * 0.618_034).fract()));
+            let gradient = Gradient::outer(slope, outward);
+            cache.insert(Record { position: outward * r, radius: 0.2 * r, value, gradient }, &[]).unwrap();
+        }
+    }
+    cache.finish().unwrap();
+    cache
+}
+
+fn uniform_cache(value: Spectrum) -> VolumeCache<'static> {
+    let mut cache: VolumeCache<'static> = Cache::growing(0);
+    cache.insert(Record { position: Vec3::ZERO, radius: 1e3, value, gradient: Gradient::ZERO }, &[]).unwrap();
+    cache.finish().unwrap();
+    cache
+}
+
+/// With caches that hold the truth of a furnace, eye rays see the truth.
+#[test]
+fn eye_rays_see_what_the_caches_hold() {
+    let scattering = 0.7;
+    let medium = fog(0.3, scattering, Phase::ISOTROPIC);
+    let body = Ball { centre: Vec3::ZERO, radius: 5.0, surface: Surface::BLACK };
+    let lights: [Light<'_>; 0] = [];
+    let make = estimator(&medium, &body, &lights);
+    let (surface, multiple) =
+        (uniform_cache(Spectrum::new(0.25, 0.5, 0.75)), uniform_cache(Spectrum::new(0.75, 1.5, 2.25)));
+    let reading = Reading { extrapolation: Extrapolation::Constant, ..Reading::new(0.5) };
+    let caches = Caches {
+        surface: Some(Reader { cache: &surface, reading }),
+        multiple: Some(Reader { cache: &multiple, reading }),
+        ..Caches::default()
+    };
+    let eye = EyeSettings { density: 8.0, lights_visible: true, indirect: true };
+    let seen = estimate(4000, |rng| {
+        let direction = warp::uniform_sphere(uniform2(rng));
+        radiance(&Ray::new(Vec3::ZERO, direction), &make, &caches, &eye, rng).total()
+    });
+    // L (σₛ/σₜ) (1 − e^(−σₜ s))
+    let share = f64::from(scattering) * (1.0 - (-5.0_f64).exp());
+    seen.assert_is(SKY.map(|l| l * share), 1e-4, "a ball of even light");
+}
+
+/// Irradiance by the same random numbers at moved points, of light from surfaces alone and far from edges.
+#[test]
+fn gradients_of_irradiance_agree_with_differences() {
+    let wall =
+        Ball { centre: Vec3::ZERO, radius: 2.0, surface: Surface::Lambert { reflectance: Spectrum::splat(0.6) } };
+    for (density, tolerance) in [(0.0, 0.004), (0.15, 0.004)] {
+        let medium = fog(density, 0.0, Phase::ISOTROPIC);
+        let lights = [Light::Point(PointLight::new(Vec3::new(0.3, 0.4, 1.2), Spectrum::ONE).unwrap())];
+        let make = Estimator {
+            paths: path::Settings { max_scatterings: 1, ..path::Settings::default() },
+            ..estimator(&medium, &wall, &lights)
+        };
+        let (point, normal, h) = (Vec3::new(0.1, -0.2, 0.0), Vec3::Z, 0.05);
+        let mean = |p: Vec3| {
+            let (mut value, mut gradient) = (Spectrum::ZERO, Gradient::ZERO);
+            for seed in 0..40 {
+                let (sums, _) = make.irradiance(p, normal, 4096, &mut Generator::new(seed));
+                value += sums.value / 40.0;
+                gradient += sums.gradient * (1.0 / 40.0);
+            }
+            (value[0], gradient.channel(0))
+        };
+        let (value, gradient) = mean(point);
+        for axis in [Vec3::X, Vec3::Y] {
+            let difference = (mean(point + axis * h).0 - mean(point - axis * h).0) / (2.0 * h);
+            let along = gradient.dot(axis);
+            assert!(
+                (along - difference).abs() < tolerance * value,
+                "σ = {density}, {axis}: {along} instead of {difference} of {value}"
+            );
+        }
+    }
+}
+
+/// The vector irradiance tells what a tilt of the surface changes.
+#[test]
+fn turns_of_the_normal_agree_with_differences() {
+    let wall =
+        Ball { centre: Vec3::ZERO, radius: 2.0, surface: Surface::Lambert { reflectance: Spectrum::splat(0.6) } };
+    let medium = fog(0.05, 0.0, Phase::ISOTROPIC);
+    let lights = [Light::Point(PointLight::new(Vec3::new(0.5, 0.8, 1.2), Spectrum::ONE).unwrap())];
+    let make = Estimator {
+        paths: path::Settings { max_scatterings: 1, ..path::Settings::default() },
+        ..estimator(&medium, &wall, &lights)
+    };
+    let point = Vec3::new(0.1, -0.2, 0.0);
+    let mean = |normal: Vec3| {
+        let (mut value, mut turn) = (0.0, Vec3::ZERO);
+        for seed in 0..40 {
+            let (sums, facing) = make.irradiance(point, normal, 4096, &mut Generator::new(seed));
+            value += sums.value[0] / 40.0;
+            turn += facing.turn.channel(0) / 40.0;
+        }
+        (value, turn)
+    };
+    let (value, turn) = mean(Vec3::Z);
+    for axis in [Vec3::X, Vec3::Y] {
+        let tilted = (Vec3::Z + axis * 0.05).normalize();
+        let back = (Vec3::Z - axis * 0.05).normalize();
+        let difference = mean(tilted).0 - mean(back).0;
+        let expected = turn.dot(tilted - back);
+        assert!(
+            (difference - expected).abs() < 0.0008 * value,
+            "{axis}: {difference} instead of {expected} of {value}"
+        );
+    }
+}
