@@ -120,7 +120,7 @@ fn caches_of_anything_else_are_refused() {
         (with("cut", &[]), &["cut: is cut off"]),
         (with("flipped", &[]), &["flipped: ", "damaged"]),
         (
-            with("a.caches", &["--max-depth", "5"]),
+            with("a.caches", &["--max-depth", "1"]),
             &["a.caches: was made for another scene, or with another --max-depth"],
         ),
         (with("a.caches", &["--tolerance-of", "multiple=0.5"]), &["a.caches: ", "\"multiple\"", "tolerance 2; 0.5"]),

@@ -234,7 +234,7 @@ fn eye_rays_see_what_the_caches_hold() {
         multiple: Some(Reader { cache: &multiple, reading }),
         ..Caches::default()
     };
-    let eye = EyeSettings { density: 8.0, lights_visible: true, indirect: true };
+    let eye = EyeSettings { density: 8.0, connections: 4, lights_visible: true, indirect: true };
     let seen = estimate(4000, |rng| {
         let direction = warp::uniform_sphere(uniform2(rng));
         radiance(&Ray::new(Vec3::ZERO, direction), &make, &caches, &eye, rng).total()

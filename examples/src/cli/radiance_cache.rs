@@ -158,6 +158,9 @@ pub(super) fn check_depth(paths: &path::Settings) -> Result<(), String> {
     }
 }
 
+/// Samples of all lights with extent together, for a record of single scattering.
+const LIGHT_SAMPLES: u32 = 128;
+
 /// Number of lights from which on single scattering is cached.
 const MANY_LIGHTS: usize = 12;
 
@@ -268,7 +271,7 @@ impl WithMedium for CacheJob<'_> {
                 ..multiple_scatter::Settings::new(steps)
             },
             paths: self.paths,
-            light_samples: 16,
+            light_samples: (LIGHT_SAMPLES / self.lights.len().max(1) as u32).clamp(1, 16),
         };
         let (width, height) = (self.film.width() as f32, self.film.height() as f32);
         let ray = |at: [f32; 2]| -> Ray { self.camera.ray(Vec2::from(at)) };
