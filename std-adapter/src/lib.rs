@@ -6,6 +6,7 @@
 //! | [`seed`] | the random numbers of each pixel and sample: independent, or low-discrepancy |
 //! | [`tiles`] | parallel rendering, the same bits for any number of threads |
 //! | [`progress`] | progress, cancellation |
+//! | [`radiance_cache`] | filling radiance caches in parallel; their files |
 //! | [`image`] | PNG, PFM and (feature `exr`, on by default) OpenEXR files |
 //! | [`stats`] | seconds per phase, queries of the world |
 //!

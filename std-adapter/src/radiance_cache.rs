@@ -2,8 +2,13 @@
 //!
 //! Eye rays say where light is asked for. Where no record reaches, one is computed against the
 //! frozen caches, many at a time; then they are inserted in order, and those dropped that an earlier
-//! one of the same round now covers. First the cache on surfaces, because light from surfaces enters all
-//! others.
+//! one of the same round now covers. In this order:
+//!
+//! 1. coarse irradiance on all surfaces, light of surfaces in the medium, coarse multiple scattering: from
+//!    few whole walks;
+//! 2. the same records again, twice, from all that they know of each other;
+//! 3. final multiple scattering and final irradiance where eye rays come: places and radii from few
+//!    samples, then values from many, so that noise in one does not steer the other.
 
 mod file;
 

@@ -14,6 +14,8 @@
 //!   sampled equiangularly (Kulla and Fajardo 2012), which takes the `1/ρ²` out along the segment.
 //!   What is left of `‖∇L‖` still diverges logarithmically, so the fall-off of lights without extent
 //!   may be held constant within a small distance ([`Settings::closest`]);
+//! - Eq. 34 takes norms of sums over walks that start in one of 24 cones, not of single walks;
+//! - a walk may end where its host knows the rest of the light ([`Walk::along`]);
 //! - the light of surfaces enters through the direction in which the walk goes on anyway.
 //!
 //! `L_m` does not contain `σₛ` of the point itself. The light a surface sends straight to that

@@ -35,7 +35,7 @@ pub struct CacheArguments {
     /// Error tolerance of one cache, as CACHE=E; may be repeated.
     #[arg(long, value_name = "CACHE=E", value_parser = named)]
     pub tolerance_of: Vec<(Kind, f64)>,
-    /// Random walks per record of multiple scattering; the other caches in proportion.
+    /// Random walks per record of multiple scattering; the other caches in proportion [default: 1024].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     pub paths: Option<u32>,
     /// Degree of expansions in anisotropic media [default: from the phase function and the tolerance].
@@ -158,6 +158,9 @@ pub(super) fn check_depth(paths: &path::Settings) -> Result<(), String> {
     }
 }
 
+/// Random walks per record of multiple scattering, unless the user says otherwise.
+const PATHS: u32 = 1024;
+
 /// Samples of all lights with extent together, for a record of single scattering.
 const LIGHT_SAMPLES: u32 = 128;
 
@@ -192,7 +195,7 @@ impl CacheJob<'_> {
     fn efforts(&self, phase: &Phase) -> cache::Settings {
         let size = self.world.bounds().size().max_element();
         let arguments = self.arguments;
-        let scale = f64::from(arguments.paths.unwrap_or(512)) / 512.0;
+        let scale = f64::from(arguments.paths.unwrap_or(PATHS)) / 512.0;
         let effort = |kind: Kind, tolerance: f64, samples: f64, degree: usize, most: f32| {
             let named = arguments.tolerance_of.iter().rev().find(|(k, _)| *k == kind).map(|(_, e)| *e);
             let effort = Effort {

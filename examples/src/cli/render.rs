@@ -32,7 +32,7 @@ pub struct RenderArguments {
     /// How light is computed.
     #[arg(long, value_enum, default_value_t = Method::Path)]
     pub method: Method,
-    /// Samples per pixel [default: what the scene says; with --time, as many as fit].
+    /// Samples per pixel [default: what the scene says, for radiance caching 64; with --time, as many as fit].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub spp: Option<u32>,
     /// Seconds to render for, on the wall clock.
@@ -91,7 +91,10 @@ const CACHE_LAYERS: [&str; 7] =
     ["total", "emitted", "surface_direct", "surface_indirect", "medium_single", "medium_surface", "medium_multiple"];
 
 /// Samples per pixel of radiance caching: what is left for them to even out are edges and direct light.
-const CACHE_SAMPLES: u32 = 32;
+const CACHE_SAMPLES: u32 = 64;
+
+/// The same where there is nothing but direct light.
+const DIRECT_SAMPLES: u32 = 256;
 
 /// Set by Ctrl-C.
 static STOP: AtomicBool = AtomicBool::new(false);
@@ -159,7 +162,10 @@ pub(crate) fn render(arguments: &RenderArguments) -> Result<Rendered, Failure> {
     let samples = match (arguments.spp, arguments.time) {
         (Some(spp), _) => spp,
         (None, Some(_)) => u32::MAX,
-        (None, None) if arguments.method == Method::RadianceCache => CACHE_SAMPLES,
+        (None, None) if arguments.method == Method::RadianceCache => {
+            let is_direct = path_settings(&scene, arguments.max_depth).max_scatterings <= 1;
+            if is_direct { DIRECT_SAMPLES } else { CACHE_SAMPLES }
+        }
         (None, None) => scene.sensor.samples,
     };
     let settings = tiles::Settings {
