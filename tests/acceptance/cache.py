@@ -44,12 +44,11 @@ CORNELL = [f"cornell-{medium}-{phase}" for medium in ("homog", "hetero") for pha
 LADDER = [
     (None, 128, 16),
     (None, 256, 16),
-    (None, 256, 32),
+    (None, 512, 16),
     (None, 512, 32),
-    (None, 512, 64),
-    (0.5, 512, 64),
-    (0.35, 1024, 64),
-    (0.25, 1024, 128),
+    (None, 1024, 32),
+    (None, 2048, 32),
+    (0.5, 2048, 64),
 ]
 
 

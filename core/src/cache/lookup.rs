@@ -57,6 +57,12 @@ impl Basis {
         Self { values, count }
     }
 
+    /// Without that of degree 0.
+    #[inline]
+    fn higher(&self) -> &[f32] {
+        self.values.get(1..self.count).unwrap_or(&[])
+    }
+
     /// Whether it reaches up to `degree`.
     #[inline]
     #[must_use]
@@ -81,34 +87,34 @@ impl VolumeCache<'_> {
     #[must_use]
     pub fn lookup(&self, point: Vec3, basis: &Basis, reading: &Reading) -> Option<Spectrum> {
         let mut blend = reading.blend();
-        let higher = basis.values.get(1..basis.count).unwrap_or(&[]);
+        let higher = basis.higher();
         let mut add = |i, record: &Record, share| {
             let d = 1.0 - share - reading.margin;
             if d <= 0.0 {
                 return;
             }
-            let (mut value, mut gradient) = (record.value, record.gradient);
-            for (c, &y) in self.attached(i).iter().zip(higher) {
-                value += c.value * y;
-                gradient += c.gradient * y;
-            }
+            let (value, gradient) = self.expanded(i, record, higher);
             blend.add(weight(d), value, gradient.along(point - record.position));
         };
         self.visit(point, &mut add);
         blend.value().or_else(|| self.gap(point, basis, reading)).map(|light| light.max(Spectrum::ZERO))
     }
 
+    /// Value and gradient of a record's expansion in one direction.
+    #[inline]
+    fn expanded(&self, number: u32, record: &Record, higher: &[f32]) -> (Spectrum, Gradient) {
+        self.attached(number).iter().zip(higher).fold((record.value, record.gradient), |(value, gradient), (c, &y)| {
+            (value + c.value * y, gradient + c.gradient * y)
+        })
+    }
+
     /// Between the spheres, the nearest count.
     #[cold]
     fn gap(&self, point: Vec3, basis: &Basis, reading: &Reading) -> Option<Spectrum> {
         let mut blend = reading.blend();
-        let higher = basis.values.get(1..basis.count).unwrap_or(&[]);
+        let higher = basis.higher();
         self.visit_wide(point, |i, record, share| {
-            let (mut value, mut gradient) = (record.value, record.gradient);
-            for (c, &y) in self.attached(i).iter().zip(higher) {
-                value += c.value * y;
-                gradient += c.gradient * y;
-            }
+            let (value, gradient) = self.expanded(i, record, higher);
             blend.add(weight(1.0 - share), value, gradient.along(point - record.position));
         });
         blend.value()
@@ -120,17 +126,13 @@ impl VolumeCache<'_> {
     pub fn lookup_with_gradient(&self, point: Vec3, basis: &Basis, reading: &Reading) -> Option<Contribution> {
         let mut blend = reading.blend();
         let mut slope = Gradient::ZERO;
-        let higher = basis.values.get(1..basis.count).unwrap_or(&[]);
+        let higher = basis.higher();
         self.visit(point, |i, record, share| {
             let d = 1.0 - share - reading.margin;
             if d <= 0.0 {
                 return;
             }
-            let (mut value, mut gradient) = (record.value, record.gradient);
-            for (c, &y) in self.attached(i).iter().zip(higher) {
-                value += c.value * y;
-                gradient += c.gradient * y;
-            }
+            let (value, gradient) = self.expanded(i, record, higher);
             let weight = weight(d);
             blend.add(weight, value, gradient.along(point - record.position));
             slope += gradient * weight;
@@ -224,17 +226,4 @@ fn facing_distance(point: Vec3, normal: Vec3, record: &Record, facing: &Facing, 
     let turn = float::safe_sqrt(2.0 - 2.0 * normal.dot(facing.normal));
     let offset = facing.normal.dot(point - record.position).abs() / record.radius;
     share + TURN * turn + OFFSET * offset
-}
-
-/// The gradient of an expansion's value is the expansion of the gradients; here for tests and
-/// figures.
-#[must_use]
-pub fn gradient_towards(cache: &VolumeCache<'_>, record: u32, basis: &Basis) -> (Spectrum, Gradient) {
-    let Some(r) = cache.records().get(record as usize) else { return (Spectrum::ZERO, Gradient::ZERO) };
-    let higher = basis.values.get(1..basis.count).unwrap_or(&[]);
-    cache
-        .attached(record)
-        .iter()
-        .zip(higher)
-        .fold((r.value, r.gradient), |(value, gradient), (c, &y)| (value + c.value * y, gradient + c.gradient * y))
 }
