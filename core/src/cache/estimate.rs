@@ -319,10 +319,9 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
     }
 
     /// Light of all lights, scattered once at `point` towards `to_eye`: one sample of each.
-    pub fn towards(&self, point: Vec3, to_eye: Vec3, phase: &Phase, rng: &mut Generator) -> (Spectrum, Sums) {
+    pub fn towards(&self, point: Vec3, to_eye: Vec3, phase: &Phase, rng: &mut Generator) -> Spectrum {
         let World { medium, scene, lights } = self.world;
-        let sums = single_scatter::sample(point, to_eye, phase, medium, scene, lights, 1, self.walk.steps, rng);
-        (sums.value, sums)
+        single_scatter::sample(point, to_eye, phase, medium, scene, lights, 1, self.walk.steps, rng).value
     }
 
     /// Light of surfaces, scattered once at `point` towards `to_eye`: one direction.

@@ -125,6 +125,7 @@ fn look<M: Medium + ?Sized, S: Scene + ?Sized>(
     let mut throughput = Spectrum::ONE;
     // Until the first real scattering lights may be hidden; after a lobe they were connected to.
     let (mut lights_visible, mut lights_done) = (settings.lights_visible, false);
+    let mut bounced = false;
     let mut ray = *ray;
     for _ in 0..MAX_BOUNCES {
         let hit = world.scene.closest_hit(&ray);
@@ -132,9 +133,13 @@ fn look<M: Medium + ?Sized, S: Scene + ?Sized>(
         let (u, jitter, choice) = (uniform(rng), uniform(rng), uniform(rng));
         let turn = uniform2(rng);
         let to_eye = -ray.direction;
-        sight.segment(&segment, throughput);
+        // Behind a mirror, direct light has been scattered twice.
+        let scatters = settings.indirect || !bounced;
+        if scatters {
+            sight.segment(&segment, throughput);
+        }
         let seen = scattering_points(&segment, world.medium, settings.density, u, jitter, |t, properties, weight| {
-            if !properties.scattering.is_black() {
+            if scatters && !properties.scattering.is_black() {
                 sight.scatter(segment.at(t), to_eye, properties, throughput * weight * properties.scattering);
             }
         });
@@ -160,14 +165,15 @@ fn look<M: Medium + ?Sized, S: Scene + ?Sized>(
         if !lights_done && let Some(light) = hit.light.and_then(|i| world.lights.get(i as usize)) {
             sight.emitted(throughput * light.radiance(hit.normal, to_eye));
         }
-        if !hit.surface.is_discrete() {
+        if scatters && !hit.surface.is_discrete() {
             sight.surface(&segment, &hit, throughput);
         }
-        if matches!(hit.surface, Surface::Lambert { .. }) || !settings.indirect && !hit.surface.is_discrete() {
+        let ends = !settings.indirect && (bounced || !hit.surface.is_discrete());
+        if ends || matches!(hit.surface, Surface::Lambert { .. }) {
             return;
         }
         let Some(sample) = hit.surface.sample(hit.normal, to_eye, choice, turn) else { return };
-        lights_visible = true;
+        (lights_visible, bounced) = (true, true);
         lights_done = !hit.surface.is_discrete();
         throughput *= sample.weight;
         ray = Ray::new(leave(point, hit.normal, sample.to_light, hit.distance), sample.to_light);
@@ -389,7 +395,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Sight for Gather<'_, M, S> {
         let single = match &caches.single {
             None => self.connected(point, to_eye, properties, k),
             Some(_) => self.cached(caches.single.as_ref(), point, to_eye, |gather| {
-                estimator.towards(point, to_eye, phase, &mut gather.rng).0
+                estimator.towards(point, to_eye, phase, &mut gather.rng)
             }),
         };
         self.seen.medium_single += weight * single;
