@@ -73,6 +73,9 @@ pub struct Estimator<'a, M: ?Sized, S: ?Sized> {
     pub paths: path::Settings,
     /// Samples of every light with extent at a point.
     pub light_samples: u32,
+    /// Length (m) below which changes of light are not asked for: the gradient of no sample is larger than its
+    /// light over it. Close to walls and lights single samples have gradients without bound.
+    pub finest: f32,
 }
 
 impl<M: ?Sized, S: ?Sized> Clone for Estimator<'_, M, S> {
@@ -132,6 +135,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
                 let radiance = self.outgoing(&ray, &hit, &mut child);
                 let pdf = pdf * directions as f32;
                 if let Some(arrival) = Arrival::from_surface(&ray, &hit, radiance, pdf, medium, marching) {
+                    let arrival = self.steadied(arrival);
                     sums.add(&arrival.scatter_directional(into.moments, 1.0, into.coefficients), true);
                 }
             }
@@ -157,12 +161,11 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
             for j in 0..paths {
                 let uniformly = |u| warp::uniform_sphere(u);
                 let (to_light, pdf) = aimed(&aims, j, paths, shift, uniformly, |_| warp::uniform_sphere_pdf());
-                let mut ray = Ray::new(point, to_light);
-                ray.length = nearest_surface(&ray, self.world.scene).map_or(f32::INFINITY, |hit| hit.distance);
+                let ray = Ray::new(point, to_light);
+                let end = nearest_surface(&ray, self.world.scene);
                 let u = third + THIRD * j as f32;
-                let light = self.walked(&walk, ray, pdf, u - libm::floorf(u), rng) * share;
-                let incoming = Incoming { to_light, light };
-                let mean = incoming.scatter_directional(into.moments, into.coefficients);
+                let incoming = self.walked(&walk, ray, end.as_ref(), pdf, u - libm::floorf(u), rng) * share;
+                let mean = incoming.scatter_directional(into.moments, 1.0, into.coefficients);
                 cones.add(to_light, &mean);
                 halves.add(j, &mean.gradient);
             }
@@ -174,7 +177,15 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
     }
 
     /// Light scattered in the medium along a ray, by one walk that ends where caches know the rest.
-    fn walked(&self, walk: &Walk<'_, M, S>, ray: Ray, pdf: f32, u: f32, rng: &mut impl Rng) -> Contribution {
+    fn walked(
+        &self,
+        walk: &Walk<'_, M, S>,
+        ray: Ray,
+        end: Option<&Hit>,
+        pdf: f32,
+        u: f32,
+        rng: &mut impl Rng,
+    ) -> Incoming {
         let mut child = Generator::child(rng);
         let outgoing = |ray: &Ray, hit: &Hit| self.outgoing(ray, hit, &mut child);
         let known = |point: Vec3, to_eye: Vec3, _: &Properties| {
@@ -184,7 +195,14 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
             light += surface.0.lookup_with_gradient(point, &basis, &surface.1)?;
             Some(light)
         };
-        walk.along(ray, pdf, u, outgoing, known, rng)
+        self.steadied(walk.along(ray, end, pdf, u, outgoing, known, rng))
+    }
+
+    /// An arrival whose gradient is no larger than [`Estimator::finest`] lets it be.
+    fn steadied(&self, arrival: Arrival) -> Arrival {
+        let steepest = arrival.irradiance / self.finest;
+        let scale = steepest.zip(arrival.gradient.norm(), |most, norm| if norm > most { most / norm } else { 1.0 });
+        Arrival { gradient: arrival.gradient * scale, turning: arrival.turning.min(steepest), ..arrival }
     }
 
     /// Indirect irradiance (W·m⁻²) at `point` on a surface with `normal`, from `paths` directions:
@@ -211,23 +229,24 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
                 continue;
             }
             let weight = share * cosine / pdf;
-            let mut ray = Ray::new(leave(point, normal, to_light, 0.0), to_light);
+            let ray = Ray::new(leave(point, normal, to_light, 0.0), to_light);
             let marching = Marching { steps: self.walk.steps, offset: uniform(rng) };
             let mut total = Contribution::ZERO;
-            if let Some(hit) = nearest_surface(&ray, self.world.scene) {
-                ray.length = hit.distance;
-                let radiance = self.outgoing(&ray, &hit, &mut child);
-                let arrival = Arrival::from_surface(&ray, &hit, radiance, 1.0, self.world.medium, marching);
+            let end = nearest_surface(&ray, self.world.scene);
+            // How the cosine changes as what is seen stays.
+            let tilt = (to_light * cosine - normal) / cosine.max(MIN_COSINE);
+            if let Some(hit) = &end {
+                let radiance = self.outgoing(&ray, hit, &mut child);
+                let arrival = Arrival::from_surface(&ray, hit, radiance, 1.0, self.world.medium, marching);
                 if let Some(arrival) = arrival {
-                    let tilt = (to_light * cosine - normal) / (hit.distance * cosine.max(MIN_COSINE));
-                    let gradient = arrival.gradient + Gradient::outer(arrival.irradiance, tilt);
-                    let light = Contribution { radiance: arrival.irradiance, gradient } * weight;
+                    let light = tilted(&self.steadied(arrival), tilt) * weight;
                     sums.add(&light, true);
                     total += light;
                 }
             }
             let u = third + THIRD * j as f32;
-            let light = self.walked(&walk, ray, 1.0, u - libm::floorf(u), rng) * weight;
+            let light = self.walked(&walk, ray, end.as_ref(), 1.0, u - libm::floorf(u), rng);
+            let light = tilted(&light, tilt) * weight;
             scattered.add(to_light, &light);
             total += light;
             halves.add(j, &total.gradient);
@@ -366,6 +385,12 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
         higher.copy_from_slice(&all[1..=higher.len()]);
         sums
     }
+}
+
+/// Arriving light with the change of its cosine, relative to the cosine, as its direction turns.
+fn tilted(arrival: &Arrival, tilt: Vec3) -> Contribution {
+    let gradient = arrival.gradient + Gradient::outer(arrival.turning, tilt);
+    Contribution { radiance: arrival.irradiance, gradient }
 }
 
 /// How far an estimated gradient can be believed: as far as two halves of its samples agree.

@@ -1,7 +1,8 @@
 //! What several records say about a point: Jarosz et al. 2008, Eq. 35; sheet § 1.10.
 
 use crate::math::float;
-use crate::spectrum::Spectrum;
+use crate::spectrum::{Gradient, Spectrum};
+use glam::Vec3;
 
 /// How a record is carried to another point.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -17,6 +18,10 @@ pub enum Extrapolation {
     Linear,
     /// `L`, mixed by a weighted mean.
     Constant,
+    /// Linear, second order.
+    Curved,
+    /// Log, second order.
+    CurvedExponential,
 }
 
 /// Weight of a record at `1 − distance/radius`: `d² (3 − 2d)`, from 0 at the edge to 1.
@@ -62,6 +67,8 @@ pub struct Blend {
     total: f32,
     sum: Spectrum,
     positive: Spectrum,
+    slope: Gradient,
+    offset: Vec3,
 }
 
 impl Blend {
@@ -69,14 +76,34 @@ impl Blend {
     #[inline]
     #[must_use]
     pub fn new(kind: Extrapolation, limit: f32) -> Self {
-        Self { kind, limit, total: 0.0, sum: Spectrum::ZERO, positive: Spectrum::ZERO }
+        Self { kind, limit, total: 0.0, sum: Spectrum::ZERO, positive: Spectrum::ZERO, slope: Gradient::ZERO, offset: Vec3::ZERO }
     }
 
     /// Adds a record's value and its change `∇L·Δ` on the way to the point.
     #[inline]
-    pub fn add(&mut self, weight: f32, value: Spectrum, change: Spectrum) {
+    pub fn add(&mut self, weight: f32, value: Spectrum, gradient: &Gradient, offset: Vec3) {
         self.total += weight;
+        let change = gradient.along(offset);
         match self.kind {
+            Extrapolation::Curved => {
+                self.sum += (value + change * 0.5) * weight;
+                self.slope += *gradient * weight;
+                self.offset += offset * weight;
+            }
+            Extrapolation::CurvedExponential => {
+                self.offset += offset * weight;
+                let mut inverse = Spectrum::ZERO;
+                for channel in 0..3 {
+                    let l = value[channel];
+                    if l > 0.0 {
+                        let exponent = (change[channel] / l).clamp(-self.limit, self.limit);
+                        self.sum[channel] += weight * (float::ln(l) + 0.5 * exponent);
+                        self.positive[channel] += weight;
+                        inverse[channel] = weight / l;
+                    }
+                }
+                self.slope += *gradient * inverse;
+            }
             Extrapolation::Exponential => {
                 for channel in 0..3 {
                     let l = value[channel];
@@ -115,6 +142,13 @@ impl Blend {
             return None;
         }
         Some(match self.kind {
+            Extrapolation::Curved => (self.sum + self.slope.along(self.offset) * (0.5 / self.total)) / self.total,
+            Extrapolation::CurvedExponential => {
+                let bend = self.slope.along(self.offset) * (0.5 / self.total);
+                (self.sum + bend).zip(self.positive, |sum, positive| {
+                    if positive > 0.0 { positive / self.total * float::exp(sum / positive) } else { 0.0 }
+                })
+            }
             Extrapolation::Exponential => self.sum.zip(self.positive, |sum, positive| {
                 if positive > 0.0 { positive / self.total * float::exp(sum / positive) } else { 0.0 }
             }),

@@ -14,7 +14,7 @@ use crate::spectrum::{Gradient, Spectrum};
 const TURN: f32 = 2.0;
 
 /// How sharply they stop off their plane: at `1/OFFSET` of their radius.
-const OFFSET: f32 = 4.0;
+const OFFSET: f32 = 40.0;
 
 /// How a cache is read.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -94,7 +94,7 @@ impl VolumeCache<'_> {
                 return;
             }
             let (value, gradient) = self.expanded(i, record, higher);
-            blend.add(weight(d), value, gradient.along(point - record.position));
+            blend.add(weight(d), value, &gradient, point - record.position);
         };
         self.visit(point, &mut add);
         blend.value().or_else(|| self.gap(point, basis, reading)).map(|light| light.max(Spectrum::ZERO))
@@ -115,7 +115,7 @@ impl VolumeCache<'_> {
         let higher = basis.higher();
         self.visit_wide(point, |i, record, share| {
             let (value, gradient) = self.expanded(i, record, higher);
-            blend.add(weight(1.0 - share), value, gradient.along(point - record.position));
+            blend.add(weight(1.0 - share), value, &gradient, point - record.position);
         });
         blend.value()
     }
@@ -134,7 +134,7 @@ impl VolumeCache<'_> {
             }
             let (value, gradient) = self.expanded(i, record, higher);
             let weight = weight(d);
-            blend.add(weight, value, gradient.along(point - record.position));
+            blend.add(weight, value, &gradient, point - record.position);
             slope += gradient * weight;
         });
         let radiance = blend.value()?;
@@ -174,7 +174,7 @@ impl SurfaceCache<'_> {
         let mut blend = reading.blend();
         self.visit_facing(point, normal, reading.margin, |record, facing, d| {
             let turned = facing.turn.along(normal - facing.normal);
-            blend.add(weight(d), record.value, record.change(point) + turned);
+            blend.add(weight(d), record.value + turned, &record.gradient, point - record.position);
         });
         blend.value().or_else(|| self.gap(point, normal, reading)).map(|light| light.max(Spectrum::ZERO))
     }
@@ -188,7 +188,7 @@ impl SurfaceCache<'_> {
             let d = 1.0 - facing_distance(point, normal, record, facing, share);
             if d > 0.0 {
                 let turned = facing.turn.along(normal - facing.normal);
-                blend.add(weight(d), record.value, record.change(point) + turned);
+                blend.add(weight(d), record.value + turned, &record.gradient, point - record.position);
             }
         });
         blend.value()
@@ -224,6 +224,6 @@ impl SurfaceCache<'_> {
 #[inline]
 fn facing_distance(point: Vec3, normal: Vec3, record: &Record, facing: &Facing, share: f32) -> f32 {
     let turn = float::safe_sqrt(2.0 - 2.0 * normal.dot(facing.normal));
-    let offset = facing.normal.dot(point - record.position).abs() / record.radius;
+    let offset = 0.5 * (facing.normal + normal).dot(point - record.position).abs() / record.radius;
     share + TURN * turn + OFFSET * offset
 }

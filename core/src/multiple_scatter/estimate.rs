@@ -29,7 +29,7 @@ fn for_each_path<M: Medium + ?Sized, S: Scene + ?Sized>(
             (azimuth - libm::floor(azimuth)) as f32,
         );
         let mut incoming = walk.path(point, first, &mut outgoing, rng);
-        incoming.light = incoming.light * share;
+        incoming = incoming * share;
         visit(&incoming);
     }
 }
@@ -84,7 +84,7 @@ pub fn sample_directional<M: Medium + ?Sized, S: Scene + ?Sized>(
 ) -> Sums {
     let mut cones = Cones::default();
     for_each_path(walk, point, outgoing, paths, rng, |incoming| {
-        cones.add(incoming.to_light, &incoming.scatter_directional(into.moments, into.coefficients));
+        cones.add(incoming.to_light, &incoming.scatter_directional(into.moments, 1.0, into.coefficients));
     });
     cones.sums()
 }

@@ -37,4 +37,4 @@ pub(crate) use estimate::Cones;
 pub use estimate::{sample, sample_directional};
 pub use flight::Lengths;
 pub use walk::{Incoming, Settings, Walk};
-pub use weight::Weight;
+pub use weight::{Shift, Weight};

@@ -2,18 +2,16 @@
 
 use glam::{Vec2, Vec3};
 
-use super::Weight;
+use super::weight::{Shift, Weight};
 use super::flight::{Collision, Lengths, fly, own};
 use crate::host::{Hit, Medium, Properties, Rng, Scene};
 use crate::light::{Falloff, Light};
-use crate::math::Ray;
-use crate::phase::{self, Phase};
+use crate::math::{Ray, float};
 use crate::sampling::discrete::choose;
 use crate::sampling::distance::Equiangular;
 use crate::sampling::{Generator, uniform, uniform2, warp};
-use crate::sh::Coefficient;
-use crate::single_scatter::{self, Arrival, Contribution, nearest_surface, shadow_ray};
-use crate::spectrum::Spectrum;
+use crate::single_scatter::{Arrival, Contribution, nearest_surface, shadow_ray};
+use crate::spectrum::{Gradient, Spectrum};
 use crate::transmittance::thickness::{Marching, Steps, optical_thickness_with_gradients};
 
 /// Beyond this many distances to the light an endless segment is not sampled equiangularly: 10⁻⁴ of
@@ -62,33 +60,14 @@ pub struct Walk<'a, M: ?Sized, S: ?Sized> {
     pub settings: Settings,
 }
 
+/// `D`, the reach of [`Shift`], over the distance of the nearest light of finite size.
+const REACH: f32 = 0.5;
+
 /// The light one path brings to its start, over the density of its first direction.
 ///
-/// Without the phase function at the start: that is applied by [`Incoming::scatter`] for one
-/// direction or [`Incoming::scatter_directional`] for all.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Incoming {
-    /// First direction of the walk (unit).
-    pub to_light: Vec3,
-    /// Total over the path's vertices (W·m⁻²) with its gradient, the vector sum.
-    pub light: Contribution,
-}
-
-impl Incoming {
-    /// Scattered at the start towards `to_eye`; the first phase function is frozen, too.
-    #[inline]
-    #[must_use]
-    pub fn scatter(&self, to_eye: Vec3, phase: &Phase) -> Contribution {
-        let value = phase.value(phase::deflection(self.to_light, to_eye));
-        Contribution { radiance: self.light.radiance * value, gradient: self.light.gradient * value }
-    }
-
-    /// Scattered in all directions: adds to the coefficients, returns the mean over directions. The
-    /// coefficients `f_l Y_lm` of the first phase function have no gradient here (sheet § 1.7).
-    pub fn scatter_directional(&self, moments: &[Spectrum], expansion: &mut [Coefficient]) -> Contribution {
-        single_scatter::scatter_directional(self.to_light, &self.light, moments, expansion)
-    }
-}
+/// Without the phase function at the start: that is applied by [`Arrival::scatter`] for one direction, or
+/// [`Arrival::scatter_directional`] for all.
+pub type Incoming = Arrival;
 
 impl<M: Medium + ?Sized, S: Scene + ?Sized> Walk<'_, M, S> {
     /// One path from `point`; `first` makes its first direction, uniform over the sphere.
@@ -104,15 +83,15 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Walk<'_, M, S> {
         rng: &mut (impl Rng + ?Sized),
     ) -> Incoming {
         let to_light = warp::uniform_sphere(first);
-        let mut ray = Ray::new(point, to_light);
-        ray.length = nearest_surface(&ray, self.scene).map_or(f32::INFINITY, |hit| hit.distance);
+        let ray = Ray::new(point, to_light);
+        let end = nearest_surface(&ray, self.scene);
         let u = uniform(rng);
-        Incoming { to_light, light: self.along(ray, warp::uniform_sphere_pdf(), u, outgoing, |_, _, _| None, rng) }
+        self.along(ray, end.as_ref(), warp::uniform_sphere_pdf(), u, outgoing, |_, _, _| None, rng)
     }
 
-    /// Light scattered on a path whose first segment lies on `ray`, up to its end, over the density
-    /// `pdf` (sr⁻¹) of its direction: radiance at the ray's origin over `pdf`, and how it changes as
-    /// the whole path is translated. `u`, in [0, 1), decides the first length.
+    /// Light scattered on a path whose first segment lies on `ray`, up to its `end`, the nearest surface, over
+    /// the density `pdf` (sr⁻¹) of its direction: radiance at the ray's origin over `pdf`, and how it
+    /// changes as the origin moves and the vertices with it ([`Shift`]). `u`, in [0, 1), decides the first length.
     ///
     /// `known(point, to_eye, properties)` may answer for all light but that straight from the lights
     /// that is scattered towards `to_eye` at a collision (W·m⁻²·sr⁻¹), with its gradient: then the
@@ -120,18 +99,27 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Walk<'_, M, S> {
     pub fn along(
         &self,
         mut ray: Ray,
+        end: Option<&Hit>,
         pdf: f32,
         mut u: f32,
         mut outgoing: impl FnMut(&Ray, &Hit) -> Spectrum,
         mut known: impl FnMut(Vec3, Vec3, &Properties) -> Option<Contribution>,
         rng: &mut (impl Rng + ?Sized),
-    ) -> Contribution {
+    ) -> Incoming {
         let rng = &mut own(rng);
         let mut kappa = Spectrum::splat(1.0 / pdf);
         let mut weight = Weight::ONE;
-        let mut total = Contribution::ZERO;
+        let mut total = Incoming {
+            to_light: ray.direction,
+            irradiance: Spectrum::ZERO,
+            gradient: Gradient::ZERO,
+            turning: Spectrum::ZERO,
+        };
+        let mut end = end.copied();
+        ray.length = end.map_or(f32::INFINITY, |hit| hit.distance);
         for vertex in 1..=self.settings.max_vertices {
-            total += self.near_lights(&ray, &weight, kappa, rng);
+            let reach = self.reach(ray.origin);
+            self.near_lights(&ray, end.as_ref(), reach, &weight, kappa, &mut total, rng);
             let marching = self.marching(rng);
             let hit = fly(&ray, self.medium, self.settings.lengths, weight.value * kappa, marching, u, rng);
             let Some(Collision { distance, properties, factor }) = hit else { break };
@@ -140,9 +128,10 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Walk<'_, M, S> {
             if step.is_black() || !step.is_finite() {
                 break;
             }
-            let slope = optical_thickness_with_gradients(&segment, self.medium, marching).gradient_joint;
+            let thickness = optical_thickness_with_gradients(&segment, self.medium, marching);
             let next = self.medium.gradients(at).scattering;
-            weight = weight.advance(kappa, factor, &slope, properties.scattering, &next);
+            let shift = Shift::new(&ray, end.as_ref(), reach, distance);
+            weight = weight.advance_by(&shift, kappa, factor, &thickness, properties.scattering, &next);
             if vertex >= self.settings.roulette_from {
                 let survival = step.max_element().clamp(MIN_SURVIVAL, 1.0);
                 if uniform(rng) >= survival {
@@ -151,9 +140,9 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Walk<'_, M, S> {
                 weight = weight.scaled(1.0 / survival);
             }
             let to_eye = -ray.direction;
-            total += weight.carry(&self.lights_at(at, to_eye, &properties, rng));
+            add(&mut total, &weight, &self.lights_at(at, to_eye, &properties, rng));
             if let Some(light) = known(at, to_eye, &properties) {
-                total += weight.carry(&light);
+                add(&mut total, &weight, &light);
                 break;
             }
 
@@ -161,21 +150,29 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Walk<'_, M, S> {
             let turn = properties.phase.sample(to_eye, uniform2(rng));
             kappa = turn.weight;
             ray = Ray { origin: at, direction: turn.to_light, length: f32::INFINITY };
-            if let Some(hit) = nearest_surface(&ray, self.scene) {
+            end = nearest_surface(&ray, self.scene);
+            if let Some(hit) = end {
                 ray.length = hit.distance;
                 let marching = self.marching(rng);
                 let radiance = outgoing(&ray, &hit);
                 let arrival = Arrival::from_surface(&ray, &hit, radiance, turn.pdf, self.medium, marching);
                 if let Some(arrival) = arrival {
-                    total += weight.carry(&arrival.scatter(to_eye, &properties.phase));
+                    add(&mut total, &weight, &arrival.scatter(to_eye, &properties.phase));
                 }
             }
         }
         // A light or a hit within rounding of a vertex may leave the range of f32.
-        if !(total.radiance.is_finite() && total.gradient.is_finite()) {
-            total = Contribution::ZERO;
+        if !(total.irradiance.is_finite() && total.gradient.is_finite() && total.turning.is_finite()) {
+            (total.irradiance, total.gradient, total.turning) = (Spectrum::ZERO, Gradient::ZERO, Spectrum::ZERO);
         }
         total
+    }
+
+    /// The reach of [`Shift`] at a point.
+    fn reach(&self, point: Vec3) -> f32 {
+        let away = |light: &Light<'_>| light.near_field().map(|field| field.centre().distance_squared(point));
+        let nearest2 = self.lights.iter().filter_map(away).fold(f32::INFINITY, f32::min);
+        REACH * float::sqrt(nearest2)
     }
 
     #[inline]
@@ -189,25 +186,38 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Walk<'_, M, S> {
             let near = light.steep_field().is_some_and(|field| field.contains(at));
             if near { 0.0 } else { light.importance(at) }
         };
+        let mut sum = Contribution::ZERO;
         self.each_light(importance, rng, |light, share, rng| {
             let mut sample = light.sample(at, uniform2(rng))?;
             sample.source.weight = sample.source.weight / share;
             let arrival = Arrival::from_source(at, self.medium, &sample.source, self.marching(rng), 0.0)?;
-            (!self.scene.is_blocked(&shadow_ray(at, &sample.source)))
-                .then(|| arrival.scatter(to_eye, &properties.phase))
-        })
+            if !self.scene.is_blocked(&shadow_ray(at, &sample.source)) {
+                sum += arrival.scatter(to_eye, &properties.phase);
+            }
+            Some(())
+        });
+        sum
     }
 
     /// Light scattered somewhere along a segment within a light's near field, carried to the start.
-    fn near_lights(&self, ray: &Ray, weight: &Weight, kappa: Spectrum, rng: &mut Generator) -> Contribution {
+    fn near_lights(
+        &self,
+        ray: &Ray,
+        end: Option<&Hit>,
+        reach: f32,
+        weight: &Weight,
+        kappa: Spectrum,
+        total: &mut Incoming,
+        rng: &mut Generator,
+    ) {
         let importance = |light: &Light<'_>| match light.steep_field() {
             Some(field) => light.intensity() / height(ray, field.centre()),
             None => 0.0,
         };
         self.each_light(importance, rng, |light, share, rng| {
             let (position, source) = light.anchor(uniform2(rng))?;
-            let end = ray.length.min(ENDLESS * ray.origin.distance(position).max(self.medium.resolution()));
-            let (near, far) = light.near_interval(ray, 0.0, end)?;
+            let farthest = ray.length.min(ENDLESS * ray.origin.distance(position).max(self.medium.resolution()));
+            let (near, far) = light.near_interval(ray, 0.0, farthest)?;
             let law = Equiangular::new(ray.origin, ray.direction, position, near, far)?;
             let distance = law.sample(uniform(rng)).clamp(near, far);
             let (at, marching) = (ray.at(distance), self.marching(rng));
@@ -228,34 +238,42 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Walk<'_, M, S> {
             let frozen = kappa / (law.pdf(distance) * share);
             let slope = self.medium.gradients(at).scattering;
             let through = segment.value.transmitted();
-            let joined = weight.advance(frozen, through, &segment.gradient_joint, properties.scattering, &slope);
-            Some(joined.carry(&arrival.scatter(-ray.direction, &properties.phase)))
-        })
+            let shift = Shift::new(ray, end, reach, distance);
+            let joined = weight.advance_by(&shift, frozen, through, &segment, properties.scattering, &slope);
+            add(total, &joined, &arrival.scatter(-ray.direction, &properties.phase));
+            Some(())
+        });
     }
 
-    /// Sum of `connect` over all lights with positive importance, or its value for one of them over
-    /// the probability it was chosen with.
+    /// Calls `connect(light, probability)` for all lights with positive importance, or for one of them.
     fn each_light(
         &self,
         importance: impl Fn(&Light<'_>) -> f32,
         rng: &mut Generator,
-        mut connect: impl FnMut(&Light<'_>, f32, &mut Generator) -> Option<Contribution>,
-    ) -> Contribution {
-        let mut sum = Contribution::ZERO;
+        mut connect: impl FnMut(&Light<'_>, f32, &mut Generator) -> Option<()>,
+    ) {
         if self.settings.one_light {
             let weighted = self.lights.iter().map(|light| (importance(light), light));
             if let Some((light, choice)) = choose(weighted, uniform(rng)) {
-                sum += connect(light, choice.probability, rng).unwrap_or_default();
+                connect(light, choice.probability, rng);
             }
-            return sum;
+            return;
         }
         for light in self.lights {
             if importance(light) > 0.0 {
-                sum += connect(light, 1.0, rng).unwrap_or_default();
+                connect(light, 1.0, rng);
             }
         }
-        sum
     }
+}
+
+/// Adds light at a path's last vertex.
+#[inline]
+fn add(total: &mut Incoming, weight: &Weight, light: &Contribution) {
+    let carried = weight.carry(light);
+    total.irradiance += carried.radiance;
+    total.gradient += carried.gradient;
+    total.turning += carried.radiance * weight.turn.unwrap_or(0.0);
 }
 
 /// Distance (m) of a light from a ray: its light along the ray sums up to about π over this.

@@ -1,15 +1,81 @@
 //! The weight of a path and its gradient.
 
+use glam::Vec3;
+
+use crate::host::Hit;
+use crate::math::Ray;
 use crate::single_scatter::Contribution;
 use crate::spectrum::{Gradient, Spectrum};
+use crate::transmittance::thickness::Thickness;
 
-/// `(W, ∇W)`: weight of the path so far, and how it changes when the whole path is translated.
+/// Least cosine at a surface in the change of volume before it: `1/c` has no bound where a ray grazes a curved one.
+const MIN_COSINE: f32 = 0.02;
+
+/// How a vertex moves when the start of its segment does.
+///
+/// ```text
+/// y ↦ y + φ δ,   φ = max(0, 1 − t/s),
+/// ∇ ln(dV/r²) = (n + 2 c ω)/(c s) before a surface at s with normal n, c = −n·ω
+///             = ω/s before a sphere of radius s,   2 ω/t beyond it
+/// ```
+///
+/// for a vertex at `t` in direction `ω`. Near the start vertices go along, or `1/t²` would make the gradient
+/// noise; on surfaces and around lights they stay. So none crosses a wall, the volume that fills with light
+/// as the start leaves one is part of the gradient, and the steep light around a lamp adds no noise.
+/// With nothing in reach this is J's translation.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Shift {
+    /// `φ`.
+    pub share: f32,
+    /// Relative change of the volume element over the squared distance (m⁻¹).
+    pub spread: Vec3,
+    /// How the direction turns: one over the distance of the point that, at rest, would turn it so (m⁻¹).
+    pub turn: f32,
+}
+
+impl Shift {
+    /// The vertex goes all the way with the start.
+    pub const TRANSLATION: Self = Self { share: 1.0, spread: Vec3::ZERO, turn: 0.0 };
+
+    /// Of a vertex at `distance` (m) on a ray that ends on a surface, or nowhere. `reach` (m) is the radius
+    /// of the sphere around the start beyond which vertices stay.
+    ///
+    /// ```
+    /// # use fogbow::{host::Hit, math::{Ray, Vec3}, multiple_scatter::Shift, surface::Surface};
+    /// let wall = Hit { distance: 2.0, normal: Vec3::NEG_X, surface: Surface::Null, light: None };
+    /// let shift = Shift::new(&Ray::new(Vec3::ZERO, Vec3::X), Some(&wall), f32::INFINITY, 0.5);
+    /// assert_eq!((shift.share, shift.spread), (0.75, Vec3::new(0.5, 0.0, 0.0)));
+    /// ```
+    #[inline]
+    #[must_use]
+    pub fn new(ray: &Ray, end: Option<&Hit>, reach: f32, distance: f32) -> Self {
+        let wall = end.filter(|end| end.distance > 0.0 && end.distance < reach);
+        let s = wall.map_or(reach, |wall| wall.distance);
+        if distance >= s {
+            return Self { share: 0.0, spread: ray.direction * (2.0 / distance), turn: 1.0 / distance };
+        }
+        let Some(wall) = wall else {
+            return Self { share: 1.0 - distance / s, spread: ray.direction / s, turn: 1.0 / s };
+        };
+        let signed = -wall.normal.dot(ray.direction);
+        // The side that is seen.
+        let normal = if signed < 0.0 { -wall.normal } else { wall.normal };
+        let spread = (normal / signed.abs().max(MIN_COSINE) + ray.direction * 2.0) / s;
+        Self { share: 1.0 - distance / s, spread, turn: 1.0 / s }
+    }
+}
+
+/// `(W, ∇W)`: weight of the path so far, and how it changes when its start is moved.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Weight {
     /// `W_k = Π a_i`.
     pub value: Spectrum,
     /// `∇W_k` (m⁻¹).
     pub gradient: Gradient,
+    /// How far the last vertex moves with the start: `Π φ_i`, 1 where the path is translated.
+    pub moved: f32,
+    /// How the first direction turns (m⁻¹), see [`Shift::turn`]; `None` before the first vertex.
+    pub turn: Option<f32>,
 }
 
 impl Default for Weight {
@@ -20,7 +86,7 @@ impl Default for Weight {
 
 impl Weight {
     /// Of a path without vertices.
-    pub const ONE: Self = Self { value: Spectrum::ONE, gradient: Gradient::ZERO };
+    pub const ONE: Self = Self { value: Spectrum::ONE, gradient: Gradient::ZERO, moved: 1.0, turn: None };
 
     /// One vertex on.
     ///
@@ -53,10 +119,41 @@ impl Weight {
         let frozen = kappa * transmittance;
         let step = frozen * scattering;
         let slope = (*scattering_gradient - *thickness_gradient * scattering) * frozen;
-        Self { value: self.value * step, gradient: self.gradient * step + slope * self.value }
+        Self { value: self.value * step, gradient: self.gradient * step + slope * self.value, ..*self }
     }
 
-    /// Light at the last vertex, carried to the first: `(W L, L ∇W + W ∇L)`.
+    /// One vertex on, where vertices are moved by `shift`.
+    ///
+    /// ```text
+    /// ∇a = a ∇ ln(dV/r²) + κ T (φ ∇σₛ − σₛ ∇τ_φ),   ∇τ_φ = φ ∇τ_joint + (1 − φ) ∇τ_fixed
+    /// ```
+    ///
+    /// `thickness` gives the gradients; its value is not used. With [`Shift::TRANSLATION`] the same as
+    /// [`Weight::advance`].
+    #[inline]
+    #[must_use]
+    pub fn advance_by(
+        &self,
+        shift: &Shift,
+        kappa: Spectrum,
+        transmittance: Spectrum,
+        thickness: &Thickness,
+        scattering: Spectrum,
+        scattering_gradient: &Gradient,
+    ) -> Self {
+        let frozen = kappa * transmittance;
+        let step = frozen * scattering;
+        let through = thickness.gradient_joint * shift.share + thickness.gradient_fixed * (1.0 - shift.share);
+        let slope = *scattering_gradient * shift.share - through * scattering + Gradient::outer(scattering, shift.spread);
+        Self {
+            value: self.value * step,
+            gradient: self.gradient * step + slope * (frozen * self.value * self.moved),
+            moved: self.moved * shift.share,
+            turn: self.turn.or(Some(shift.turn)),
+        }
+    }
+
+    /// Light at the last vertex, carried to the first: `(W L, L ∇W + W Πφ ∇L)`.
     ///
     /// ```
     /// # use fogbow::{multiple_scatter::Weight, single_scatter::Contribution, spectrum::{Gradient, Spectrum}};
@@ -68,7 +165,7 @@ impl Weight {
     pub fn carry(&self, light: &Contribution) -> Contribution {
         Contribution {
             radiance: self.value * light.radiance,
-            gradient: self.gradient * light.radiance + light.gradient * self.value,
+            gradient: self.gradient * light.radiance + light.gradient * (self.value * self.moved),
         }
     }
 
@@ -76,6 +173,6 @@ impl Weight {
     #[inline]
     #[must_use]
     pub fn scaled(&self, factor: f32) -> Self {
-        Self { value: self.value * factor, gradient: self.gradient * factor }
+        Self { value: self.value * factor, gradient: self.gradient * factor, ..*self }
     }
 }

@@ -19,12 +19,12 @@ const MIN_HIT_COSINE: f32 = 1e-3;
 pub struct Arrival {
     /// Where it comes from (unit).
     pub to_light: Vec3,
-    /// How far (m); infinite for a distant source.
-    pub distance: f32,
     /// Irradiance across the light, `w T H` (W·m⁻²).
     pub irradiance: Spectrum,
     /// `w (T ∇H + H ∇T)` (W·m⁻³).
     pub gradient: Gradient,
+    /// Irradiance over the distance (W·m⁻³), by which the direction turns; 0 for a distant source.
+    pub turning: Spectrum,
 }
 
 /// One summand of an estimate: radiance (W·m⁻²·sr⁻¹) and its gradient (W·m⁻³·sr⁻¹).
@@ -54,6 +54,19 @@ impl core::ops::AddAssign for Contribution {
     fn add_assign(&mut self, other: Self) {
         self.radiance += other.radiance;
         self.gradient += other.gradient;
+    }
+}
+
+impl core::ops::Mul<f32> for Arrival {
+    type Output = Self;
+    #[inline]
+    fn mul(self, factor: f32) -> Self {
+        Self {
+            irradiance: self.irradiance * factor,
+            gradient: self.gradient * factor,
+            turning: self.turning * factor,
+            ..self
+        }
     }
 }
 
@@ -150,9 +163,9 @@ impl Arrival {
         // NaN, too, is not below.
         (steepest < MOST && gradient.is_finite() && irradiance_here.max_element() < MOST).then_some(Self {
             to_light: ray.direction,
-            distance: ray.length,
             irradiance: irradiance_here,
             gradient,
+            turning: irradiance_here / ray.length,
         })
     }
 
@@ -163,11 +176,11 @@ impl Arrival {
     pub fn scatter(&self, to_eye: Vec3, phase: &Phase) -> Contribution {
         let deflection = phase::deflection(self.to_light, to_eye);
         let value = phase.value(deflection);
-        let turn = deflection_gradient(self.to_light, to_eye, self.distance);
+        let turn = deflection_gradient(self.to_light, to_eye, 1.0);
         let slope = Gradient::outer(phase.derivative(deflection), turn);
         let scattered = Contribution {
             radiance: value * self.irradiance,
-            gradient: slope * self.irradiance + self.gradient * value,
+            gradient: slope * self.turning + self.gradient * value,
         };
         if scattered.radiance.is_finite() && scattered.gradient.is_finite() { scattered } else { Contribution::ZERO }
     }
@@ -192,28 +205,15 @@ impl Arrival {
             sh::zonal::coefficients_with_gradients(
                 &moments[..known],
                 -self.to_light,
-                self.distance,
+                1.0,
                 |k, value, slope| {
                     expansion[k].value += value * self.irradiance * weight;
-                    expansion[k].gradient += (slope * self.irradiance + self.gradient * value) * weight;
+                    expansion[k].gradient += (slope * self.turning + self.gradient * value) * weight;
                 },
             );
         }
         Contribution { radiance: self.irradiance, gradient: self.gradient } * crate::math::float::INV_FOUR_PI
     }
-}
-
-/// Scatters `incoming` irradiance from the fixed direction `to_light` in all directions: as
-/// [`Arrival::scatter_directional`], but without a gradient of the phase function.
-pub fn scatter_directional(
-    to_light: Vec3,
-    incoming: &Contribution,
-    moments: &[Spectrum],
-    expansion: &mut [Coefficient],
-) -> Contribution {
-    let arrival =
-        Arrival { to_light, distance: f32::INFINITY, irradiance: incoming.radiance, gradient: incoming.gradient };
-    arrival.scatter_directional(moments, 1.0, expansion)
 }
 
 /// In-scattered radiance at `point` towards `to_eye` from one source, without shadows, and its

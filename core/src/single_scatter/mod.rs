@@ -19,7 +19,7 @@ mod arrival;
 mod sample;
 mod sums;
 
-pub use arrival::{Arrival, Contribution, connect, moments, scatter_directional};
+pub use arrival::{Arrival, Contribution, connect, moments};
 pub(crate) use sample::lattice;
 pub use sample::{
     Directional, nearest_surface, sample, sample_directional, sample_surfaces, sample_surfaces_directional, shadow_ray,

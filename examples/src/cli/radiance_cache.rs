@@ -102,6 +102,10 @@ pub enum Carrying {
     Linear,
     /// Unchanged.
     Constant,
+    /// Curved
+    Curved,
+    /// Curved
+    CurvedExponential,
 }
 
 impl From<Carrying> for Extrapolation {
@@ -111,6 +115,8 @@ impl From<Carrying> for Extrapolation {
             Carrying::Exponential => Self::Exponential,
             Carrying::Linear => Self::Linear,
             Carrying::Constant => Self::Constant,
+            Carrying::Curved => Self::Curved,
+            Carrying::CurvedExponential => Self::CurvedExponential,
         }
     }
 }
@@ -163,6 +169,9 @@ const PATHS: u32 = 1024;
 
 /// Samples of all lights with extent together, for a record of single scattering.
 const LIGHT_SAMPLES: u32 = 128;
+
+/// Changes of light below this share of the scene's size are noise.
+const FINEST: f32 = 0.01;
 
 /// Number of lights from which on single scattering is cached.
 const MANY_LIGHTS: usize = 12;
@@ -275,6 +284,7 @@ impl WithMedium for CacheJob<'_> {
             },
             paths: self.paths,
             light_samples: (LIGHT_SAMPLES / self.lights.len().max(1) as u32).clamp(1, 16),
+            finest: FINEST * self.world.bounds().size().max_element(),
         };
         let (width, height) = (self.film.width() as f32, self.film.height() as f32);
         let ray = |at: [f32; 2]| -> Ray { self.camera.ray(Vec2::from(at)) };
@@ -303,6 +313,7 @@ impl WithMedium for CacheJob<'_> {
                 walk: estimator.walk,
                 paths: estimator.paths,
                 light_samples: 1,
+                finest: estimator.finest,
             };
             let jitter = uniform2(rng);
             let film = Vec2::new((sample.x as f32 + jitter.x) / width, (sample.y as f32 + jitter.y) / height);
