@@ -70,7 +70,7 @@ impl Default for Settings {
             surface: None,
             multiple: None,
             irradiance: None,
-            extrapolation: Extrapolation::ExponentialMean,
+            extrapolation: Extrapolation::default(),
             rays: 16384,
             margin: 0.15,
             pixels: (1.5, 64.0),

@@ -3,7 +3,7 @@
 use glam::{Vec2, Vec3};
 
 use super::aim::Aims;
-use super::lookup::{Basis, Reading};
+use super::lookup::{Reading, TurningBasis};
 use super::record::Facing;
 use super::store::{SurfaceCache, VolumeCache};
 use crate::host::{Hit, Medium, Properties, Rng, Scene};
@@ -27,9 +27,6 @@ const MIN_COSINE: f32 = 0.05;
 
 /// A number whose multiples, wrapped, are even beside a golden-ratio lattice: the third coordinate.
 const THIRD: f32 = 0.414_213_56;
-
-/// Highest degree read where a walk ends: a phase function still to come smooths what is finer.
-const KNOWN_DEGREE: usize = 3;
 
 /// Direction `j` of `count`, of which every other one is aimed at lights, and the density (sr⁻¹) of the mixture.
 fn aimed(
@@ -190,10 +187,11 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
         let outgoing = |ray: &Ray, hit: &Hit| self.outgoing(ray, hit, &mut child);
         let known = |point: Vec3, to_eye: Vec3, _: &Properties| {
             let [surface, multiple] = self.scattered.as_ref()?;
-            let basis = Basis::new(to_eye, surface.0.degree().max(multiple.0.degree()).min(KNOWN_DEGREE));
-            let mut light = multiple.0.lookup_with_gradient(point, &basis, &multiple.1)?;
-            light += surface.0.lookup_with_gradient(point, &basis, &surface.1)?;
-            Some(light)
+            let basis = TurningBasis::new(to_eye, surface.0.degree().max(multiple.0.degree()));
+            let (mut light, turned) = multiple.0.lookup_with_gradients(point, &basis, &multiple.1)?;
+            let (more, turned_more) = surface.0.lookup_with_gradients(point, &basis, &surface.1)?;
+            light += more;
+            Some((light, turned + turned_more))
         };
         self.steadied(walk.along(ray, end, pdf, u, outgoing, known, rng))
     }

@@ -1,27 +1,26 @@
 //! What several records say about a point: Jarosz et al. 2008, Eq. 35; sheet § 1.10.
 
-use crate::math::float;
-use crate::spectrum::{Gradient, Spectrum};
 use glam::Vec3;
 
-/// How a record is carried to another point.
+use crate::math::float;
+use crate::spectrum::{Gradient, Spectrum};
+
+/// How records are carried to another point, and mixed there.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Extrapolation {
-    /// `L e^{∇L·Δ/L}`, mixed by a weighted geometric mean: exact where light falls off
-    /// exponentially, never negative (Eq. 35).
+    /// `L + ½ (∇L + ∇̄L)·Δ` with the mean gradient `∇̄L` of all records that reach the point: exact for light
+    /// that changes quadratically, where records surround the point. Linear in what the records hold, so
+    /// that noise does not make it darker or brighter.
     #[default]
+    Curved,
+    /// `L e^{∇L·Δ/L}`, mixed by a weighted geometric mean: exact where light falls off
+    /// exponentially, never negative (Eq. 35). A geometric mean of noise is darker than the truth
+    /// by half its variance.
     Exponential,
-    /// `L e^{∇L·Δ/L}`, mixed by a weighted mean. Records are noisy, and a geometric mean of noise is
-    /// darker than the truth by half its variance, again at every bounce that is read from a cache.
-    ExponentialMean,
     /// `L + ∇L·Δ`, mixed by a weighted mean.
     Linear,
     /// `L`, mixed by a weighted mean.
     Constant,
-    /// Linear, second order.
-    Curved,
-    /// Log, second order.
-    CurvedExponential,
 }
 
 /// Weight of a record at `1 − distance/radius`: `d² (3 − 2d)`, from 0 at the edge to 1.
@@ -50,14 +49,20 @@ pub fn exponent_limit(tolerance: f32) -> f32 {
 /// L = (W₊/W) exp(Σ_{L_k>0} w_k (ln L_k + ∇L_k·Δ_k/L_k) / W₊)
 /// ```
 ///
-/// per channel, with `W = Σ w_k` and `W₊` the part of it from records with `L_k > 0`: Eq. 35 where
-/// all are positive, and no blackening of everything by one black record where not.
+/// per channel when carried exponentially, with `W = Σ w_k` and `W₊` the part of it from records with
+/// `L_k > 0`: Eq. 35 where all are positive, and no blackening of everything by one black record where not.
+///
+/// ```text
+/// L = Σ w_k (L_k + ½ ∇L_k·Δ_k) / W + ½ (Σ w_k ∇L_k / W)·(Σ w_k Δ_k / W)
+/// ```
+///
+/// when curved: the error is that of `½ ∇²L` at the square of the mean `Δ_k`, not at the mean of their squares.
 ///
 /// ```
-/// # use fogbow::{cache::{Blend, Extrapolation}, spectrum::Spectrum};
+/// # use fogbow::{cache::{Blend, Extrapolation}, math::Vec3, spectrum::{Gradient, Spectrum}};
 /// let mut blend = Blend::new(Extrapolation::Exponential, 4.0);
-/// blend.add(0.5, Spectrum::splat(2.0), Spectrum::splat(0.0));
-/// blend.add(0.5, Spectrum::splat(8.0), Spectrum::splat(0.0));
+/// blend.add(0.5, Spectrum::splat(2.0), &Gradient::ZERO, Vec3::ZERO);
+/// blend.add(0.5, Spectrum::splat(8.0), &Gradient::ZERO, Vec3::ZERO);
 /// assert!((blend.value().unwrap()[0] - 4.0).abs() < 1e-6);   // the geometric mean
 /// ```
 #[derive(Debug, Clone, Copy)]
@@ -76,35 +81,29 @@ impl Blend {
     #[inline]
     #[must_use]
     pub fn new(kind: Extrapolation, limit: f32) -> Self {
-        Self { kind, limit, total: 0.0, sum: Spectrum::ZERO, positive: Spectrum::ZERO, slope: Gradient::ZERO, offset: Vec3::ZERO }
+        Self {
+            kind,
+            limit,
+            total: 0.0,
+            sum: Spectrum::ZERO,
+            positive: Spectrum::ZERO,
+            slope: Gradient::ZERO,
+            offset: Vec3::ZERO,
+        }
     }
 
-    /// Adds a record's value and its change `∇L·Δ` on the way to the point.
+    /// Adds a record's value and gradient, and the way `Δ` (m) from it to the point.
     #[inline]
     pub fn add(&mut self, weight: f32, value: Spectrum, gradient: &Gradient, offset: Vec3) {
         self.total += weight;
-        let change = gradient.along(offset);
         match self.kind {
             Extrapolation::Curved => {
-                self.sum += (value + change * 0.5) * weight;
+                self.sum += (value + gradient.along(offset) * 0.5) * weight;
                 self.slope += *gradient * weight;
                 self.offset += offset * weight;
             }
-            Extrapolation::CurvedExponential => {
-                self.offset += offset * weight;
-                let mut inverse = Spectrum::ZERO;
-                for channel in 0..3 {
-                    let l = value[channel];
-                    if l > 0.0 {
-                        let exponent = (change[channel] / l).clamp(-self.limit, self.limit);
-                        self.sum[channel] += weight * (float::ln(l) + 0.5 * exponent);
-                        self.positive[channel] += weight;
-                        inverse[channel] = weight / l;
-                    }
-                }
-                self.slope += *gradient * inverse;
-            }
             Extrapolation::Exponential => {
+                let change = gradient.along(offset);
                 for channel in 0..3 {
                     let l = value[channel];
                     if l > 0.0 {
@@ -114,15 +113,7 @@ impl Blend {
                     }
                 }
             }
-            Extrapolation::ExponentialMean => {
-                for channel in 0..3 {
-                    let (l, change) = (value[channel], change[channel]);
-                    // Negative lobes of truncated expansions are part of the mean.
-                    let carried = if l > 0.0 { l * grown(change / l) } else { l };
-                    self.sum[channel] += weight * carried;
-                }
-            }
-            Extrapolation::Linear => self.sum += (value + change) * weight,
+            Extrapolation::Linear => self.sum += (value + gradient.along(offset)) * weight,
             Extrapolation::Constant => self.sum += value * weight,
         }
     }
@@ -142,36 +133,11 @@ impl Blend {
             return None;
         }
         Some(match self.kind {
-            Extrapolation::Curved => (self.sum + self.slope.along(self.offset) * (0.5 / self.total)) / self.total,
-            Extrapolation::CurvedExponential => {
-                let bend = self.slope.along(self.offset) * (0.5 / self.total);
-                (self.sum + bend).zip(self.positive, |sum, positive| {
-                    if positive > 0.0 { positive / self.total * float::exp(sum / positive) } else { 0.0 }
-                })
-            }
+            Extrapolation::Curved => (self.sum + self.slope.along(self.offset / self.total) * 0.5) / self.total,
             Extrapolation::Exponential => self.sum.zip(self.positive, |sum, positive| {
                 if positive > 0.0 { positive / self.total * float::exp(sum / positive) } else { 0.0 }
             }),
-            Extrapolation::ExponentialMean => (self.sum / self.total).max(Spectrum::ZERO),
             Extrapolation::Linear | Extrapolation::Constant => self.sum / self.total,
         })
     }
-}
-
-/// `eˣ` up to `x = 1`, straight on beyond: a value that nearly vanishes in one direction must not explode
-/// by what its slope is in that direction.
-#[inline]
-fn grown(x: f32) -> f32 {
-    use core::f32::consts::E;
-    if x > 1.0 {
-        return E * x;
-    }
-    if x < -1.0 {
-        return float::exp(x);
-    }
-    // The fourth power of a series: 10⁻⁶.
-    let y = 0.25 * x;
-    let e = 1.0 + y * (1.0 + y * (0.5 + y * (1.0 / 6.0 + y * (1.0 / 24.0 + y * (1.0 / 120.0)))));
-    let e = e * e;
-    e * e
 }

@@ -6,7 +6,7 @@ use super::extrapolate::{Blend, Extrapolation, exponent_limit, weight};
 use super::record::{Facing, Record};
 use super::store::{SurfaceCache, VolumeCache};
 use crate::math::float;
-use crate::sh::{self, MAX_COEFFICIENTS};
+use crate::sh::{self, Coefficient, MAX_COEFFICIENTS};
 use crate::single_scatter::Contribution;
 use crate::spectrum::{Gradient, Spectrum};
 
@@ -29,10 +29,10 @@ pub struct Reading {
 }
 
 impl Reading {
-    /// Records made with `tolerance`, carried exponentially.
+    /// Records made with `tolerance`, carried in the best way there is.
     #[must_use]
     pub fn new(tolerance: f32) -> Self {
-        Self { extrapolation: Extrapolation::ExponentialMean, tolerance, margin: 0.0 }
+        Self { extrapolation: Extrapolation::default(), tolerance, margin: 0.0 }
     }
 
     fn blend(&self) -> Blend {
@@ -68,6 +68,37 @@ impl Basis {
     #[must_use]
     pub fn covers(&self, degree: usize) -> bool {
         self.count >= sh::coefficient_count(degree)
+    }
+}
+
+/// Highest degree of a [`TurningBasis`].
+pub const TURNING_DEGREE: usize = 3;
+
+const TURNING_COEFFICIENTS: usize = (TURNING_DEGREE + 1) * (TURNING_DEGREE + 1);
+
+/// [`Basis`] up to degree [`TURNING_DEGREE`] with tangential gradients.
+#[derive(Debug, Clone, Copy)]
+pub struct TurningBasis {
+    basis: Basis,
+    slopes: [Vec3; TURNING_COEFFICIENTS],
+}
+
+impl TurningBasis {
+    /// Up to `degree`, at most [`TURNING_DEGREE`], towards `to_eye` (unit).
+    #[must_use]
+    pub fn new(to_eye: Vec3, degree: usize) -> Self {
+        let degree = degree.min(TURNING_DEGREE);
+        let count = sh::coefficient_count(degree);
+        let mut basis = Basis { values: [0.0; MAX_COEFFICIENTS], count };
+        let mut slopes = [Vec3::ZERO; TURNING_COEFFICIENTS];
+        sh::evaluate_with_gradients(to_eye, degree, &mut basis.values[..count], &mut slopes[..count]);
+        Self { basis, slopes }
+    }
+
+    /// How an expansion changes as the direction turns.
+    fn turned(&self, higher: &[Coefficient]) -> Gradient {
+        let slopes = self.slopes.get(1..self.basis.count).unwrap_or(&[]);
+        higher.iter().zip(slopes).fold(Gradient::ZERO, |sum, (c, slope)| sum + Gradient::outer(c.value, *slope))
     }
 }
 
@@ -120,13 +151,18 @@ impl VolumeCache<'_> {
         blend.value()
     }
 
-    /// [`VolumeCache::lookup`] with the gradient of the mixture, weights held: what random walks that end
-    /// at a record carry to their start.
+    /// [`VolumeCache::lookup`] with the gradients of the mixture, weights held, as the point moves and as the
+    /// direction turns: what random walks that end at a record carry to their start.
     #[must_use]
-    pub fn lookup_with_gradient(&self, point: Vec3, basis: &Basis, reading: &Reading) -> Option<Contribution> {
+    pub fn lookup_with_gradients(
+        &self,
+        point: Vec3,
+        basis: &TurningBasis,
+        reading: &Reading,
+    ) -> Option<(Contribution, Gradient)> {
         let mut blend = reading.blend();
-        let mut slope = Gradient::ZERO;
-        let higher = basis.higher();
+        let (mut slope, mut turned) = (Gradient::ZERO, Gradient::ZERO);
+        let higher = basis.basis.higher();
         self.visit(point, |i, record, share| {
             let d = 1.0 - share - reading.margin;
             if d <= 0.0 {
@@ -136,9 +172,11 @@ impl VolumeCache<'_> {
             let weight = weight(d);
             blend.add(weight, value, &gradient, point - record.position);
             slope += gradient * weight;
+            turned += basis.turned(self.attached(i)) * weight;
         });
         let radiance = blend.value()?;
-        Some(Contribution { radiance, gradient: slope * (1.0 / blend.weight()) })
+        let share = 1.0 / blend.weight();
+        Some((Contribution { radiance, gradient: slope * share }, turned * share))
     }
 
     /// Whether a record reaches `point`.

@@ -42,7 +42,7 @@ pub use estimate::Estimator;
 pub use extrapolate::{Blend, Extrapolation, exponent_limit, weight};
 pub use eye::{Caches, EyeSettings, Place, Reader, Seen, places, radiance};
 pub use index::{Block, Index, Node};
-pub use lookup::{Basis, Reading};
+pub use lookup::{Basis, Reading, TURNING_DEGREE, TurningBasis};
 pub use radius::{Limits, clamp_gradient, log_gradient_radius, neighbour_clamped, valid_radius};
 pub use record::{Facing, Record};
 pub use store::{Cache, SurfaceCache, VolumeCache};

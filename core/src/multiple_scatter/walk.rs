@@ -7,6 +7,7 @@ use super::flight::{Collision, Lengths, fly, own};
 use crate::host::{Hit, Medium, Properties, Rng, Scene};
 use crate::light::{Falloff, Light};
 use crate::math::{Ray, float};
+use crate::phase::Phase;
 use crate::sampling::discrete::choose;
 use crate::sampling::distance::Equiangular;
 use crate::sampling::{Generator, uniform, uniform2, warp};
@@ -94,8 +95,8 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Walk<'_, M, S> {
     /// changes as the origin moves and the vertices with it ([`Shift`]). `u`, in [0, 1), decides the first length.
     ///
     /// `known(point, to_eye, properties)` may answer for all light but that straight from the lights
-    /// that is scattered towards `to_eye` at a collision (W·m⁻²·sr⁻¹), with its gradient: then the
-    /// path ends there. Other arguments as for [`Walk::path`].
+    /// that is scattered towards `to_eye` at a collision (W·m⁻²·sr⁻¹), with its gradients as the point moves
+    /// and as `to_eye` turns: then the path ends there. Other arguments as for [`Walk::path`].
     pub fn along(
         &self,
         mut ray: Ray,
@@ -103,7 +104,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Walk<'_, M, S> {
         pdf: f32,
         mut u: f32,
         mut outgoing: impl FnMut(&Ray, &Hit) -> Spectrum,
-        mut known: impl FnMut(Vec3, Vec3, &Properties) -> Option<Contribution>,
+        mut known: impl FnMut(Vec3, Vec3, &Properties) -> Option<(Contribution, Gradient)>,
         rng: &mut (impl Rng + ?Sized),
     ) -> Incoming {
         let rng = &mut own(rng);
@@ -140,9 +141,9 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Walk<'_, M, S> {
                 weight = weight.scaled(1.0 / survival);
             }
             let to_eye = -ray.direction;
-            add(&mut total, &weight, &self.lights_at(at, to_eye, &properties, rng));
-            if let Some(light) = known(at, to_eye, &properties) {
-                add(&mut total, &weight, &light);
+            self.lights_at(at, to_eye, &properties, &weight, &mut total, rng);
+            if let Some((light, turned)) = known(at, to_eye, &properties) {
+                add(&mut total, weight.turn, &weight.carry_turned(&light, &turned));
                 break;
             }
 
@@ -157,7 +158,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Walk<'_, M, S> {
                 let radiance = outgoing(&ray, &hit);
                 let arrival = Arrival::from_surface(&ray, &hit, radiance, turn.pdf, self.medium, marching);
                 if let Some(arrival) = arrival {
-                    add(&mut total, &weight, &arrival.scatter(to_eye, &properties.phase));
+                    add_scattered(&mut total, &weight, &arrival, to_eye, &properties.phase);
                 }
             }
         }
@@ -181,22 +182,28 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Walk<'_, M, S> {
     }
 
     /// Single scattering at a vertex of the lights in whose near field it does not lie.
-    fn lights_at(&self, at: Vec3, to_eye: Vec3, properties: &Properties, rng: &mut Generator) -> Contribution {
+    fn lights_at(
+        &self,
+        at: Vec3,
+        to_eye: Vec3,
+        properties: &Properties,
+        weight: &Weight,
+        total: &mut Incoming,
+        rng: &mut Generator,
+    ) {
         let importance = |light: &Light<'_>| {
             let near = light.steep_field().is_some_and(|field| field.contains(at));
             if near { 0.0 } else { light.importance(at) }
         };
-        let mut sum = Contribution::ZERO;
         self.each_light(importance, rng, |light, share, rng| {
             let mut sample = light.sample(at, uniform2(rng))?;
             sample.source.weight = sample.source.weight / share;
             let arrival = Arrival::from_source(at, self.medium, &sample.source, self.marching(rng), 0.0)?;
             if !self.scene.is_blocked(&shadow_ray(at, &sample.source)) {
-                sum += arrival.scatter(to_eye, &properties.phase);
+                add_scattered(total, weight, &arrival, to_eye, &properties.phase);
             }
             Some(())
         });
-        sum
     }
 
     /// Light scattered somewhere along a segment within a light's near field, carried to the start.
@@ -240,7 +247,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Walk<'_, M, S> {
             let through = segment.value.transmitted();
             let shift = Shift::new(ray, end, reach, distance);
             let joined = weight.advance_by(&shift, frozen, through, &segment, properties.scattering, &slope);
-            add(total, &joined, &arrival.scatter(-ray.direction, &properties.phase));
+            add_scattered(total, &joined, &arrival, -ray.direction, &properties.phase);
             Some(())
         });
     }
@@ -267,13 +274,23 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Walk<'_, M, S> {
     }
 }
 
-/// Adds light at a path's last vertex.
+/// Adds what a path's last vertex scatters of an arrival.
+fn add_scattered(total: &mut Incoming, weight: &Weight, arrival: &Arrival, to_eye: Vec3, phase: &Phase) {
+    let light = arrival.scatter(to_eye, phase);
+    let carried = if phase.is_isotropic() {
+        weight.carry(&light)
+    } else {
+        weight.carry_turned(&light, &arrival.turned(to_eye, phase))
+    };
+    add(total, weight.turn, &carried);
+}
+
+/// Adds light that has been carried to the start.
 #[inline]
-fn add(total: &mut Incoming, weight: &Weight, light: &Contribution) {
-    let carried = weight.carry(light);
+fn add(total: &mut Incoming, turn: Option<f32>, carried: &Contribution) {
     total.irradiance += carried.radiance;
     total.gradient += carried.gradient;
-    total.turning += carried.radiance * weight.turn.unwrap_or(0.0);
+    total.turning += carried.radiance * turn.unwrap_or(0.0);
 }
 
 /// Distance (m) of a light from a ray: its light along the ray sums up to about π over this.

@@ -76,6 +76,8 @@ pub struct Weight {
     pub moved: f32,
     /// How the first direction turns (m⁻¹), see [`Shift::turn`]; `None` before the first vertex.
     pub turn: Option<f32>,
+    /// How the last direction turns (m⁻¹).
+    pub last_turn: f32,
 }
 
 impl Default for Weight {
@@ -86,7 +88,7 @@ impl Default for Weight {
 
 impl Weight {
     /// Of a path without vertices.
-    pub const ONE: Self = Self { value: Spectrum::ONE, gradient: Gradient::ZERO, moved: 1.0, turn: None };
+    pub const ONE: Self = Self { value: Spectrum::ONE, gradient: Gradient::ZERO, moved: 1.0, turn: None, last_turn: 0.0 };
 
     /// One vertex on.
     ///
@@ -150,6 +152,7 @@ impl Weight {
             gradient: self.gradient * step + slope * (frozen * self.value * self.moved),
             moved: self.moved * shift.share,
             turn: self.turn.or(Some(shift.turn)),
+            last_turn: self.moved * shift.turn,
         }
     }
 
@@ -167,6 +170,16 @@ impl Weight {
             radiance: self.value * light.radiance,
             gradient: self.gradient * light.radiance + light.gradient * (self.value * self.moved),
         }
+    }
+
+    /// [`Weight::carry`] of light that changes with the direction in which it leaves the last vertex, too:
+    /// `turned` is its tangential gradient (W·m⁻²·sr⁻¹ per radian).
+    #[inline]
+    #[must_use]
+    pub fn carry_turned(&self, light: &Contribution, turned: &Gradient) -> Contribution {
+        let carried = self.carry(light);
+        let gradient = carried.gradient + *turned * (self.value * self.last_turn);
+        Contribution { gradient, ..carried }
     }
 
     /// Both parts times a factor: one over a probability of survival.

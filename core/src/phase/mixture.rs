@@ -69,6 +69,13 @@ impl Phase {
         count: 1,
     };
 
+    /// Whether light is scattered alike in all directions.
+    #[inline]
+    #[must_use]
+    pub fn is_isotropic(&self) -> bool {
+        self.lobes[..self.count].iter().all(|lobe| *lobe == Lobe::Isotropic)
+    }
+
     /// Fog or cloud of water droplets of `diameter` (µm, in [5, 50]): the blend of
     /// Henyey–Greenstein and Draine fitted by Jendersie and d'Eon 2023.
     ///

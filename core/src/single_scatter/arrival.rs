@@ -185,6 +185,16 @@ impl Arrival {
         if scattered.radiance.is_finite() && scattered.gradient.is_finite() { scattered } else { Contribution::ZERO }
     }
 
+    /// How what is scattered towards `to_eye` changes as that direction turns: a tangential gradient
+    /// (W·m⁻²·sr⁻¹ per radian).
+    #[inline]
+    #[must_use]
+    pub fn turned(&self, to_eye: Vec3, phase: &Phase) -> Gradient {
+        let slope = phase.derivative(phase::deflection(self.to_light, to_eye));
+        let turned = Gradient::outer(slope * self.irradiance, to_eye * to_eye.dot(self.to_light) - self.to_light);
+        if turned.is_finite() { turned } else { Gradient::ZERO }
+    }
+
     /// Scattered once in all directions: adds `weight` times the coefficients and their gradients
     /// to `expansion`, and returns the mean over directions, `E/(4π)`.
     ///

@@ -94,29 +94,23 @@ impl CacheArguments {
 /// How records are carried to other points.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum Carrying {
-    /// Exponentially, mixed by their mean.
-    ExponentialMean,
+    /// Along the mean of gradients: exact for light that changes quadratically.
+    Curved,
     /// Exponentially, mixed by their geometric mean: as Jarosz et al. do.
     Exponential,
     /// Along the gradient.
     Linear,
     /// Unchanged.
     Constant,
-    /// Curved
-    Curved,
-    /// Curved
-    CurvedExponential,
 }
 
 impl From<Carrying> for Extrapolation {
     fn from(carrying: Carrying) -> Self {
         match carrying {
-            Carrying::ExponentialMean => Self::ExponentialMean,
+            Carrying::Curved => Self::Curved,
             Carrying::Exponential => Self::Exponential,
             Carrying::Linear => Self::Linear,
             Carrying::Constant => Self::Constant,
-            Carrying::Curved => Self::Curved,
-            Carrying::CurvedExponential => Self::CurvedExponential,
         }
     }
 }
@@ -221,15 +215,15 @@ impl CacheJob<'_> {
             Single::Direct => false,
             Single::Cached => true,
         };
-        // Gradients through changing extinction are noisy, and exponentials of noise are too bright.
-        let carrying = if self.world.media().is_homogeneous() { Carrying::ExponentialMean } else { Carrying::Linear };
+        // Expansions change faster than the mean over directions, from which radii come.
+        let sharpness = 1.0 - f64::from(phase.mean_cosine().map(f32::abs).max_element());
         cache::Settings {
             single: if cached { effort(Kind::Single, 0.2, 16.0, degree(1, 0.0), 0.1) } else { None },
             surface: effort(Kind::Surface, 2.0, 256.0, degree(1, 1.5), 0.1),
-            multiple: effort(Kind::Multiple, 1.0, 512.0, degree(2, 0.0), 0.1),
+            multiple: effort(Kind::Multiple, sharpness.max(0.1), 512.0, degree(2, 0.0), 0.1),
             irradiance: effort(Kind::Irradiance, 0.35, 256.0, 0, 0.1),
             rays: 16384,
-            extrapolation: arguments.extrapolation.unwrap_or(carrying).into(),
+            extrapolation: arguments.extrapolation.map_or_else(Extrapolation::default, Into::into),
             margin: 0.15,
             pixels: (1.5, 64.0),
             round: 64,
