@@ -26,7 +26,7 @@ use fogbow_std::stats::Stopwatch;
 
 const SAMPLES: u32 = 256;
 const REPEATS: u64 = 24;
-const RAYS: u32 = 24;
+const RAYS: u32 = 60;
 
 struct Job<'a>(&'a World<'a>);
 

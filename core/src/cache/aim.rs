@@ -2,8 +2,9 @@
 
 use glam::{Vec2, Vec3};
 
+use crate::host::Scene;
 use crate::light::Light;
-use crate::math::{Frame, float};
+use crate::math::{Frame, Ray, float};
 use crate::sampling::discrete::choose;
 use crate::sampling::warp;
 
@@ -35,7 +36,13 @@ struct Cone {
 }
 
 impl Aims {
-    pub(super) fn new(point: Vec3, lights: &[Light<'_>], is_aim: impl Fn(&Light<'_>) -> bool) -> Self {
+    /// Those that `is_aim` and whose surroundings are seen from `point`.
+    pub(super) fn new(
+        point: Vec3,
+        lights: &[Light<'_>],
+        scene: &(impl Scene + ?Sized),
+        is_aim: impl Fn(&Light<'_>) -> bool,
+    ) -> Self {
         let mut cones = heapless::Vec::new();
         for light in lights {
             let Some(field) = light.near_field().filter(|_| is_aim(light)) else { continue };
@@ -52,7 +59,11 @@ impl Aims {
             if !(weight > 0.0 && weight < f32::INFINITY && sine < WIDEST) {
                 continue;
             }
-            let cone = Cone { axis: offset / distance, height: 1.0 - float::safe_sqrt(1.0 - sine * sine), weight };
+            let axis = offset / distance;
+            if scene.is_blocked(&Ray { origin: point, direction: axis, length: distance - radius }) {
+                continue;
+            }
+            let cone = Cone { axis, height: 1.0 - float::safe_sqrt(1.0 - sine * sine), weight };
             if let Err(cone) = cones.push(cone)
                 && let Some(weakest) = cones.iter_mut().min_by(|a, b| a.weight.total_cmp(&b.weight))
                 && weakest.weight < cone.weight

@@ -3,6 +3,7 @@
 use glam::{Vec2, Vec3};
 
 use super::aim::Aims;
+use super::guide::{Guided, Looks};
 use super::lookup::{Reading, TurningBasis};
 use super::record::Facing;
 use super::store::{SurfaceCache, VolumeCache};
@@ -28,26 +29,38 @@ const MIN_COSINE: f32 = 0.05;
 /// A number whose multiples, wrapped, are even beside a golden-ratio lattice: the third coordinate.
 const THIRD: f32 = 0.414_213_56;
 
-/// Direction `j` of `count`, of which every other one is aimed at lights, and the density (sr⁻¹) of the mixture.
-fn aimed(
-    aims: &Aims,
-    j: u32,
+/// A mixture of densities of directions, each with an equal part of the samples: a given one, one towards
+/// lights, and one that was learnt.
+struct Mixture<'a> {
+    aims: Aims,
+    guide: Option<&'a Guided>,
     count: u32,
     shift: Vec2,
-    sample: impl Fn(Vec2) -> Vec3,
-    pdf: impl Fn(Vec3) -> f32,
-) -> (Vec3, f32) {
-    if aims.is_empty() {
-        let direction = sample(single_scatter::lattice(j, count, shift));
-        return (direction, pdf(direction));
+}
+
+impl Mixture<'_> {
+    /// Direction `j` with the density (sr⁻¹) of the mixture.
+    fn direction(&self, j: u32, sample: impl Fn(Vec2) -> Vec3, pdf: impl Fn(Vec3) -> f32) -> (Vec3, f32) {
+        let has_aims = !self.aims.is_empty();
+        let kinds = 1 + u32::from(has_aims) + u32::from(self.guide.is_some());
+        let of_kind = |kind: u32| (self.count + kinds - 1 - kind) / kinds;
+        let at = single_scatter::lattice(j / kinds, of_kind(j % kinds), self.shift);
+        let direction = match (j % kinds, self.guide) {
+            (0, _) => sample(at),
+            (1, _) if has_aims => self.aims.sample(at),
+            (_, Some(guide)) => guide.sample(at),
+            _ => self.aims.sample(at),
+        };
+        let share = |kind: u32| of_kind(kind) as f32 / self.count as f32;
+        let mut density = share(0) * pdf(direction);
+        if has_aims {
+            density += share(1) * self.aims.pdf(direction);
+        }
+        if let Some(guide) = self.guide {
+            density += share(kinds - 1) * guide.pdf(direction);
+        }
+        (direction, density)
     }
-    let share = (count / 2) as f32 / count as f32;
-    let direction = if j.is_multiple_of(2) {
-        sample(single_scatter::lattice(j / 2, count.div_ceil(2), shift))
-    } else {
-        aims.sample(single_scatter::lattice(j / 2, count / 2, shift))
-    };
-    (direction, (1.0 - share) * pdf(direction) + share * aims.pdf(direction))
 }
 
 /// Estimates the light that the caches hold.
@@ -109,29 +122,33 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
 
     /// Light from surfaces, scattered once at `point`, from `directions` directions. As
     /// [`Estimator::single`].
-    pub fn surface(
+    pub fn surface<'g>(
         &self,
         point: Vec3,
         phase: &Phase,
-        directions: u32,
+        directions: impl Into<Looks<'g>>,
         higher: &mut [Coefficient],
         rng: &mut impl Rng,
     ) -> Sums {
         let (mut child, shift) = (Generator::child(rng), uniform2(rng));
+        let Looks { count, guide, mut learnt } = directions.into();
         let World { medium, scene, lights } = self.world;
         // Rectangles light what lies before them, not what surrounds them.
-        let aims = Aims::new(point, lights, |light| !matches!(light, Light::Quad(_)));
+        let aims = Aims::new(point, lights, scene, |light| !matches!(light, Light::Quad(_)));
+        let mixture = Mixture { aims, guide, count, shift };
         self.expanded(phase, higher, |into| {
             let mut sums = Sums::default();
-            for j in 0..directions {
-                let (direction, pdf) =
-                    aimed(&aims, j, directions, shift, warp::uniform_sphere, |_| warp::uniform_sphere_pdf());
+            for j in 0..count {
+                let (direction, pdf) = mixture.direction(j, warp::uniform_sphere, |_| warp::uniform_sphere_pdf());
                 let ray = Ray::new(point, direction);
                 let marching = Marching { steps: self.walk.steps, offset: uniform(rng) };
                 let Some(hit) = nearest_surface(&ray, scene) else { continue };
                 let radiance = self.outgoing(&ray, &hit, &mut child);
-                let pdf = pdf * directions as f32;
-                if let Some(arrival) = Arrival::from_surface(&ray, &hit, radiance, pdf, medium, marching) {
+                let total = pdf * count as f32;
+                if let Some(arrival) = Arrival::from_surface(&ray, &hit, radiance, total, medium, marching) {
+                    if let Some(learnt) = &mut learnt {
+                        learnt.add(direction, arrival.irradiance.mean() * count as f32, pdf, count);
+                    }
                     let arrival = self.steadied(arrival);
                     sums.add(&arrival.scatter_directional(into.moments, 1.0, into.coefficients), true);
                 }
@@ -142,26 +159,30 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
 
     /// Light scattered more than once, the last time at `point`, from `paths` random walks. As
     /// [`Estimator::single`].
-    pub fn multiple(
+    pub fn multiple<'g>(
         &self,
         point: Vec3,
         phase: &Phase,
-        paths: u32,
+        paths: impl Into<Looks<'g>>,
         higher: &mut [Coefficient],
         rng: &mut impl Rng,
     ) -> Sums {
         let (walk, shift, third) = (self.walker(), uniform2(rng), uniform(rng));
-        let share = 1.0 / paths.max(1) as f32;
-        let aims = Aims::new(point, self.world.lights, |_| true);
+        let Looks { count, guide, mut learnt } = paths.into();
+        let share = 1.0 / count.max(1) as f32;
+        let aims = Aims::new(point, self.world.lights, self.world.scene, |_| true);
+        let mixture = Mixture { aims, guide, count, shift };
         self.expanded(phase, higher, |into| {
             let (mut cones, mut halves) = (Cones::default(), Halves::default());
-            for j in 0..paths {
-                let uniformly = |u| warp::uniform_sphere(u);
-                let (to_light, pdf) = aimed(&aims, j, paths, shift, uniformly, |_| warp::uniform_sphere_pdf());
+            for j in 0..count {
+                let (to_light, pdf) = mixture.direction(j, warp::uniform_sphere, |_| warp::uniform_sphere_pdf());
                 let ray = Ray::new(point, to_light);
                 let end = nearest_surface(&ray, self.world.scene);
                 let u = third + THIRD * j as f32;
                 let incoming = self.walked(&walk, ray, end.as_ref(), pdf, u - libm::floorf(u), rng) * share;
+                if let Some(learnt) = &mut learnt {
+                    learnt.add(to_light, incoming.irradiance.mean() * count as f32, pdf, count);
+                }
                 let mean = incoming.scatter_directional(into.moments, 1.0, into.coefficients);
                 cones.add(to_light, &mean);
                 halves.add(j, &mean.gradient);
@@ -211,17 +232,26 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
     /// E = ∫ cos θ (T L_surface + ∫ T σₛ L_i dt) dω,   ∇E: light from a surface as an area light that
     /// stays, ∇(cos θ) included; light from the medium by translating the path, cos θ frozen
     /// ```
-    pub fn irradiance(&self, point: Vec3, normal: Vec3, paths: u32, rng: &mut impl Rng) -> (Sums, Facing) {
+    pub fn irradiance<'g>(
+        &self,
+        point: Vec3,
+        normal: Vec3,
+        paths: impl Into<Looks<'g>>,
+        rng: &mut impl Rng,
+    ) -> (Sums, Facing) {
+        let Looks { count, guide, mut learnt } = paths.into();
         let (mut sums, mut scattered, mut turn) = (Sums::default(), Cones::default(), Gradient::ZERO);
         let mut halves = Halves::default();
         let mut child = Generator::child(rng);
         let (frame, walk, shift, third) = (Frame::around(normal), self.walker(), uniform2(rng), uniform(rng));
-        let share = 1.0 / paths.max(1) as f32;
-        let aims = Aims::new(point, self.world.lights, |_| true);
-        for j in 0..paths {
+        let share = 1.0 / count.max(1) as f32;
+        let outside = leave(point, normal, normal, 0.0);
+        let aims = Aims::new(outside, self.world.lights, self.world.scene, |_| true);
+        let mixture = Mixture { aims, guide, count, shift };
+        for j in 0..count {
             let upwards = |u| frame.to_world(warp::cosine_hemisphere(u));
             let cosine_pdf = |direction| warp::cosine_hemisphere_pdf(normal.dot(direction).max(0.0));
-            let (to_light, pdf) = aimed(&aims, j, paths, shift, upwards, cosine_pdf);
+            let (to_light, pdf) = mixture.direction(j, upwards, cosine_pdf);
             let cosine = normal.dot(to_light);
             if cosine <= 0.0 {
                 continue;
@@ -247,6 +277,9 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
             let light = tilted(&light, tilt) * weight;
             scattered.add(to_light, &light);
             total += light;
+            if let Some(learnt) = &mut learnt {
+                learnt.add(to_light, total.radiance.mean() * count as f32, pdf, count);
+            }
             halves.add(j, &total.gradient);
             turn += Gradient::outer(total.radiance, to_light / cosine.max(MIN_COSINE));
         }

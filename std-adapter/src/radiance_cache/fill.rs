@@ -14,7 +14,8 @@ use core::fmt;
 
 use fogbow::cache::bytes::Crc;
 use fogbow::cache::{
-    Cache, Estimator, EyeSettings, Facing, Place, Reading, Record, SurfaceCache, VolumeCache, clamp_gradient, places,
+    Cache, Estimator, EyeSettings, Facing, Guide, Guided, Looks, Place, Reading, Record, SurfaceCache, VolumeCache,
+    clamp_gradient, places,
 };
 use fogbow::host::{Medium, Scene};
 use fogbow::math::{Ray, Vec3};
@@ -121,6 +122,8 @@ trait Fill: Sync {
     fn count(&self) -> usize;
     fn finish(&mut self);
     fn record(&self, number: usize) -> (Place, f32);
+    /// Calls `visit(number, weight)` for the records that reach `point`.
+    fn visit_near(&self, point: Vec3, visit: impl FnMut(usize, f32));
     fn replace(&mut self, number: usize, sums: &Sums, gradient: &Gradient, attached: Self::Attached);
 }
 
@@ -145,6 +148,9 @@ impl Fill for VolumeCache<'_> {
     fn record(&self, number: usize) -> (Place, f32) {
         let record = &self.records()[number];
         (Place { point: record.position, normal: None, is_seen: true }, record.radius)
+    }
+    fn visit_near(&self, point: Vec3, mut visit: impl FnMut(usize, f32)) {
+        self.visit(point, |number, _, share| visit(number as usize, 1.0 - share));
     }
     fn replace(&mut self, number: usize, sums: &Sums, gradient: &Gradient, higher: Vec<Coefficient>) {
         self.revise(number as u32, sums.value, gradient, &higher);
@@ -173,6 +179,9 @@ impl Fill for SurfaceCache<'_> {
         let normal = self.attached(number as u32).first().map(|facing| facing.normal);
         (Place { point: record.position, normal, is_seen: false }, record.radius)
     }
+    fn visit_near(&self, point: Vec3, mut visit: impl FnMut(usize, f32)) {
+        self.visit(point, |number, _, share| visit(number as usize, 1.0 - share));
+    }
     fn replace(&mut self, number: usize, sums: &Sums, gradient: &Gradient, facing: Facing) {
         self.revise(number as u32, sums.value, gradient, &[facing]);
     }
@@ -197,11 +206,16 @@ enum Part {
     Multiple,
 }
 
+/// Samples drawn blindly, for others to learn from.
+fn looks(count: u32, learnt: &mut Guide) -> Looks<'_> {
+    Looks { count, guide: None, learnt: Some(learnt) }
+}
+
 /// An estimate for a record in the medium.
 fn scattered<M: Medium + ?Sized, S: Scene + ?Sized>(
     cache: &VolumeCache<'_>,
     estimator: &Estimator<'_, M, S>,
-    samples: u32,
+    looks: Looks<'_>,
     place: &Place,
     rng: &mut Generator,
     part: Part,
@@ -210,8 +224,8 @@ fn scattered<M: Medium + ?Sized, S: Scene + ?Sized>(
     let phase = estimator.phase(place.point);
     let sums = match part {
         Part::Single => estimator.single(place.point, &phase, &mut higher, rng),
-        Part::Surface => estimator.surface(place.point, &phase, samples, &mut higher, rng),
-        Part::Multiple => estimator.multiple(place.point, &phase, samples, &mut higher, rng),
+        Part::Surface => estimator.surface(place.point, &phase, looks, &mut higher, rng),
+        Part::Multiple => estimator.multiple(place.point, &phase, looks, &mut higher, rng),
     };
     (sums, higher)
 }
@@ -219,27 +233,37 @@ fn scattered<M: Medium + ?Sized, S: Scene + ?Sized>(
 /// An estimate for a record on a surface.
 fn irradiance<M: Medium + ?Sized, S: Scene + ?Sized>(
     estimator: &Estimator<'_, M, S>,
-    samples: u32,
+    looks: Looks<'_>,
     place: &Place,
     rng: &mut Generator,
 ) -> (Sums, Facing) {
-    estimator.irradiance(place.point, place.normal.unwrap_or(Vec3::Z), samples, rng)
+    estimator.irradiance(place.point, place.normal.unwrap_or(Vec3::Z), looks, rng)
 }
 
-/// Puts revised estimates in the place of the old ones, from a record on.
-fn put<C: Fill>(cache: &mut Option<C>, effort: Option<Effort>, from: usize, revised: Revised<C::Attached>) -> u64 {
+/// Puts revised estimates in the place of the old ones, from a record on, and adds to what was learnt.
+fn put<C: Fill>(
+    cache: &mut Option<C>,
+    effort: Option<Effort>,
+    from: usize,
+    revised: Revised<C::Attached>,
+    guides: &mut [Guide],
+) -> u64 {
     let (Some(cache), Some(effort)) = (cache, effort) else { return 0 };
     let count = revised.len() as u64;
-    for (number, (sums, attached)) in (from..).zip(revised) {
+    for (i, (sums, attached, learnt)) in revised.into_iter().enumerate() {
         // Within its radius a record changes by a factor of e to the tolerance at most.
+        let number = from + i;
         let reach = cache.record(number).1 / effort.tolerance;
         cache.replace(number, &sums, &clamp_gradient(&sums.gradient, sums.value, reach), attached);
+        if let Some(guide) = guides.get_mut(i) {
+            guide.merge(&learnt, 1.0);
+        }
     }
     count
 }
 
-/// Estimates for the records of a cache, in their order.
-type Revised<A> = Vec<(Sums, A)>;
+/// Estimates for the records of a cache, in their order, with what they learnt.
+type Revised<A> = Vec<(Sums, A, Guide)>;
 
 impl<M, S, F> Filler<'_, M, S, F>
 where
@@ -272,44 +296,46 @@ where
             caches.multiple.as_ref().map_or(0, Fill::count),
             caches.irradiance.as_ref().map_or(0, Fill::count),
         ];
+        // What the records made here have learnt, in the order of `before`.
+        let mut guides: [Vec<Guide>; 5] = Default::default();
         // What lights everything else: coarse, because whoever asks sees many records at once. Made by
         // whole walks, and few, because it is revised with what those have told.
         if let (Some(cache), Some(effort)) = (&mut caches.coarse_irradiance, settings.coarse_irradiance()) {
             let clock = Stopwatch::start();
-            outcome.computed[3] += self.rounds(cache, &effort, 4, &all, everywhere, |cache, place, rng| {
+            outcome.computed[3] += self.rounds(cache, &effort, 4, &all, everywhere, &mut guides[0], |cache, place, learnt, rng| {
                 let surfaces = Some((cache, settings.reading(&effort)));
                 let estimator = Estimator { surfaces, ..*self.estimator };
-                irradiance(&estimator, (effort.samples / FIRST_WALKS).max(16), place, rng)
+                irradiance(&estimator, looks((effort.samples / FIRST_WALKS).max(16), learnt), place, rng)
             });
             outcome.seconds[3] = clock.elapsed();
         }
         let estimator = Estimator { surfaces: lighting(&caches.coarse_irradiance, settings), ..*self.estimator };
         if let (Some(cache), Some(effort)) = (&mut caches.surface, settings.surface) {
             let clock = Stopwatch::start();
-            outcome.computed[1] += self.rounds(cache, &effort, 1, &all, in_medium, |cache, place, rng| {
-                scattered(cache, &estimator, effort.samples, place, rng, Part::Surface)
+            outcome.computed[1] += self.rounds(cache, &effort, 1, &all, in_medium, &mut guides[1], |cache, place, learnt, rng| {
+                scattered(cache, &estimator, looks((effort.samples / FIRST_WALKS).max(16), learnt), place, rng, Part::Surface)
             });
             outcome.seconds[1] = clock.elapsed();
         }
         if let (Some(cache), Some(effort)) = (&mut caches.coarse_multiple, settings.coarse_multiple()) {
             let clock = Stopwatch::start();
             let surface = caches.surface.as_ref().zip(settings.surface).map(|(c, e)| (c, settings.reading(&e)));
-            outcome.computed[2] += self.rounds(cache, &effort, 5, &all, in_medium, |cache, place, rng| {
+            outcome.computed[2] += self.rounds(cache, &effort, 5, &all, in_medium, &mut guides[2], |cache, place, learnt, rng| {
                 let scattered_light = surface.map(|surface| [surface, (cache, settings.reading(&effort))]);
                 let estimator = Estimator { scattered: scattered_light, ..estimator };
-                scattered(cache, &estimator, (effort.samples / FIRST_WALKS).max(16), place, rng, Part::Multiple)
+                scattered(cache, &estimator, looks((effort.samples / FIRST_WALKS).max(16), learnt), place, rng, Part::Multiple)
             });
             outcome.seconds[2] = clock.elapsed();
         }
         for pass in 0..REVISIONS {
-            self.revise(caches, before, pass, &mut outcome);
+            self.revise(caches, before, pass, &mut guides, &mut outcome);
         }
 
         let estimator = Estimator { surfaces: lighting(&caches.coarse_irradiance, settings), ..*self.estimator };
         if let (Some(cache), Some(effort)) = (&mut caches.single, settings.single) {
             let clock = Stopwatch::start();
-            outcome.computed[0] = self.rounds(cache, &effort, 0, &all, in_medium, |cache, place, rng| {
-                scattered(cache, &estimator, effort.samples, place, rng, Part::Single)
+            outcome.computed[0] = self.rounds(cache, &effort, 0, &all, in_medium, &mut Vec::new(), |cache, place, learnt, rng| {
+                scattered(cache, &estimator, looks(effort.samples, learnt), place, rng, Part::Single)
             });
             outcome.seconds[0] = clock.elapsed();
         }
@@ -319,8 +345,8 @@ where
             let coarse = caches.coarse_multiple.as_ref().zip(settings.coarse_multiple());
             let known = surface.zip(coarse).map(|(s, (c, e))| [s, (c, settings.reading(&e))]);
             let estimator = Estimator { scattered: known, ..estimator };
-            outcome.computed[2] += self.rounds(cache, &effort, 2, &all, in_medium, |cache, place, rng| {
-                scattered(cache, &estimator, (effort.samples / FIRST_LOOK).max(1), place, rng, Part::Multiple)
+            outcome.computed[2] += self.rounds(cache, &effort, 2, &all, in_medium, &mut guides[3], |cache, place, learnt, rng| {
+                scattered(cache, &estimator, looks((effort.samples / FIRST_LOOK).max(1), learnt), place, rng, Part::Multiple)
             });
             outcome.seconds[2] = outcome.seconds[2] + clock.elapsed();
         }
@@ -328,10 +354,10 @@ where
         let known = surface.zip(caches.multiple.as_ref().zip(settings.multiple));
         let known = known.map(|(s, (c, e))| [s, (c, settings.reading(&e))]);
         let again = Estimator { scattered: known, ..estimator };
-        let revised = self.revised(&caches.multiple, settings.multiple, before[3], 100, |cache, e, place, rng| {
-            scattered(cache, &again, e.samples, place, rng, Part::Multiple)
+        let revised = self.revised(&caches.multiple, settings.multiple, before[3], 100, &guides[3], |cache, looks, place, rng| {
+            scattered(cache, &again, looks, place, rng, Part::Multiple)
         });
-        outcome.computed[2] += put(&mut caches.multiple, settings.multiple, before[3], revised);
+        outcome.computed[2] += put(&mut caches.multiple, settings.multiple, before[3], revised, &mut guides[3]);
         outcome.seconds[2] = outcome.seconds[2] + clock.elapsed();
         let multiple = caches.multiple.as_ref().zip(settings.multiple).map(|(c, e)| (c, settings.reading(&e)));
         if let Some(effort) = settings.irradiance {
@@ -339,14 +365,14 @@ where
             let known = surface.zip(multiple).map(|(surface, multiple)| [surface, multiple]);
             let estimator = Estimator { scattered: known, ..estimator };
             if let Some(cache) = &mut caches.irradiance {
-                outcome.computed[3] += self.rounds(cache, &effort, 3, &all, in_sight, |_, place, rng| {
-                    irradiance(&estimator, (effort.samples / FIRST_LOOK).max(1), place, rng)
+                outcome.computed[3] += self.rounds(cache, &effort, 3, &all, in_sight, &mut guides[4], |_, place, learnt, rng| {
+                    irradiance(&estimator, looks((effort.samples / FIRST_LOOK).max(1), learnt), place, rng)
                 });
             }
-            let revised = self.revised(&caches.irradiance, settings.irradiance, before[4], 101, |_, e, place, rng| {
-                irradiance(&estimator, e.samples, place, rng)
+            let revised = self.revised(&caches.irradiance, settings.irradiance, before[4], 101, &guides[4], |_, looks, place, rng| {
+                irradiance(&estimator, looks, place, rng)
             });
-            outcome.computed[3] += put(&mut caches.irradiance, settings.irradiance, before[4], revised);
+            outcome.computed[3] += put(&mut caches.irradiance, settings.irradiance, before[4], revised, &mut guides[4]);
             outcome.seconds[3] = outcome.seconds[3] + clock.elapsed();
         }
         outcome.cancelled = self.control.is_cancelled();
@@ -392,7 +418,14 @@ where
     }
 
     /// Estimates the first records once more, with everything they know of each other; from those numbers on.
-    fn revise(&self, caches: &mut RadianceCaches, from: [usize; 5], pass: u64, outcome: &mut Outcome) {
+    fn revise(
+        &self,
+        caches: &mut RadianceCaches,
+        from: [usize; 5],
+        pass: u64,
+        guides: &mut [Vec<Guide>; 5],
+        outcome: &mut Outcome,
+    ) {
         let settings = self.settings;
         let (on_surfaces, light, coarse) = (settings.coarse_irradiance(), settings.surface, settings.coarse_multiple());
         let surface = caches.surface.as_ref().zip(light).map(|(c, e)| (c, settings.reading(&e)));
@@ -402,41 +435,54 @@ where
             Estimator { surfaces: lighting(&caches.coarse_irradiance, settings), scattered: known, ..*self.estimator };
         let mut clock = Stopwatch::start();
         let new_irradiance =
-            self.revised(&caches.coarse_irradiance, on_surfaces, from[0], 3 * pass, |_, e, place, rng| {
-                irradiance(&estimator, e.samples, place, rng)
+            self.revised(&caches.coarse_irradiance, on_surfaces, from[0], 3 * pass, &guides[0], |_, looks, place, rng| {
+                irradiance(&estimator, looks, place, rng)
             });
         outcome.seconds[3] = outcome.seconds[3] + clock.elapsed();
         clock = Stopwatch::start();
-        let new_surface = self.revised(&caches.surface, light, from[1], 3 * pass + 1, |cache, e, place, rng| {
-            scattered(cache, &estimator, e.samples, place, rng, Part::Surface)
+        let new_surface = self.revised(&caches.surface, light, from[1], 3 * pass + 1, &guides[1], |cache, looks, place, rng| {
+            scattered(cache, &estimator, looks, place, rng, Part::Surface)
         });
         outcome.seconds[1] = outcome.seconds[1] + clock.elapsed();
         clock = Stopwatch::start();
         let new_multiple =
-            self.revised(&caches.coarse_multiple, coarse, from[2], 3 * pass + 2, |cache, e, place, rng| {
-                scattered(cache, &estimator, e.samples, place, rng, Part::Multiple)
+            self.revised(&caches.coarse_multiple, coarse, from[2], 3 * pass + 2, &guides[2], |cache, looks, place, rng| {
+                scattered(cache, &estimator, looks, place, rng, Part::Multiple)
             });
         outcome.seconds[2] = outcome.seconds[2] + clock.elapsed();
-        outcome.computed[3] += put(&mut caches.coarse_irradiance, on_surfaces, from[0], new_irradiance);
-        outcome.computed[1] += put(&mut caches.surface, light, from[1], new_surface);
-        outcome.computed[2] += put(&mut caches.coarse_multiple, coarse, from[2], new_multiple);
+        outcome.computed[3] += put(&mut caches.coarse_irradiance, on_surfaces, from[0], new_irradiance, &mut guides[0]);
+        outcome.computed[1] += put(&mut caches.surface, light, from[1], new_surface, &mut guides[1]);
+        outcome.computed[2] += put(&mut caches.coarse_multiple, coarse, from[2], new_multiple, &mut guides[2]);
     }
 
+    /// Estimates for all records from a number on, each guided by what those around it have learnt.
     fn revised<C: Fill>(
         &self,
         cache: &Option<C>,
         effort: Option<Effort>,
         from: usize,
         stream: u64,
-        compute: impl Fn(&C, &Effort, &Place, &mut Generator) -> (Sums, C::Attached) + Sync,
+        guides: &[Guide],
+        compute: impl Fn(&C, Looks<'_>, &Place, &mut Generator) -> (Sums, C::Attached) + Sync,
     ) -> Revised<C::Attached> {
         let (Some(cache), Some(effort)) = (cache, effort) else { return Vec::new() };
         if self.control.is_cancelled() {
             return Vec::new();
         }
         let seed = mix(self.settings.seed ^ mix(stream + 16));
-        let estimate =
-            |number: usize| compute(cache, &effort, &cache.record(number).0, &mut Generator::new(seed ^ number as u64));
+        let estimate = |number: usize| {
+            let place = cache.record(number).0;
+            let mut around = Guide::default();
+            cache.visit_near(place.point, |other, weight| {
+                if let Some(guide) = other.checked_sub(from).and_then(|i| guides.get(i)) {
+                    around.merge(guide, weight);
+                }
+            });
+            let (guide, mut learnt) = (Guided::new(&around), Guide::default());
+            let looks = Looks { count: effort.samples, guide: guide.as_ref(), learnt: Some(&mut learnt) };
+            let (sums, attached) = compute(cache, looks, &place, &mut Generator::new(seed ^ number as u64));
+            (sums, attached, learnt)
+        };
         (from..cache.count()).into_par_iter().map(estimate).collect()
     }
 
@@ -485,7 +531,8 @@ where
         stream: u64,
         batches: &[Vec<Wanted>],
         is_for: impl Fn(&Place) -> bool,
-        compute: impl Fn(&C, &Place, &mut Generator) -> (Sums, C::Attached) + Sync,
+        guides: &mut Vec<Guide>,
+        compute: impl Fn(&C, &Place, &mut Guide, &mut Generator) -> (Sums, C::Attached) + Sync,
     ) -> u64 {
         let reading = Reading { margin: self.settings.margin, ..self.settings.reading(effort) };
         // Records added later must not share the random numbers of the first.
@@ -503,22 +550,24 @@ where
                 let numbered: Vec<(u64, Wanted)> =
                     chosen.into_iter().enumerate().map(|(i, w)| (start.wrapping_add(computed + i as u64), w)).collect();
                 computed += numbered.len() as u64;
-                let records: Vec<(Place, Option<Record>, C::Attached)> = numbered
+                let records: Vec<(Place, Option<Record>, C::Attached, Guide)> = numbered
                     .par_iter()
                     .map(|(number, Wanted { place, distance })| {
                         let seed = mix(self.settings.seed ^ mix(stream + 1)) ^ number;
-                        let (sums, attached) = compute(frozen, place, &mut Generator::new(seed));
+                        let mut learnt = Guide::default();
+                        let (sums, attached) = compute(frozen, place, &mut learnt, &mut Generator::new(seed));
                         let (least, most) = self.settings.pixels;
                         let limits = effort.limits.on_screen(least, most, self.pixel, *distance);
-                        (*place, Record::new(place.point, &sums, effort.tolerance, limits), attached)
+                        (*place, Record::new(place.point, &sums, effort.tolerance, limits), attached, learnt)
                     })
                     .collect();
                 let mut added = 0;
-                for (place, record, attached) in records {
+                for (place, record, attached, learnt) in records {
                     if let Some(record) = record
                         && !cache.is_covered(&place, &reading)
                         && cache.add(record, attached)
                     {
+                        guides.push(learnt);
                         added += 1;
                     }
                 }

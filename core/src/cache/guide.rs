@@ -1,0 +1,127 @@
+//! Where the light of a record comes from: learnt by a first look, used by the next.
+
+use glam::{Vec2, Vec3};
+
+use crate::math::float::{self, PI};
+
+const ROWS: usize = 8;
+const COLUMNS: usize = 16;
+
+/// Cells of equal solid angle that the sphere is divided into.
+const CELLS: usize = ROWS * COLUMNS;
+
+/// What samples have found by direction: `∫ f² dω` per cell, from which the best density follows.
+///
+/// A record's own samples must not be drawn by what they found themselves, or records that happened to see
+/// something bright would keep it: learn from some, draw others.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Guide([f32; CELLS]);
+
+impl Default for Guide {
+    fn default() -> Self {
+        Self([0.0; CELLS])
+    }
+}
+
+fn cell(direction: Vec3) -> usize {
+    // Casts saturate, and take NaN to 0.
+    let row = ((direction.z * 0.5 + 0.5) * ROWS as f32) as usize;
+    let column = ((libm::atan2f(direction.y, direction.x) / (2.0 * PI) + 0.5) * COLUMNS as f32) as usize;
+    row.min(ROWS - 1) * COLUMNS + column.min(COLUMNS - 1)
+}
+
+impl Guide {
+    /// Adds one of `count` samples: `value` is what it found over its density `pdf` (sr⁻¹).
+    #[inline]
+    pub fn add(&mut self, direction: Vec3, value: f32, pdf: f32, count: u32) {
+        let square = value * value * pdf / count.max(1) as f32;
+        if square > 0.0 && square.is_finite() {
+            self.0[cell(direction)] += square;
+        }
+    }
+
+    /// Adds what another has learnt nearby.
+    pub fn merge(&mut self, other: &Self, weight: f32) {
+        self.0.iter_mut().zip(&other.0).for_each(|(a, b)| *a += weight * b);
+    }
+}
+
+/// A density of directions made from a [`Guide`]: in every cell in proportion to the root of the mean square,
+/// which gives the least variance.
+///
+/// ```
+/// # use fogbow::{cache::{Guide, Guided}, math::{Vec2, Vec3}};
+/// let mut guide = Guide::default();
+/// guide.add(Vec3::Z, 1.0, 0.08, 1);
+/// let guided = Guided::new(&guide).unwrap();
+/// assert!(guided.sample(Vec2::splat(0.5)).z > 0.7);
+/// assert!(guided.pdf(Vec3::NEG_Z) == 0.0);
+/// ```
+#[derive(Debug, Clone, Copy)]
+pub struct Guided {
+    /// Sums of the cells' probabilities, up to and with each.
+    until: [f32; CELLS],
+}
+
+impl Guided {
+    /// `None` if nothing was found anywhere.
+    #[must_use]
+    pub fn new(guide: &Guide) -> Option<Self> {
+        let mut total = 0.0;
+        let mut until = guide.0.map(|square| {
+            total += float::sqrt(square);
+            total
+        });
+        if !(total > 0.0 && total < f32::INFINITY) {
+            return None;
+        }
+        until.iter_mut().for_each(|u| *u /= total);
+        Some(Self { until })
+    }
+
+    /// A direction (unit) for `u` in the unit square.
+    #[must_use]
+    pub fn sample(&self, u: Vec2) -> Vec3 {
+        let last = CELLS - 1;
+        let mut cell = self.until.partition_point(|until| *until <= u.x).min(last);
+        // Rounding may lead past the last cell that has a probability.
+        while cell > 0 && self.probability(cell) <= 0.0 {
+            cell -= 1;
+        }
+        let below = if cell > 0 { self.until[cell - 1] } else { 0.0 };
+        let rest = ((u.x - below) / self.probability(cell)).clamp(0.0, 1.0);
+        let z = ((cell / COLUMNS) as f32 + rest) * (2.0 / ROWS as f32) - 1.0;
+        let azimuth = ((cell % COLUMNS) as f32 + u.y) * (2.0 * PI / COLUMNS as f32) - PI;
+        let radius = float::safe_sqrt(1.0 - z * z);
+        Vec3::new(radius * libm::cosf(azimuth), radius * libm::sinf(azimuth), z)
+    }
+
+    /// Its density (sr⁻¹).
+    #[must_use]
+    pub fn pdf(&self, direction: Vec3) -> f32 {
+        self.probability(cell(direction)) * (CELLS as f32 / (4.0 * PI))
+    }
+
+    fn probability(&self, cell: usize) -> f32 {
+        let below = if cell > 0 { self.until[cell - 1] } else { 0.0 };
+        self.until[cell] - below
+    }
+}
+
+/// How a record's samples are drawn.
+#[derive(Debug, Default)]
+pub struct Looks<'g> {
+    /// Their number.
+    pub count: u32,
+    /// What is known of where light comes from.
+    pub guide: Option<&'g Guided>,
+    /// Takes down what they find.
+    pub learnt: Option<&'g mut Guide>,
+}
+
+impl From<u32> for Looks<'_> {
+    /// Nothing known, nothing learnt.
+    fn from(count: u32) -> Self {
+        Self { count, guide: None, learnt: None }
+    }
+}
