@@ -15,6 +15,7 @@ use fogbow::surface::Surface;
 use fogbow::transmittance::thickness::{Marching, Steps, optical_thickness, optical_thickness_with_gradients};
 use fogbow_tests::analytic::mean_and_error;
 use fogbow_tests::hosts::{Analytic, Field, Room};
+use fogbow_tests::tolerance;
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 
@@ -24,7 +25,8 @@ const EXACT: Marching = Marching { steps: Steps::Gauss(4), offset: 0.0 };
 fn config(cases: u32, seed: u64) -> ProptestConfig {
     ProptestConfig {
         cases,
-        max_global_rejects: cases,
+        // Kinks of the shift are set aside.
+        max_global_rejects: 4 * cases,
         failure_persistence: None,
         rng_seed: RngSeed::Fixed(seed),
         ..ProptestConfig::default()
@@ -56,7 +58,8 @@ impl Around {
 
     /// How `Shift::share` changes with the vertex.
     fn slope(&self, vertex: Vec3, h: f32) -> Vec3 {
-        let along = |axis: Vec3| (self.shift(vertex + axis * h).share - self.shift(vertex - axis * h).share) / (2.0 * h);
+        let along =
+            |axis: Vec3| (self.shift(vertex + axis * h).share - self.shift(vertex - axis * h).share) / (2.0 * h);
         Vec3::new(along(Vec3::X), along(Vec3::Y), along(Vec3::Z))
     }
 
@@ -187,8 +190,7 @@ fn a_shift_by_translation_is_an_advance() {
     let (scattering, slope) = (medium.properties(at).scattering, medium.gradients(at).scattering);
     let through = thickness.value.transmitted();
     let plain = Weight::ONE.advance(Spectrum::ONE, through, &thickness.gradient_joint, scattering, &slope);
-    let moved =
-        Weight::ONE.advance_by(&Shift::TRANSLATION, Spectrum::ONE, through, &thickness, scattering, &slope);
+    let moved = Weight::ONE.advance_by(&Shift::TRANSLATION, Spectrum::ONE, through, &thickness, scattering, &slope);
     assert_eq!((plain.value, plain.gradient, plain.moved), (moved.value, moved.gradient, moved.moved));
 }
 
@@ -211,7 +213,11 @@ fn panel() -> Light<'static> {
     Light::Quad(QuadLight::new(corner, u, v, Spectrum::ONE).unwrap())
 }
 
-fn estimator<'a>(medium: &'a Homogeneous, scene: &'a Room, lights: &'a [Light<'a>]) -> Estimator<'a, Homogeneous, Room> {
+fn estimator<'a>(
+    medium: &'a Homogeneous,
+    scene: &'a Room,
+    lights: &'a [Light<'a>],
+) -> Estimator<'a, Homogeneous, Room> {
     Estimator {
         world: World { medium, scene, lights },
         surfaces: None,
@@ -224,52 +230,125 @@ fn estimator<'a>(medium: &'a Homogeneous, scene: &'a Room, lights: &'a [Light<'a
     }
 }
 
-const PHASES: [(&str, Lobe); 2] = [("isotropic", Lobe::Isotropic), ("forwards", Lobe::HenyeyGreenstein { g: 0.6 })];
+/// What is compared: a value at a point with its gradient, in one channel.
+type Seen = (f64, Vec3);
 
-#[test]
-fn probe() {
-    let kind = std::env::var("PROBE").unwrap_or_default();
-    let h: f32 = std::env::var("H").ok().and_then(|s| s.parse().ok()).unwrap_or(0.02);
-    let n: u64 = std::env::var("N").ok().and_then(|s| s.parse().ok()).unwrap_or(64);
-    let paths: u32 = std::env::var("P").ok().and_then(|s| s.parse().ok()).unwrap_or(2048);
-    let max_vertices: u32 = std::env::var("V").ok().and_then(|s| s.parse().ok()).unwrap_or(64);
-    for (name, lobe) in PHASES {
-        for (lamp, light) in [("bulb", bulb()), ("panel", panel())] {
-            let (medium, scene, lights) = (fog(lobe), room(0.5), [light]);
-            let mut make = estimator(&medium, &scene, &lights);
-            make.walk.max_vertices = max_vertices;
-            let phase = Phase::from(lobe);
-            let to_eye = Vec3::new(0.36, 0.48, 0.8);
-            let walker = Walk { medium: &medium, scene: &scene, lights: &lights, settings: make.walk };
-            for (point, axis) in [(Vec3::new(0.9, -0.2, 0.1), Vec3::X), (Vec3::new(0.9, -0.2, 0.1), Vec3::Y), (Vec3::new(-0.2, -0.1, 0.1), Vec3::new(0.6, 0.8, 0.0)), (Vec3::new(-0.2, -0.1, 0.1), Vec3::Z)] {
-                let at = |p: Vec3, seed: u64| -> Sums {
-                    let mut rng = Generator::new(seed);
-                    match kind.as_str() {
-                        "sample" => {
-                            let mut child = Generator::child(&mut rng);
-                            multiple_scatter::sample(&walker, p, to_eye, &phase, |r, h| make.outgoing(r, h, &mut child), paths, &mut rng)
-                        }
-                        "multiple" => make.multiple(p, &phase, paths, &mut [], &mut rng),
-                        _ => {
-                            let p = if point.x > 0.5 { p.with_x(1.0).with_y(p.y + 1.05) } else { p.with_x(1.0) };
-                            make.irradiance(p, Vec3::NEG_X, paths, &mut rng).0
-                        }
-                    }
-                };
-                if !matches!(kind.as_str(), "sample" | "multiple") && axis == Vec3::X { continue; }
-                let axis = if matches!(kind.as_str(), "sample" | "multiple") { axis } else { axis.with_x(0.0).normalize() };
-                let start = std::time::Instant::now();
-                let (mut d, mut g, mut both, mut v) = (vec![], vec![], vec![], vec![]);
-                for seed in 0..n {
-                    let here = at(point, seed);
-                    let slope = f64::from(here.gradient.channel(0).dot(axis));
-                    let diff = f64::from(at(point + axis * h, seed).value[0] - at(point - axis * h, seed).value[0]) / (2.0 * f64::from(h));
-                    v.push(f64::from(here.value[0]));
-                    d.push(diff); g.push(slope); both.push(diff - slope);
-                }
-                let [v, d, g, b] = [v, d, g, both].map(|x| mean_and_error(&x));
-                eprintln!("{kind} {name} {lamp} {point} {axis}: value {:.5} diff {:.5} ± {:.5}, grad {:.5} ± {:.5}, both {:.5} ± {:.5} ({:.1} se, {:.4} of value/m) {:?}", v.0, d.0, d.1, g.0, g.1, b.0, b.1, b.0 / b.1, b.0 / v.0, start.elapsed());
-            }
+fn first(sums: &Sums) -> Seen {
+    (f64::from(sums.value[0]), sums.gradient.channel(0))
+}
+
+/// Central differences over a stretch against the gradient's mean along it (three points of Gauss, so that the
+/// stretch may be long), in 24 pairs of estimates with different random numbers.
+#[track_caller]
+fn check(point: Vec3, axis: Vec3, what: &str, light: impl Fn(Vec3, &mut Generator) -> Seen) {
+    const H: f32 = 0.1;
+    const GAUSS: [(f32, f64); 3] = [(-0.774_596_7, 5.0 / 18.0), (0.0, 8.0 / 18.0), (0.774_596_7, 5.0 / 18.0)];
+    let at = |x: f32, seed: u64| light(point + axis * (H * x), &mut Generator::new(seed));
+    let (mut slopes, mut apart) = (vec![], vec![]);
+    for seed in 0..24 {
+        let slope: f64 = GAUSS.iter().map(|&(x, w)| w * f64::from(at(x, seed).1.dot(axis))).sum();
+        slopes.push(slope);
+        apart.push((at(1.0, seed).0 - at(-1.0, seed).0) / f64::from(2.0 * H) - slope);
+    }
+    let ((slope, _), (apart, error)) = (mean_and_error(&slopes), mean_and_error(&apart));
+    let said = format!("{what} at {point} along {axis}: gradient {slope:.6}, differences {apart:+.6} ± {error:.6}");
+    assert!(apart.abs() < tolerance::STANDARD_ERRORS * error, "{said}");
+    // Errors of two fifths are found; translation misses by more, or has no end of noise.
+    assert!(error < 0.1 * slope.abs(), "{said}: no evidence");
+}
+
+/// Beside a wall and in the middle, away from the walls and towards the lamps.
+const PLACES: [(Vec3, Vec3); 2] =
+    [(Vec3::new(0.84, -0.2, 0.1), Vec3::new(-0.6, 0.8, 0.0)), (Vec3::new(-0.2, -0.1, 0.1), Vec3::new(0.6, 0.8, 0.0))];
+
+/// `sample` towards one direction, by walks of up to so many vertices.
+fn check_samples(lobe: Lobe, max_vertices: u32, paths: u32) {
+    let (medium, scene, phase) = (fog(lobe), room(0.5), Phase::from(lobe));
+    let to_eye = Vec3::new(0.36, 0.48, 0.8);
+    for light in [bulb(), panel()] {
+        let lights = [light];
+        let mut make = estimator(&medium, &scene, &lights);
+        make.walk.max_vertices = max_vertices;
+        let walk = Walk { medium: &medium, scene: &scene, lights: &lights, settings: make.walk };
+        for (point, axis) in PLACES {
+            check(point, axis, &format!("{lobe:?}, {lights:?}"), |point, rng| {
+                let mut child = Generator::child(rng);
+                let outgoing = |ray: &Ray, hit: &Hit| make.outgoing(ray, hit, &mut child);
+                first(&multiple_scatter::sample(&walk, point, to_eye, &phase, outgoing, paths, rng))
+            });
         }
     }
+}
+
+/// `Estimator::multiple`, as [`check_samples`].
+fn check_estimates(lobe: Lobe, max_vertices: u32, paths: u32) {
+    let (medium, scene, phase) = (fog(lobe), room(0.5), Phase::from(lobe));
+    for light in [bulb(), panel()] {
+        let lights = [light];
+        let mut make = estimator(&medium, &scene, &lights);
+        make.walk.max_vertices = max_vertices;
+        for (point, axis) in PLACES {
+            check(point, axis, &format!("{lobe:?}, {lights:?}"), |point, rng| {
+                first(&make.multiple(point, &phase, paths, &mut [], rng))
+            });
+        }
+    }
+}
+
+/// `Estimator::irradiance` along a black wall towards its edge with another, and in its middle: light scattered in
+/// the fog alone.
+fn check_irradiance(lobe: Lobe, max_vertices: u32, paths: u32) {
+    let (medium, scene) = (fog(lobe), room(0.0));
+    for light in [bulb(), panel()] {
+        let lights = [light];
+        let mut make = estimator(&medium, &scene, &lights);
+        make.walk.max_vertices = max_vertices;
+        for point in [Vec3::new(1.0, 0.85, 0.1), Vec3::new(1.0, -0.1, 0.1)] {
+            check(point, Vec3::Y, &format!("{lobe:?}, {lights:?}"), |point, rng| {
+                first(&make.irradiance(point, Vec3::NEG_X, paths, rng).0)
+            });
+        }
+    }
+}
+
+const FORWARDS: Lobe = Lobe::HenyeyGreenstein { g: 0.6 };
+
+#[test]
+fn light_scattered_in_a_closed_room_changes_as_its_gradient_says() {
+    check_samples(Lobe::Isotropic, 64, 4096);
+}
+
+/// Scattered forwards, twice: walks that end at the first vertex, as where caches know the rest.
+#[test]
+fn light_scattered_forwards_in_a_closed_room_changes_as_its_gradient_says() {
+    check_samples(FORWARDS, 1, 8192);
+}
+
+#[test]
+fn estimates_of_records_in_a_closed_room_change_as_their_gradients_say() {
+    check_estimates(Lobe::Isotropic, 64, 4096);
+}
+
+#[test]
+fn estimates_of_records_of_forward_fog_in_a_closed_room_change_as_their_gradients_say() {
+    check_estimates(FORWARDS, 1, 6144);
+}
+
+#[test]
+fn irradiance_beside_an_edge_changes_as_its_gradient_says() {
+    check_irradiance(Lobe::Isotropic, 64, 4096);
+}
+
+#[test]
+fn irradiance_of_forward_fog_beside_an_edge_changes_as_its_gradient_says() {
+    check_irradiance(FORWARDS, 1, 4096);
+}
+
+/// The gradients of longer walks hold the phase functions between two vertices.
+#[test]
+#[ignore = "fails: phase functions inside a walk are held while its directions turn"]
+fn light_scattered_forwards_often_changes_as_its_gradient_says() {
+    check_samples(FORWARDS, 3, 16384);
+    check_estimates(FORWARDS, 64, 8192);
+    check_irradiance(FORWARDS, 64, 8192);
 }

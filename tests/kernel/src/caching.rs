@@ -28,8 +28,7 @@ const QUESTIONS: usize = 32;
 const DEGREE: usize = 2;
 const STRIDE: usize = coefficient_count(DEGREE) - 1;
 const LIMITS: Limits = Limits { min: 0.2, max: 2.0 };
-const READING: Reading =
-    Reading { extrapolation: fogbow::cache::Extrapolation::Curved, tolerance: 0.5, margin: 0.0 };
+const READING: Reading = Reading { extrapolation: fogbow::cache::Extrapolation::Curved, tolerance: 0.5, margin: 0.0 };
 
 /// Room for the index over the records of a cache: what [`Index::new`] asks for.
 struct Slots {
