@@ -39,7 +39,8 @@ impl WithMedium for Job<'_> {
         let walk = multiple_scatter::Settings { one_light: lights.len() > 1, ..multiple_scatter::Settings::new(steps) };
         let world = path::World { medium, scene: self.0, lights: &lights };
         let paths = path::Settings::default();
-        let estimator = Estimator { world, surfaces: None, scattered: None, walk, paths, light_samples: 16, finest: 0.02 };
+        let estimator =
+            Estimator { world, surfaces: None, scattered: None, walk, paths, light_samples: 16, finest: 0.02 };
         let eye = EyeSettings { density: 1.0, connections: 4, lights_visible: true, indirect: true };
         let camera = self.0.camera();
         let mut found: Vec<Place> = Vec::new();

@@ -409,7 +409,7 @@ fn extrapolation(input: &Input<'_>) -> Value {
         let offset = x - entry.vector("x");
         let d = 1.0 - offset.length() / entry.number("r");
         if d > 0.0 {
-            blend.add(weight(d), entry.colour("L"), entry.slope("grad").along(offset));
+            blend.add(weight(d), entry.colour("L"), &entry.slope("grad"), offset);
         }
     }
     json!({ "weight": blend.weight(), "L": blend.value().map(|l| l.0) })

@@ -253,6 +253,26 @@ impl Scene for Ball {
     }
 }
 
+/// A room: a box seen from inside.
+#[derive(Debug, Clone, Copy)]
+pub struct Room {
+    /// Its walls.
+    pub bounds: Bounds,
+    /// What they are made of.
+    pub surface: fogbow::surface::Surface,
+}
+
+impl Scene for Room {
+    fn closest_hit(&self, ray: &Ray) -> Option<Hit> {
+        let (_, distance) = self.bounds.intersect(ray)?;
+        if !(distance > 1e-5 && distance < ray.length) {
+            return None;
+        }
+        let normal = -Body::Box(self.bounds).normal(ray.at(distance));
+        Some(Hit { distance, normal, surface: self.surface, light: None })
+    }
+}
+
 /// Wraps a medium or a scene, asserts that it is asked and answers sensibly, and counts.
 #[derive(Debug, Default)]
 pub struct Complaining<T> {

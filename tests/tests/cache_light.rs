@@ -28,6 +28,7 @@ fn estimator<'a, M: Medium, S: Scene>(medium: &'a M, scene: &'a S, lights: &'a [
         walk: multiple_scatter::Settings::new(Steps::Gauss(8)),
         paths: path::Settings::default(),
         light_samples: 4,
+        finest: 1e-6,
     }
 }
 

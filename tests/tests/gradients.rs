@@ -223,6 +223,23 @@ proptest! {
     }
 
     #[test]
+    fn scattered_light_as_the_direction_to_the_eye_turns(
+        medium in medium(), source in source(), x in vector(1.0), to_eye in direction(),
+    ) {
+        prop_assume!(x.distance(source.position) > 0.1);
+        let arrival = Arrival::from_source(x, &medium, &source, EXACT, 0.0);
+        prop_assume!(arrival.is_some());
+        let (arrival, phase) = (arrival.unwrap(), medium.phase);
+        let light = arrival.scatter(to_eye, &phase).radiance;
+        // Of the direction of any vector: its gradient at a unit vector is the tangential one.
+        let f = |p: Vec3| arrival.scatter((to_eye + p).normalize(), &phase).radiance;
+        let turned = arrival.turned(to_eye, &phase);
+        prop_assert!(turned.along(to_eye).map(f32::abs).max_element() <= 1e-5 * turned.norm().max_element());
+        prop_assume!(!light.is_black());
+        check!(turned, f, Vec3::ZERO, 0.3);
+    }
+
+    #[test]
     fn coefficients_of_an_expansion(
         medium in medium(), source in source(), x in vector(1.0), degree in 0_usize..=6, pick in 0.0..1.0_f32,
     ) {

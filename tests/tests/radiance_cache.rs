@@ -55,7 +55,7 @@ fn settings() -> Settings {
         surface: effort(1.5, 2),
         multiple: effort(1.0, 2),
         irradiance: effort(0.5, 0),
-        extrapolation: Extrapolation::ExponentialMean,
+        extrapolation: Extrapolation::Curved,
         rays: 600,
         margin: 0.15,
         pixels: (1.0, 1000.0),
@@ -73,6 +73,7 @@ fn estimator<'a, M>(medium: &'a M, room: &'a Ball, lights: &'a [Light<'a>]) -> E
         walk: multiple_scatter::Settings::new(Steps::Length(0.3)),
         paths: path::Settings::default(),
         light_samples: 1,
+        finest: 0.02,
     }
 }
 

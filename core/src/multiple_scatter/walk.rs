@@ -2,8 +2,8 @@
 
 use glam::{Vec2, Vec3};
 
-use super::weight::{Shift, Weight};
 use super::flight::{Collision, Lengths, fly, own};
+use super::weight::{Shift, Weight};
 use crate::host::{Hit, Medium, Properties, Rng, Scene};
 use crate::light::{Falloff, Light};
 use crate::math::{Ray, float};

@@ -88,7 +88,8 @@ impl Default for Weight {
 
 impl Weight {
     /// Of a path without vertices.
-    pub const ONE: Self = Self { value: Spectrum::ONE, gradient: Gradient::ZERO, moved: 1.0, turn: None, last_turn: 0.0 };
+    pub const ONE: Self =
+        Self { value: Spectrum::ONE, gradient: Gradient::ZERO, moved: 1.0, turn: None, last_turn: 0.0 };
 
     /// One vertex on.
     ///
@@ -146,7 +147,8 @@ impl Weight {
         let frozen = kappa * transmittance;
         let step = frozen * scattering;
         let through = thickness.gradient_joint * shift.share + thickness.gradient_fixed * (1.0 - shift.share);
-        let slope = *scattering_gradient * shift.share - through * scattering + Gradient::outer(scattering, shift.spread);
+        let slope =
+            *scattering_gradient * shift.share - through * scattering + Gradient::outer(scattering, shift.spread);
         Self {
             value: self.value * step,
             gradient: self.gradient * step + slope * (frozen * self.value * self.moved),

@@ -178,10 +178,8 @@ impl Arrival {
         let value = phase.value(deflection);
         let turn = deflection_gradient(self.to_light, to_eye, 1.0);
         let slope = Gradient::outer(phase.derivative(deflection), turn);
-        let scattered = Contribution {
-            radiance: value * self.irradiance,
-            gradient: slope * self.turning + self.gradient * value,
-        };
+        let scattered =
+            Contribution { radiance: value * self.irradiance, gradient: slope * self.turning + self.gradient * value };
         if scattered.radiance.is_finite() && scattered.gradient.is_finite() { scattered } else { Contribution::ZERO }
     }
 
@@ -212,15 +210,10 @@ impl Arrival {
     ) -> Contribution {
         if weight != 0.0 {
             let known = moments.len().min(sh::degree_of(expansion.len()).map_or(0, |d| d + 1));
-            sh::zonal::coefficients_with_gradients(
-                &moments[..known],
-                -self.to_light,
-                1.0,
-                |k, value, slope| {
-                    expansion[k].value += value * self.irradiance * weight;
-                    expansion[k].gradient += (slope * self.turning + self.gradient * value) * weight;
-                },
-            );
+            sh::zonal::coefficients_with_gradients(&moments[..known], -self.to_light, 1.0, |k, value, slope| {
+                expansion[k].value += value * self.irradiance * weight;
+                expansion[k].gradient += (slope * self.turning + self.gradient * value) * weight;
+            });
         }
         Contribution { radiance: self.irradiance, gradient: self.gradient } * crate::math::float::INV_FOUR_PI
     }

@@ -2,7 +2,7 @@
 
 use fogbow::cache::{
     Basis, Block, Cache, Caches, Estimator, EyeSettings, Facing, Index, Limits, Node, Place, Reader, Reading, Record,
-    SurfaceCache, VolumeCache, places, radiance,
+    SurfaceCache, TurningBasis, VolumeCache, places, radiance,
 };
 use fogbow::host::Medium;
 use fogbow::light::Light;
@@ -28,8 +28,7 @@ const QUESTIONS: usize = 32;
 const DEGREE: usize = 2;
 const STRIDE: usize = coefficient_count(DEGREE) - 1;
 const LIMITS: Limits = Limits { min: 0.2, max: 2.0 };
-const READING: Reading =
-    Reading { extrapolation: fogbow::cache::Extrapolation::ExponentialMean, tolerance: 0.5, margin: 0.0 };
+const READING: Reading = Reading { extrapolation: fogbow::cache::Extrapolation::Curved, tolerance: 0.5, margin: 0.0 };
 
 /// Room for the index over the records of a cache: what [`Index::new`] asks for.
 struct Slots {
@@ -78,6 +77,7 @@ fn in_medium(out: &mut Digest, medium: &dyn Medium, lights: &[Light<'_>]) -> Res
         walk: multiple_scatter::Settings { max_vertices: 8, ..multiple_scatter::Settings::new(Steps::Length(0.3)) },
         paths: path::Settings { max_scatterings: 6, ..path::Settings::default() },
         light_samples: 1,
+        finest: 0.02,
     };
 
     let (mut near, mut far) = (Slots::new(), Slots::new());
@@ -132,11 +132,14 @@ fn in_medium(out: &mut Digest, medium: &dyn Medium, lights: &[Light<'_>]) -> Res
             out.gradient(&coefficient.gradient);
         }
         for _ in 0..QUESTIONS {
-            let (at, basis) = (point(&mut rng) * 0.3, Basis::new(direction(&mut rng), DEGREE));
+            let (at, to_eye) = (point(&mut rng) * 0.3, direction(&mut rng));
+            let basis = Basis::new(to_eye, DEGREE);
             out.option(cache.lookup(at, &basis, &READING), Digest::spectrum);
-            out.option(cache.lookup_with_gradient(at, &basis, &READING), |out, light| {
+            let basis = TurningBasis::new(to_eye, DEGREE);
+            out.option(cache.lookup_with_gradients(at, &basis, &READING), |out, (light, turned)| {
                 out.spectrum(light.radiance);
                 out.gradient(&light.gradient);
+                out.gradient(&turned);
             });
         }
     }
