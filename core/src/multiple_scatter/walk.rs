@@ -7,7 +7,7 @@ use super::weight::{Shift, Weight};
 use crate::host::{Hit, Medium, Properties, Rng, Scene};
 use crate::light::{Falloff, Light};
 use crate::math::{Ray, float};
-use crate::phase::Phase;
+use crate::phase::{Phase, deflection};
 use crate::sampling::discrete::choose;
 use crate::sampling::distance::Equiangular;
 use crate::sampling::{Generator, uniform, uniform2, warp};
@@ -117,10 +117,12 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Walk<'_, M, S> {
             turning: Spectrum::ZERO,
         };
         let mut end = end.copied();
+        // The last vertex's direction to the eye and phase function, if that depends on directions.
+        let mut bend = None;
         ray.length = end.map_or(f32::INFINITY, |hit| hit.distance);
         for vertex in 1..=self.settings.max_vertices {
             let reach = self.reach(ray.origin);
-            self.near_lights(&ray, end.as_ref(), reach, &weight, kappa, &mut total, rng);
+            self.near_lights(&ray, end.as_ref(), reach, &weight, bend.as_ref(), kappa, &mut total, rng);
             let marching = self.marching(rng);
             let hit = fly(&ray, self.medium, self.settings.lengths, weight.value * kappa, marching, u, rng);
             let Some(Collision { distance, properties, factor }) = hit else { break };
@@ -132,7 +134,14 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Walk<'_, M, S> {
             let thickness = optical_thickness_with_gradients(&segment, self.medium, marching);
             let next = self.medium.gradients(at).scattering;
             let shift = Shift::new(&ray, end.as_ref(), reach, distance);
-            weight = weight.advance_by(&shift, kappa, factor, &thickness, properties.scattering, &next);
+            weight = bent(&weight, bend.as_ref(), &ray, &shift).advance_by(
+                &shift,
+                kappa,
+                factor,
+                &thickness,
+                properties.scattering,
+                &next,
+            );
             if vertex >= self.settings.roulette_from {
                 let survival = step.max_element().clamp(MIN_SURVIVAL, 1.0);
                 if uniform(rng) >= survival {
@@ -150,6 +159,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Walk<'_, M, S> {
             u = uniform(rng);
             let turn = properties.phase.sample(to_eye, uniform2(rng));
             kappa = turn.weight;
+            bend = (!properties.phase.is_isotropic()).then_some((to_eye, properties.phase));
             ray = Ray { origin: at, direction: turn.to_light, length: f32::INFINITY };
             end = nearest_surface(&ray, self.scene);
             if let Some(hit) = end {
@@ -213,6 +223,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Walk<'_, M, S> {
         end: Option<&Hit>,
         reach: f32,
         weight: &Weight,
+        bend: Option<&(Vec3, Phase)>,
         kappa: Spectrum,
         total: &mut Incoming,
         rng: &mut Generator,
@@ -246,7 +257,14 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Walk<'_, M, S> {
             let slope = self.medium.gradients(at).scattering;
             let through = segment.value.transmitted();
             let shift = Shift::new(ray, end, reach, distance);
-            let joined = weight.advance_by(&shift, frozen, through, &segment, properties.scattering, &slope);
+            let joined = bent(weight, bend, ray, &shift).advance_by(
+                &shift,
+                frozen,
+                through,
+                &segment,
+                properties.scattering,
+                &slope,
+            );
             add_scattered(total, &joined, &arrival, -ray.direction, &properties.phase);
             Some(())
         });
@@ -272,6 +290,17 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Walk<'_, M, S> {
             }
         }
     }
+}
+
+/// A weight with the change of the phase function at its last vertex as the directions before and after turn.
+fn bent(weight: &Weight, bend: Option<&(Vec3, Phase)>, ray: &Ray, shift: &Shift) -> Weight {
+    let Some((to_eye, phase)) = bend else { return *weight };
+    let deflected = deflection(ray.direction, *to_eye);
+    let cosine = to_eye.dot(ray.direction);
+    let before = (*to_eye * cosine - ray.direction) * weight.last_turn;
+    let after = (*to_eye - ray.direction * cosine) * (weight.moved * shift.turn);
+    let slope = phase.derivative(deflected).ratio(phase.value(deflected));
+    Weight { gradient: weight.gradient + Gradient::outer(weight.value * slope, before + after), ..*weight }
 }
 
 /// Adds what a path's last vertex scatters of an arrival.

@@ -302,29 +302,46 @@ where
         // whole walks, and few, because it is revised with what those have told.
         if let (Some(cache), Some(effort)) = (&mut caches.coarse_irradiance, settings.coarse_irradiance()) {
             let clock = Stopwatch::start();
-            outcome.computed[3] += self.rounds(cache, &effort, 4, &all, everywhere, &mut guides[0], |cache, place, learnt, rng| {
-                let surfaces = Some((cache, settings.reading(&effort)));
-                let estimator = Estimator { surfaces, ..*self.estimator };
-                irradiance(&estimator, looks((effort.samples / FIRST_WALKS).max(16), learnt), place, rng)
-            });
+            outcome.computed[3] +=
+                self.rounds(cache, &effort, 4, &all, everywhere, &mut guides[0], |cache, place, learnt, rng| {
+                    let surfaces = Some((cache, settings.reading(&effort)));
+                    let estimator = Estimator { surfaces, ..*self.estimator };
+                    irradiance(&estimator, looks((effort.samples / FIRST_WALKS).max(16), learnt), place, rng)
+                });
             outcome.seconds[3] = clock.elapsed();
         }
         let estimator = Estimator { surfaces: lighting(&caches.coarse_irradiance, settings), ..*self.estimator };
         if let (Some(cache), Some(effort)) = (&mut caches.surface, settings.surface) {
             let clock = Stopwatch::start();
-            outcome.computed[1] += self.rounds(cache, &effort, 1, &all, in_medium, &mut guides[1], |cache, place, learnt, rng| {
-                scattered(cache, &estimator, looks((effort.samples / FIRST_WALKS).max(16), learnt), place, rng, Part::Surface)
-            });
+            outcome.computed[1] +=
+                self.rounds(cache, &effort, 1, &all, in_medium, &mut guides[1], |cache, place, learnt, rng| {
+                    scattered(
+                        cache,
+                        &estimator,
+                        looks((effort.samples / FIRST_WALKS).max(16), learnt),
+                        place,
+                        rng,
+                        Part::Surface,
+                    )
+                });
             outcome.seconds[1] = clock.elapsed();
         }
         if let (Some(cache), Some(effort)) = (&mut caches.coarse_multiple, settings.coarse_multiple()) {
             let clock = Stopwatch::start();
             let surface = caches.surface.as_ref().zip(settings.surface).map(|(c, e)| (c, settings.reading(&e)));
-            outcome.computed[2] += self.rounds(cache, &effort, 5, &all, in_medium, &mut guides[2], |cache, place, learnt, rng| {
-                let scattered_light = surface.map(|surface| [surface, (cache, settings.reading(&effort))]);
-                let estimator = Estimator { scattered: scattered_light, ..estimator };
-                scattered(cache, &estimator, looks((effort.samples / FIRST_WALKS).max(16), learnt), place, rng, Part::Multiple)
-            });
+            outcome.computed[2] +=
+                self.rounds(cache, &effort, 5, &all, in_medium, &mut guides[2], |cache, place, learnt, rng| {
+                    let scattered_light = surface.map(|surface| [surface, (cache, settings.reading(&effort))]);
+                    let estimator = Estimator { scattered: scattered_light, ..estimator };
+                    scattered(
+                        cache,
+                        &estimator,
+                        looks((effort.samples / FIRST_WALKS).max(16), learnt),
+                        place,
+                        rng,
+                        Part::Multiple,
+                    )
+                });
             outcome.seconds[2] = clock.elapsed();
         }
         for pass in 0..REVISIONS {
@@ -334,9 +351,10 @@ where
         let estimator = Estimator { surfaces: lighting(&caches.coarse_irradiance, settings), ..*self.estimator };
         if let (Some(cache), Some(effort)) = (&mut caches.single, settings.single) {
             let clock = Stopwatch::start();
-            outcome.computed[0] = self.rounds(cache, &effort, 0, &all, in_medium, &mut Vec::new(), |cache, place, learnt, rng| {
-                scattered(cache, &estimator, looks(effort.samples, learnt), place, rng, Part::Single)
-            });
+            outcome.computed[0] =
+                self.rounds(cache, &effort, 0, &all, in_medium, &mut Vec::new(), |cache, place, learnt, rng| {
+                    scattered(cache, &estimator, looks(effort.samples, learnt), place, rng, Part::Single)
+                });
             outcome.seconds[0] = clock.elapsed();
         }
         let surface = caches.surface.as_ref().zip(settings.surface).map(|(c, e)| (c, settings.reading(&e)));
@@ -345,18 +363,31 @@ where
             let coarse = caches.coarse_multiple.as_ref().zip(settings.coarse_multiple());
             let known = surface.zip(coarse).map(|(s, (c, e))| [s, (c, settings.reading(&e))]);
             let estimator = Estimator { scattered: known, ..estimator };
-            outcome.computed[2] += self.rounds(cache, &effort, 2, &all, in_medium, &mut guides[3], |cache, place, learnt, rng| {
-                scattered(cache, &estimator, looks((effort.samples / FIRST_LOOK).max(1), learnt), place, rng, Part::Multiple)
-            });
+            outcome.computed[2] +=
+                self.rounds(cache, &effort, 2, &all, in_medium, &mut guides[3], |cache, place, learnt, rng| {
+                    scattered(
+                        cache,
+                        &estimator,
+                        looks((effort.samples / FIRST_LOOK).max(1), learnt),
+                        place,
+                        rng,
+                        Part::Multiple,
+                    )
+                });
             outcome.seconds[2] = outcome.seconds[2] + clock.elapsed();
         }
         let clock = Stopwatch::start();
         let known = surface.zip(caches.multiple.as_ref().zip(settings.multiple));
         let known = known.map(|(s, (c, e))| [s, (c, settings.reading(&e))]);
         let again = Estimator { scattered: known, ..estimator };
-        let revised = self.revised(&caches.multiple, settings.multiple, before[3], 100, &guides[3], |cache, looks, place, rng| {
-            scattered(cache, &again, looks, place, rng, Part::Multiple)
-        });
+        let revised = self.revised(
+            &caches.multiple,
+            settings.multiple,
+            before[3],
+            100,
+            &guides[3],
+            |cache, looks, place, rng| scattered(cache, &again, looks, place, rng, Part::Multiple),
+        );
         outcome.computed[2] += put(&mut caches.multiple, settings.multiple, before[3], revised, &mut guides[3]);
         outcome.seconds[2] = outcome.seconds[2] + clock.elapsed();
         let multiple = caches.multiple.as_ref().zip(settings.multiple).map(|(c, e)| (c, settings.reading(&e)));
@@ -365,13 +396,19 @@ where
             let known = surface.zip(multiple).map(|(surface, multiple)| [surface, multiple]);
             let estimator = Estimator { scattered: known, ..estimator };
             if let Some(cache) = &mut caches.irradiance {
-                outcome.computed[3] += self.rounds(cache, &effort, 3, &all, in_sight, &mut guides[4], |_, place, learnt, rng| {
-                    irradiance(&estimator, looks((effort.samples / FIRST_LOOK).max(1), learnt), place, rng)
-                });
+                outcome.computed[3] +=
+                    self.rounds(cache, &effort, 3, &all, in_sight, &mut guides[4], |_, place, learnt, rng| {
+                        irradiance(&estimator, looks((effort.samples / FIRST_LOOK).max(1), learnt), place, rng)
+                    });
             }
-            let revised = self.revised(&caches.irradiance, settings.irradiance, before[4], 101, &guides[4], |_, looks, place, rng| {
-                irradiance(&estimator, looks, place, rng)
-            });
+            let revised = self.revised(
+                &caches.irradiance,
+                settings.irradiance,
+                before[4],
+                101,
+                &guides[4],
+                |_, looks, place, rng| irradiance(&estimator, looks, place, rng),
+            );
             outcome.computed[3] += put(&mut caches.irradiance, settings.irradiance, before[4], revised, &mut guides[4]);
             outcome.seconds[3] = outcome.seconds[3] + clock.elapsed();
         }
@@ -434,21 +471,30 @@ where
         let estimator =
             Estimator { surfaces: lighting(&caches.coarse_irradiance, settings), scattered: known, ..*self.estimator };
         let mut clock = Stopwatch::start();
-        let new_irradiance =
-            self.revised(&caches.coarse_irradiance, on_surfaces, from[0], 3 * pass, &guides[0], |_, looks, place, rng| {
-                irradiance(&estimator, looks, place, rng)
-            });
+        let new_irradiance = self.revised(
+            &caches.coarse_irradiance,
+            on_surfaces,
+            from[0],
+            3 * pass,
+            &guides[0],
+            |_, looks, place, rng| irradiance(&estimator, looks, place, rng),
+        );
         outcome.seconds[3] = outcome.seconds[3] + clock.elapsed();
         clock = Stopwatch::start();
-        let new_surface = self.revised(&caches.surface, light, from[1], 3 * pass + 1, &guides[1], |cache, looks, place, rng| {
-            scattered(cache, &estimator, looks, place, rng, Part::Surface)
-        });
+        let new_surface =
+            self.revised(&caches.surface, light, from[1], 3 * pass + 1, &guides[1], |cache, looks, place, rng| {
+                scattered(cache, &estimator, looks, place, rng, Part::Surface)
+            });
         outcome.seconds[1] = outcome.seconds[1] + clock.elapsed();
         clock = Stopwatch::start();
-        let new_multiple =
-            self.revised(&caches.coarse_multiple, coarse, from[2], 3 * pass + 2, &guides[2], |cache, looks, place, rng| {
-                scattered(cache, &estimator, looks, place, rng, Part::Multiple)
-            });
+        let new_multiple = self.revised(
+            &caches.coarse_multiple,
+            coarse,
+            from[2],
+            3 * pass + 2,
+            &guides[2],
+            |cache, looks, place, rng| scattered(cache, &estimator, looks, place, rng, Part::Multiple),
+        );
         outcome.seconds[2] = outcome.seconds[2] + clock.elapsed();
         outcome.computed[3] += put(&mut caches.coarse_irradiance, on_surfaces, from[0], new_irradiance, &mut guides[0]);
         outcome.computed[1] += put(&mut caches.surface, light, from[1], new_surface, &mut guides[1]);
