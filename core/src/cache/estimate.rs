@@ -230,7 +230,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
     ///
     /// ```text
     /// E = ∫ cos θ (T L_surface + ∫ T σₛ L_i dt) dω,   ∇E: light from a surface as an area light that
-    /// stays, ∇(cos θ) included; light from the medium by translating the path, cos θ frozen
+    /// stays, light from the medium as Shift says, ∇(cos θ) included in both
     /// ```
     pub fn irradiance<'g>(
         &self,

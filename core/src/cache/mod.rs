@@ -18,11 +18,12 @@
 //! |---|---|
 //! | `record` | [`Record`], [`Facing`]: what is stored |
 //! | `radius` | Eq. 34, limits, clamping of gradients and neighbours |
-//! | `extrapolate` | Eq. 35: [`Blend`] |
+//! | `extrapolate` | Eq. 35, and a mixture of second order: [`Blend`] |
 //! | `index` | [`Index`]: which spheres contain this point |
 //! | `store` | [`Cache`]: records, attachments, index |
 //! | `lookup` | look-ups in the medium and on surfaces |
 //! | `aim` | where random walks start towards |
+//! | `guide` | [`Guide`], [`Guided`]: where light was found to come from; [`Looks`]: how samples are drawn |
 //! | `estimate` | [`Estimator`]: what records are made of |
 //! | `eye` | [`places`] and [`radiance`] of eye rays |
 //! | [`bytes`] | caches as bytes, to be saved |

@@ -5,9 +5,13 @@
 //! ∇(W_k L_s) = W_k L_s Σ_i [∇σₛ(x_i)/σₛ(x_i) − ∇τ_joint(x_{i−1}, x_i)] + W_k ∇L_s(x_k)
 //! ```
 //!
-//! Jarosz et al. 2008, Eq. 27–30, as in the sheet's § 1.7: the whole path is translated with its
-//! start; phase functions, densities, lengths and roulette are frozen. Departs from the paper:
+//! Jarosz et al. 2008, Eq. 27–30, as in the sheet's § 1.7: there the whole path is translated with its
+//! start, and everything but extinction and scattering is frozen. Departs from the paper:
 //!
+//! - vertices move less the nearer they are to the wall behind them or to a lamp ([`Shift`]): translated paths
+//!   cross walls, and the gradient of the volume's border was missing. The sums above get a factor `Πφ` on each
+//!   `∇` and the terms of [`Weight::advance_by`]; phase functions turn with their directions. Densities,
+//!   lengths, roulette and visibility stay frozen;
 //! - lengths come from delta tracking, which suits heterogeneous media; Eq. 29 remains as a choice;
 //! - within its near field ([`Light::steep_field`](crate::light::Light::steep_field): all of space for
 //!   lights without extent) a light is joined not to the collisions but to a point of every segment,
@@ -23,7 +27,7 @@
 //!
 //! | file | holds |
 //! |---|---|
-//! | `weight` | [`Weight`]: a path's weight and its gradient, in forward mode |
+//! | `weight` | [`Weight`]: a path's weight and its gradient, in forward mode; [`Shift`]: how vertices move |
 //! | `flight` | the distance to the next collision: delta tracking, or J's Eq. 29 |
 //! | `walk` | [`Walk`]: one path; [`Incoming`]: the light it brings |
 //! | `estimate` | [`sample`], [`sample_directional`]: sums over paths |

@@ -44,7 +44,7 @@ pub struct CacheArguments {
     /// Caches not to use: their light is estimated anew at every point; may be repeated.
     #[arg(long, value_name = "CACHE", value_enum)]
     pub uncached: Vec<Kind>,
-    /// How records are carried to other points [default: exponential-mean in homogeneous media, else linear].
+    /// How records are carried to other points [default: curved].
     #[arg(long, value_enum)]
     pub extrapolation: Option<Carrying>,
     /// How light straight from the lights is scattered once.

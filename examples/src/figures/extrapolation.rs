@@ -21,11 +21,12 @@ const LAMP: Vec3 = Vec3::new(-0.3, 0.2, 0.2);
 
 const EXACT: Marching = Marching { steps: Steps::Gauss(12), offset: 0.0 };
 
-/// The ways, from the coarsest to the one the paper proposes.
-pub const WAYS: [(&str, Extrapolation); 3] = [
+/// The ways, from the coarsest to the one the paper proposes, and the one that pictures are made with.
+pub const WAYS: [(&str, Extrapolation); 4] = [
     ("constant", Extrapolation::Constant),
     ("linear", Extrapolation::Linear),
     ("exponential", Extrapolation::Exponential),
+    ("curved", Extrapolation::Curved),
 ];
 
 /// A slice of `edge`² pixels, row by row from the top.
@@ -38,15 +39,15 @@ pub struct Slice {
     /// The true radiance.
     pub truth: Vec<f32>,
     /// Extrapolated radiance, for each of [`WAYS`].
-    pub carried: [Vec<f32>; 3],
+    pub carried: [Vec<f32>; 4],
 }
 
 impl Slice {
     /// `Σ|L̂ − L| / ΣL` for each of [`WAYS`].
     #[must_use]
-    pub fn errors(&self) -> [f64; 3] {
+    pub fn errors(&self) -> [f64; 4] {
         let light: f64 = self.truth.iter().map(|l| f64::from(*l)).sum();
-        [0, 1, 2].map(|way| {
+        [0, 1, 2, 3].map(|way| {
             let pairs = self.carried[way].iter().zip(&self.truth);
             pairs.map(|(a, b)| f64::from((a - b).abs())).sum::<f64>() / light
         })

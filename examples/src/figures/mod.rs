@@ -4,7 +4,7 @@
 //! | file | holds |
 //! |---|---|
 //! | [`radius`] | Fig. 4: valid radii against the optimal one |
-//! | [`extrapolation`] | Fig. 5: records carried in three ways |
+//! | [`extrapolation`] | Fig. 5: records carried in four ways |
 //! | `rendered` | Fig. 6 to 10: pictures beside path tracing |
 //! | `records` | where records lie |
 //! | `montage`, `plot` | pictures made of pictures; line plots |
@@ -23,7 +23,7 @@ use fogbow::spectrum::Spectrum;
 
 use crate::cli::Failure;
 use extrapolation::{Slice, WAYS};
-use plot::{BLACK, BLUE, GREEN, GREY, Line, ORANGE, Plot};
+use plot::{BLACK, BLUE, GREEN, GREY, Line, ORANGE, PURPLE, Plot};
 use radius::{Claims, Radii, TOLERANCE};
 
 /// What to make, and where.
@@ -170,16 +170,18 @@ fn fifth(plan: &Plan) -> Result<String, Failure> {
     let mut page = format!(
         "## Fig. 5: extrapolation\n\nLight of a lamp, scattered once, on a slice of {0} × {0} m beside it; above in even fog, \
          below in smoke. From left to right the truth, then the same records (ε = {1}) carried as constants, linearly, \
-         exponentially (J's Eq. 35).\n\n![slices](fig-05-slices.png)\n\n",
+         exponentially (J's Eq. 35), and curved, as pictures are made here.\n\n![slices](fig-05-slices.png)\n\n",
         2.0 * extrapolation::HALF,
         extrapolation::TOLERANCE,
     );
-    let mut table = "| medium | records | constant | linear | exponential |\n|---|---|---|---|---|\n".to_owned();
+    let mut table =
+        "| medium | records | constant | linear | exponential | curved |\n|---|---|---|---|---|---|\n".to_owned();
     let mut rows = Vec::new();
     for (name, slice) in [("even fog", extrapolation::homogeneous(edge)), ("smoke", extrapolation::heterogeneous(edge))]
     {
-        let [constant, linear, exponential] = slice.errors().map(|e| 100.0 * e);
-        table += &format!("| {name} | {} | {constant:.2} % | {linear:.2} % | {exponential:.2} % |\n", slice.records);
+        let [constant, linear, exponential, curved] = slice.errors().map(|e| 100.0 * e);
+        let percent = format!("{constant:.2} % | {linear:.2} % | {exponential:.2} % | {curved:.2} %");
+        table += &format!("| {name} | {} | {percent} |\n", slice.records);
         let [values, errors] = scanlines(&slice);
         for (what, plot) in [("line", values), ("errors", errors)] {
             let file = format!("fig-05-{}-{what}.svg", name.replace(' ', "-"));
@@ -216,7 +218,7 @@ fn scanlines(slice: &Slice) -> [Plot<'static>; 2] {
     let truth = row(&slice.truth);
     let (mut values, mut errors) = (Vec::new(), Vec::new());
     values.push(Line { name: "truth", colour: GREY, width: 4.0, points: truth.clone() });
-    for (((name, _), carried), colour) in WAYS.iter().zip(&slice.carried).zip([ORANGE, GREEN, BLUE]) {
+    for (((name, _), carried), colour) in WAYS.iter().zip(&slice.carried).zip([ORANGE, GREEN, BLUE, PURPLE]) {
         let points = row(carried);
         let relative = points.iter().zip(&truth).map(|(p, t)| [p[0], (p[1] / t[1] - 1.0).abs()]).collect();
         values.push(Line { name, colour, width: 1.2, points });

@@ -13,6 +13,7 @@ const BOTTOM: f64 = 40.0;
 pub(super) const GREY: &str = "#bbbbbb";
 pub(super) const BLACK: &str = "#000000";
 pub(super) const BLUE: &str = "#0072b2";
+pub(super) const PURPLE: &str = "#cc79a7";
 pub(super) const ORANGE: &str = "#d55e00";
 pub(super) const GREEN: &str = "#009e73";
 
