@@ -118,6 +118,9 @@ pub struct RadianceCaches {
     pub coarse_irradiance: Option<SurfaceCache<'static>>,
     /// Marks of the views that were filled to the end: for them nothing is missing.
     pub views: Vec<u64>,
+    /// Records that no fill will estimate again: coarse irradiance, light of surfaces, coarse multiple
+    /// scattering, multiple scattering, irradiance.
+    settled: [usize; 5],
 }
 
 /// Names of the caches, in the order of [`RadianceCaches::counts`].
@@ -137,6 +140,7 @@ impl RadianceCaches {
             coarse_multiple: volume(settings.coarse_multiple()),
             coarse_irradiance: settings.coarse_irradiance().map(|_| Cache::growing(1)),
             views: Vec::new(),
+            settled: [0; 5],
         }
     }
 
@@ -160,6 +164,19 @@ impl RadianceCaches {
         let volume = |cache: &Option<VolumeCache<'_>>| cache.as_ref().map_or((0, 0), |c| (c.len(), c.bytes()));
         let surface = self.irradiance.as_ref().map_or((0, 0), |c| (c.len(), c.bytes()));
         [volume(&self.single), volume(&self.surface), volume(&self.multiple), surface]
+    }
+
+    /// Records of the caches that are estimated more than once, in the order they are made.
+    fn all_counts(&self) -> [usize; 5] {
+        let volume = |cache: &Option<VolumeCache<'_>>| cache.as_ref().map_or(0, Cache::len);
+        let surface = |cache: &Option<SurfaceCache<'_>>| cache.as_ref().map_or(0, Cache::len);
+        [
+            surface(&self.coarse_irradiance),
+            volume(&self.surface),
+            volume(&self.coarse_multiple),
+            volume(&self.multiple),
+            surface(&self.irradiance),
+        ]
     }
 
     /// The same of the caches that serve the making of others: multiple scattering, irradiance.

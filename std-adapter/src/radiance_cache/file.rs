@@ -318,6 +318,7 @@ pub fn decode(file: &[u8], settings: Settings, tag: u64) -> Result<RadianceCache
     fill(&mut caches.coarse_multiple, &rows, 4, tag)?;
     fill(&mut caches.coarse_irradiance, &rows, 5, tag)?;
     caches.views = views;
+    caches.settled = caches.all_counts();
     Ok(caches)
 }
 

@@ -284,20 +284,17 @@ where
         let in_medium = |place: &Place| place.normal.is_none();
         let in_sight = |place: &Place| place.normal.is_some() && place.is_seen;
         outcome.search = clock.elapsed();
-        if all.iter().all(Vec::is_empty) {
+        if all.iter().all(Vec::is_empty) && caches.settled == caches.all_counts() {
             caches.views.push(view);
             return outcome;
         }
 
-        let before = [
-            caches.coarse_irradiance.as_ref().map_or(0, Fill::count),
-            caches.surface.as_ref().map_or(0, Fill::count),
-            caches.coarse_multiple.as_ref().map_or(0, Fill::count),
-            caches.multiple.as_ref().map_or(0, Fill::count),
-            caches.irradiance.as_ref().map_or(0, Fill::count),
-        ];
-        // What the records made here have learnt, in the order of `before`.
-        let mut guides: [Vec<Guide>; 5] = Default::default();
+        // From these records on nothing is final: what a cancelled fill has left is estimated again, too.
+        let before = caches.settled;
+        // What the records from there on have learnt.
+        let counts = caches.all_counts();
+        let mut guides: [Vec<Guide>; 5] =
+            core::array::from_fn(|i| vec![Guide::default(); counts[i].saturating_sub(before[i])]);
         // What lights everything else: coarse, because whoever asks sees many records at once. Made by
         // whole walks, and few, because it is revised with what those have told.
         if let (Some(cache), Some(effort)) = (&mut caches.coarse_irradiance, settings.coarse_irradiance()) {
@@ -415,6 +412,7 @@ where
         outcome.cancelled = self.control.is_cancelled();
         if !outcome.cancelled {
             caches.views.push(view);
+            caches.settled = caches.all_counts();
         }
         outcome
     }
