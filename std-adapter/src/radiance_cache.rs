@@ -90,12 +90,12 @@ impl Settings {
 
     /// Of the records on surfaces that light all other records.
     fn coarse_irradiance(&self) -> Option<Effort> {
-        self.irradiance.map(|effort| effort.coarser(3.0, 1))
+        self.irradiance.map(|effort| effort.coarser(3.0, 2))
     }
 
     /// Of the records at which random walks of the final ones end.
     fn coarse_multiple(&self) -> Option<Effort> {
-        self.multiple.map(|effort| effort.coarser(1.5, 1))
+        self.multiple.map(|effort| effort.coarser(1.5, 2))
     }
 }
 
