@@ -120,7 +120,7 @@ pub struct RadianceCaches {
     pub views: Vec<u64>,
     /// Records that no fill will estimate again: coarse irradiance, light of surfaces, coarse multiple
     /// scattering, multiple scattering, irradiance.
-    settled: [usize; 5],
+    pub settled: [usize; 5],
 }
 
 /// Names of the caches, in the order of [`RadianceCaches::counts`].
