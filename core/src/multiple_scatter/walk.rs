@@ -74,7 +74,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Walk<'_, M, S> {
     /// One path from `point`; `first` makes its first direction, uniform over the sphere.
     ///
     /// `outgoing(ray, hit)` is the radiance a surface sends back along the ray, as for
-    /// [`single_scatter::visit_surfaces`]; it is asked where the walk meets a surface after its first
+    /// [`crate::single_scatter::visit_surfaces`]; it is asked where the walk meets a surface after its first
     /// collision.
     pub fn path(
         &self,
