@@ -347,7 +347,7 @@ fn irradiance_of_forward_fog_beside_an_edge_changes_as_its_gradient_says() {
 /// Where a walk goes on, the phase function changes with the directions before and after it.
 #[test]
 fn light_scattered_forwards_often_changes_as_its_gradient_says() {
-    check_samples(FORWARDS, 3, 8192);
-    check_estimates(FORWARDS, 64, 4096);
-    check_irradiance(FORWARDS, 64, 4096);
+    check_samples(FORWARDS, 3, 16384);
+    check_estimates(FORWARDS, 64, 8192);
+    check_irradiance(FORWARDS, 64, 8192);
 }
