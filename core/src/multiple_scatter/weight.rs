@@ -22,7 +22,7 @@ const MIN_COSINE: f32 = 0.02;
 /// for a vertex at `t` in direction `ω`. Near the start vertices go along, or `1/t²` would make the gradient
 /// noise; on surfaces and around lights they stay. So none crosses a wall, the volume that fills with light
 /// as the start leaves one is part of the gradient, and the steep light around a lamp adds no noise.
-/// With nothing in reach this is J's translation.
+/// With nothing in reach this is J's translation. Neither J nor the sheet (§ 1.7) has it; exact but for visibility.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Shift {
     /// `φ`.
@@ -119,10 +119,8 @@ impl Weight {
         scattering: Spectrum,
         scattering_gradient: &Gradient,
     ) -> Self {
-        let frozen = kappa * transmittance;
-        let step = frozen * scattering;
-        let slope = (*scattering_gradient - *thickness_gradient * scattering) * frozen;
-        Self { value: self.value * step, gradient: self.gradient * step + slope * self.value, ..*self }
+        let thickness = Thickness { gradient_joint: *thickness_gradient, ..Thickness::default() };
+        self.advance_by(&Shift::TRANSLATION, kappa, transmittance, &thickness, scattering, scattering_gradient)
     }
 
     /// One vertex on, where vertices are moved by `shift`.
@@ -131,8 +129,8 @@ impl Weight {
     /// ∇a = a ∇ ln(dV/r²) + κ T (φ ∇σₛ − σₛ ∇τ_φ),   ∇τ_φ = φ ∇τ_joint + (1 − φ) ∇τ_fixed
     /// ```
     ///
-    /// `thickness` gives the gradients; its value is not used. With [`Shift::TRANSLATION`] the same as
-    /// [`Weight::advance`].
+    /// `thickness` gives the gradients; its value is not used. Source: J's Eq. 30 by the
+    /// change of variables that [`Shift`] describes, exact but for visibility.
     #[inline]
     #[must_use]
     pub fn advance_by(

@@ -29,7 +29,8 @@ use crate::world::{WithMedium, World};
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Radiance caching")]
 pub struct CacheArguments {
-    /// Error tolerance of all caches: smaller is finer and slower.
+    /// Error tolerance of all caches: smaller is finer and slower [default: 0.2 for single, 2 for surface, 1 less the
+    /// mean cosine of the phase function for multiple, 0.35 for irradiance].
     #[arg(long, value_name = "E", value_parser = output::positive)]
     pub tolerance: Option<f64>,
     /// Error tolerance of one cache, as CACHE=E; may be repeated.
@@ -38,7 +39,7 @@ pub struct CacheArguments {
     /// Random walks per record of multiple scattering; the other caches in proportion [default: 1024].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     pub paths: Option<u32>,
-    /// Degree of expansions in anisotropic media [default: from the phase function and the tolerance].
+    /// Degree of expansions in anisotropic media [default: from the phase function].
     #[arg(long, value_name = "L", value_parser = clap::value_parser!(u32).range(0..=16))]
     pub degree: Option<u32>,
     /// Caches not to use: their light is estimated anew at every point; may be repeated.
@@ -216,11 +217,11 @@ impl CacheJob<'_> {
             Single::Cached => true,
         };
         // Expansions change faster than the mean over directions, from which radii come.
-        let sharpness = 1.0 - f64::from(phase.mean_cosine().map(f32::abs).max_element());
+        let breadth = 1.0 - f64::from(phase.mean_cosine().map(f32::abs).max_element());
         cache::Settings {
             single: if cached { effort(Kind::Single, 0.2, 16.0, degree(1, 0.0), 0.1) } else { None },
             surface: effort(Kind::Surface, 2.0, 256.0, degree(1, 1.5), 0.1),
-            multiple: effort(Kind::Multiple, sharpness.max(0.1), 512.0, degree(2, 0.0), 0.1),
+            multiple: effort(Kind::Multiple, breadth.max(0.1), 512.0, degree(2, 0.0), 0.1),
             irradiance: effort(Kind::Irradiance, 0.35, 256.0, 0, 0.1),
             rays: 16384,
             extrapolation: arguments.extrapolation.map_or_else(Extrapolation::default, Into::into),
