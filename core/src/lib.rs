@@ -8,7 +8,9 @@ pub use bytemuck;
 pub use glam;
 pub use rand_core;
 
+pub mod beams;
 pub mod cache;
+pub mod covariance;
 pub mod host;
 pub mod light;
 pub mod march;
@@ -17,6 +19,7 @@ pub mod medium;
 pub mod multiple_scatter;
 pub mod path;
 pub mod phase;
+pub mod photon;
 pub mod sampling;
 pub mod sh;
 pub mod single_scatter;

@@ -1,0 +1,1 @@
+//! Layer 7: covariances of light fields in participating media.
