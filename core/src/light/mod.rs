@@ -7,11 +7,13 @@
 //! | [`point`] | point, Phong and spot lights |
 //! | [`area`] | quad, sphere and triangle-mesh lights |
 //! | [`distant`] | sun, constant and image environments |
+//! | [`emission`] | [`Emission`]: rays that leave a light, with their power |
 //!
 //! Point lights take radiant **intensity** (W/sr); the constructors from flux say so.
 
 pub mod area;
 pub mod distant;
+pub mod emission;
 pub mod geometry;
 pub mod point;
 
@@ -19,6 +21,7 @@ use glam::{Vec2, Vec3};
 
 pub use area::{MeshLight, QuadLight, SphereLight, Triangle};
 pub use distant::{EnvironmentMap, Sun};
+pub use emission::Emission;
 pub use geometry::{Falloff, Incident, Source};
 pub use point::{PhongLight, PointLight, SpotLight};
 

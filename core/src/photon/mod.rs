@@ -1,4 +1,9 @@
-//! Layer 6: walks of photons from the lights.
+//! Layer 6b: walks of photons from the lights.
+//!
+//! | file | holds |
+//! |---|---|
+//! | `mod` | [`Event`]: what happens to a photon |
+//! | [`trace`](mod@trace) | [`trace()`]: the walk |
 //!
 //! One walk serves all methods that send light out instead of fetching it (covariance tracing, photon
 //! beams, virtual lights): it tells what happens as [`Event`]s, in order, and whoever listens keeps
@@ -6,7 +11,11 @@
 //!
 //! Directions in events are those of *travel*, as light flies.
 
+pub mod trace;
+
 use glam::Vec3;
+
+pub use trace::trace;
 
 use crate::host::{Hit, Properties};
 use crate::math::Ray;

@@ -1,0 +1,172 @@
+//! The walk of a photon.
+
+use super::Event;
+use crate::host::{Hit, Medium, Rng, Scene};
+use crate::math::{Bounds, Ray};
+use crate::path::trace::leave;
+use crate::path::{Settings, World};
+use crate::sampling::{Generator, discrete, uniform, uniform2};
+use crate::spectrum::Spectrum;
+use crate::surface::{Surface, SurfaceSample};
+use crate::transmittance::flight;
+
+/// A walk longer than this ends: a guard against worlds that absorb nothing.
+const MAX_SEGMENTS: u32 = 100_000;
+
+/// Null interfaces that one flight passes at most.
+const MAX_NULLS: u32 = 1024;
+
+/// Largest probability of going on where roulette is played. Larger: walks in worlds without absorption
+/// take longer to end. Smaller: their powers spread.
+const MAX_SURVIVAL: f32 = 0.99;
+
+/// Sends one photon from the lights through the world and tells `visit` what happens to it.
+///
+/// A light is chosen in proportion to its [power](crate::light::Light::power), a ray drawn by
+/// [`Light::emit`](crate::light::Light::emit); collisions come by delta tracking, powers are multiplied by
+/// albedos, and after [`Settings::roulette_after`] scatterings roulette keeps them near what was emitted.
+/// Sums over events of N walks, divided by N, are unbiased:
+///
+/// ```text
+/// ∫ f Φ dV  =  E Σ_flights power ∫₀^distance f dt  =  E Σ_collisions power f/σₜ        Φ fluence (W·m⁻²)
+/// ```
+///
+/// * Light that is scattered to an eye at the end of a flight was scattered at most
+///   [`Settings::max_scatterings`] times: a walk has fewer scatterings by one, and with 0 there is none.
+/// * Refraction changes radiance by `η²`, but no power; surfaces have geometric normals only, so no other
+///   correction is due (Veach 1997, §§ 5.2–5.3).
+/// * Null interfaces are passed within one flight. Every vertex draws as many numbers from `rng`.
+/// * Glowing media send no photons.
+///
+/// `bounds` should hold all surfaces and media; by it, distant lights know where to shine.
+///
+/// ```
+/// # use fogbow::{host::Empty, light::{Light, PointLight}, math::*, medium::Homogeneous, phase::Lobe};
+/// # use fogbow::{path::{Settings, World}, photon::{self, Event}, sampling::Generator, spectrum::Spectrum};
+/// // A lamp in fog that absorbs: of its power, all is absorbed, after 1/σₐ on average.
+/// let fog = Homogeneous::new(Spectrum::splat(2.0), Spectrum::ZERO, Lobe::Isotropic)?;
+/// let lamps = [Light::Point(PointLight::from_flux(Vec3::ZERO, Spectrum::ONE)?)];
+/// let world = World { medium: &fog, scene: &Empty, lights: &lamps };
+/// let bounds = Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE };
+/// let (mut rng, mut absorbed, mut length) = (Generator::new(1), 0.0, 0.0);
+/// for _ in 0..4000 {
+///     photon::trace(&world, &bounds, &Settings::default(), &mut rng, &mut |event: &Event<'_>| match event {
+///         Event::Flew { distance, .. } => length += distance / 4000.0,
+///         Event::Collided { power, .. } => absorbed += power[0] / 4000.0,
+///         _ => {}
+///     });
+/// }
+/// assert!((absorbed - 1.0).abs() < 1e-4 && (length - 0.5).abs() < 0.03);
+/// # Ok::<(), Box<dyn core::error::Error>>(())
+/// ```
+pub fn trace<M: Medium + ?Sized, S: Scene + ?Sized>(
+    world: &World<'_, M, S>,
+    bounds: &Bounds,
+    settings: &Settings,
+    rng: &mut (impl Rng + ?Sized),
+    visit: &mut impl FnMut(&Event<'_>),
+) {
+    let choice = uniform(rng);
+    let (position, direction) = (uniform2(rng), uniform2(rng));
+    if settings.max_scatterings == 0 {
+        return;
+    }
+    let lights = world.lights.iter().enumerate().map(|(i, light)| (light.power(bounds).mean(), (i, light)));
+    let Some(((index, light), chosen)) = discrete::choose(lights, choice) else { return };
+    let Some(emission) = light.emit(bounds, position, direction) else { return };
+    let mut power = emission.power * (1.0 / chosen.probability);
+    if power.is_black() {
+        return;
+    }
+    let mut ray = emission.ray;
+    if let Some(normal) = emission.normal {
+        ray.origin = leave(ray.origin, normal, ray.direction, 0.0);
+    }
+    visit(&Event::Emitted { light: index, ray: &ray, normal: emission.normal, power });
+    // Roulette keeps powers near this one.
+    let usual = power.max_element();
+
+    let mut scatterings = 0;
+    for segment in 0..MAX_SEGMENTS {
+        let (reach, hit) = reach(world.scene, &ray);
+        let u_distance = uniform(rng);
+        let mut child = Generator::new(u64::from(rng.next_u32()) | u64::from(segment) << 32);
+        let lobe_choice = uniform(rng);
+        let lobe_u = uniform2(rng);
+        let survival = uniform(rng);
+        let is_last = scatterings + 1 >= settings.max_scatterings;
+
+        let flown = flight(world.medium, &reach, power, u_distance, &mut child);
+        visit(&Event::Flew { reach: &reach, distance: flown.distance, power });
+        let arrived = power * flown.weight;
+        // Whether the walk goes on with `after`, and with what power.
+        let roulette = |after: Spectrum| {
+            if is_last || after.is_black() {
+                return None;
+            }
+            if scatterings + 1 < settings.roulette_after {
+                return Some(after);
+            }
+            let survives = (after.max_element() / usual).min(MAX_SURVIVAL);
+            (survival < survives).then(|| after * (1.0 / survives))
+        };
+
+        let next = if let Some(properties) = flown.collision {
+            let point = reach.at(flown.distance);
+            let sample = properties.phase.sample(-ray.direction, lobe_u);
+            let after = roulette(arrived * properties.albedo() * sample.weight);
+            visit(&Event::Collided {
+                point,
+                incoming: ray.direction,
+                properties: &properties,
+                power: arrived,
+                outgoing: after.map(|_| sample.to_light),
+            });
+            after.map(|after| (after, Ray::new(point, sample.to_light)))
+        } else if let Some(hit) = hit {
+            let point = reach.at(hit.distance);
+            let to_eye = -ray.direction;
+            let sample = hit.surface.sample(hit.normal, to_eye, lobe_choice, lobe_u);
+            let after = sample.and_then(|sample| {
+                let weight = weight_of_power(&hit, &sample, to_eye);
+                Some((roulette(arrived * weight)?, sample.to_light))
+            });
+            let outgoing = after.map(|(_, outgoing)| outgoing);
+            visit(&Event::Met { point, incoming: ray.direction, hit: &hit, power: arrived, outgoing });
+            after.map(|(after, outgoing)| (after, Ray::new(leave(point, hit.normal, outgoing, hit.distance), outgoing)))
+        } else {
+            None
+        };
+        let Some((after, onward)) = next else { return };
+        (power, ray) = (after, onward);
+        scatterings += 1;
+    }
+}
+
+/// The way to the next surface that is not null, or without end, and that surface with its distance from
+/// the start of the way.
+fn reach<S: Scene + ?Sized>(scene: &S, ray: &Ray) -> (Ray, Option<Hit>) {
+    let mut rest = *ray;
+    for _ in 0..MAX_NULLS {
+        let Some(hit) = scene.closest_hit(&rest) else { break };
+        let point = rest.at(hit.distance);
+        if hit.surface != Surface::Null {
+            let distance = (point - ray.origin).dot(ray.direction).max(0.0);
+            return (ray.with_length(distance), Some(Hit { distance, ..hit }));
+        }
+        let origin = leave(point, hit.normal, ray.direction, hit.distance);
+        rest = Ray { origin, direction: ray.direction, length: rest.length - hit.distance };
+    }
+    (*ray, None)
+}
+
+/// What a surface does to power, where a [`SurfaceSample`] says what it does to radiance.
+#[inline]
+fn weight_of_power(hit: &Hit, sample: &SurfaceSample, to_eye: glam::Vec3) -> Spectrum {
+    match hit.surface {
+        Surface::Dielectric { transmittance, .. } if hit.normal.dot(to_eye) * hit.normal.dot(sample.to_light) < 0.0 => {
+            transmittance
+        }
+        _ => sample.weight,
+    }
+}
