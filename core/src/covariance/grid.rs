@@ -1,0 +1,89 @@
+//! The covariance grid: anywhere in the volume, how fast the light varies and in which direction.
+
+use glam::Vec3;
+
+use super::lattice::{Lattice, LatticeError};
+use super::metrics::Voxel;
+use crate::math::Symmetric3;
+
+/// A filled grid, ready to be asked.
+#[derive(Debug, Clone, Copy)]
+pub struct Grid<'a> {
+    lattice: Lattice,
+    voxels: &'a [Voxel],
+    paths: u64,
+}
+
+impl<'a> Grid<'a> {
+    /// From one voxel per cell of the lattice, filled by `paths` photons.
+    ///
+    /// # Errors
+    /// Storage of another length.
+    pub fn new(lattice: Lattice, voxels: &'a [Voxel], paths: u64) -> Result<Self, LatticeError> {
+        if voxels.len() != lattice.cell_count() {
+            return Err(LatticeError::Storage);
+        }
+        Ok(Self { lattice, voxels, paths })
+    }
+
+    /// The lattice.
+    #[must_use]
+    pub fn lattice(&self) -> &Lattice {
+        &self.lattice
+    }
+
+    /// The voxels, one per cell.
+    #[must_use]
+    pub fn voxels(&self) -> &'a [Voxel] {
+        self.voxels
+    }
+
+    /// How many photons filled it.
+    #[must_use]
+    pub fn paths(&self) -> u64 {
+        self.paths
+    }
+
+    /// `Γ` (cycles²/m²) at `point`, interpolated between the cells around by their energy; `None` outside, and
+    /// where no photon came by.
+    #[inline]
+    #[must_use]
+    pub fn covariance(&self, point: Vec3) -> Option<Symmetric3> {
+        self.voxel(point)?.covariance()
+    }
+
+    /// What the cells around `point` gathered, interpolated; `None` outside.
+    #[inline]
+    #[must_use]
+    pub fn voxel(&self, point: Vec3) -> Option<Voxel> {
+        let mut sum = Voxel::EMPTY;
+        for (cell, weight) in self.lattice.around(point)? {
+            let voxel = &self.voxels[cell];
+            sum.merge(&Voxel { sum: voxel.sum.times(weight), weight: voxel.weight * weight });
+        }
+        Some(sum)
+    }
+
+    /// Fluence (W·m⁻²) at `point`, interpolated: flux times length in a cell over its volume. `None` outside.
+    #[must_use]
+    pub fn fluence(&self, point: Vec3) -> Option<f32> {
+        let voxel = self.voxel(point)?;
+        let volume = self.lattice.cell();
+        Some(voxel.weight / (volume.x * volume.y * volume.z * self.paths.max(1) as f32))
+    }
+}
+
+/// Adds what another grid of the same lattice gathered, voxel by voxel: partial grids of threads, in an order the
+/// host fixes.
+///
+/// ```
+/// # use fogbow::covariance::{Voxel, merge};
+/// let mut all = [Voxel::EMPTY; 2];
+/// merge(&mut all, &[Voxel { weight: 1.0, ..Voxel::EMPTY }; 2]);
+/// assert_eq!(all[1].weight, 1.0);
+/// ```
+pub fn merge(into: &mut [Voxel], from: &[Voxel]) {
+    for (a, b) in into.iter_mut().zip(from) {
+        a.merge(b);
+    }
+}
