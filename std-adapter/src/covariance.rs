@@ -164,7 +164,8 @@ pub fn fill<M: Medium + Sync + ?Sized, S: Scene + Sync + ?Sized>(
         let mut next = 0;
         while next < PARTS {
             let end = (next + together).min(PARTS);
-            let parts: Vec<_> = (next..end).into_par_iter().with_max_len(1).map(part).collect::<Result<_, _>>()?;
+            let these: Vec<u64> = (next..end).collect();
+            let parts: Vec<_> = these.into_par_iter().with_max_len(1).map(part).collect::<Result<_, _>>()?;
             parts.iter().for_each(|part| merge(&mut voxels, part));
             next = end;
         }
