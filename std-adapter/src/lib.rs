@@ -6,6 +6,7 @@
 //! | [`seed`] | the random numbers of each pixel and sample: independent, or low-discrepancy |
 //! | [`tiles`] | parallel rendering, the same bits for any number of threads |
 //! | [`progress`] | progress, cancellation |
+//! | [`photon_beams`] | shooting and gathering photon beams in parallel, pass by pass |
 //! | [`radiance_cache`] | filling radiance caches in parallel; their files |
 //! | [`image`] | PNG, PFM and (feature `exr`, on by default) OpenEXR files |
 //! | [`stats`] | seconds per phase, queries of the world |
@@ -37,6 +38,7 @@
 
 pub mod film;
 pub mod image;
+pub mod photon_beams;
 pub mod progress;
 pub mod radiance_cache;
 pub mod seed;
