@@ -1,15 +1,16 @@
 //! Progressive photon beams in parallel, the same bits for any number of threads.
 //!
-//! A pass shoots photons, makes a tree over their beams and takes one sample of every pixel, with a blur
+//! A pass shoots photons, makes a tree over their beams and takes some samples of every pixel, with a blur
 //! narrower than that of the pass before. Photons are dealt into jobs of fixed size, each with random numbers
 //! of its own, and their beams are put together in the order of jobs.
 
 use core::fmt;
+use core::num::NonZero;
 
 use fogbow::beams::{self, Beams, Piece, kernel};
 use fogbow::host::{Medium, Scene};
 use fogbow::math::{Bounds, Ray, Vec3};
-use fogbow::path::{self, Radiance, World};
+use fogbow::path::{self, InScattered, Radiance, World};
 use fogbow::sampling::uniform::mix;
 use fogbow::spectrum::Spectrum;
 use fogbow::storage::Full;
@@ -26,6 +27,9 @@ use crate::tiles::{self, Outcome, RenderError, Sample, render_prepared};
 pub struct Settings {
     /// Paths sent from the lights in each pass.
     pub paths: u32,
+    /// Samples per pixel in each pass. The first gathers beams for all of them, because these cost
+    /// more than the rest of a sample and are less noisy.
+    pub samples: NonZero<u32>,
     /// Radius of the blur in the first pass (m).
     pub radius: f32,
     /// By which it narrows: see [`kernel::radius`].
@@ -45,7 +49,14 @@ impl Settings {
     pub fn new(bounds: &Bounds) -> Self {
         let size = bounds.size().length();
         let size = if size.is_finite() { size } else { 1.0 };
-        Self { paths: 8192, radius: 0.01 * size, alpha: 0.6, largest: 0.0, longest: 0.1 * size }
+        Self {
+            paths: 2048,
+            samples: NonZero::<u32>::MIN.saturating_add(7),
+            radius: 0.005 * size,
+            alpha: 0.6,
+            largest: 0.0,
+            longest: 0.1 * size,
+        }
     }
 }
 
@@ -157,7 +168,9 @@ where
     Ok(beams)
 }
 
-/// Adds samples to `film` as [`tiles::render`] does, each with photons of its own: a pass per sample.
+/// Adds samples to `film` as [`tiles::render`] does, in passes of [`Settings::samples`] with photons of their own.
+///
+/// [`tiles::Settings::samples`] is rounded up to whole passes, so that light of the medium and of surfaces count alike.
 ///
 /// `ray` is the eye ray of a sample; `radius` is told a point (m) and the pass's radius (m) and says how wide
 /// the kernel is there: `|_, pass| pass` for progressive photon beams, `|point, pass| pass.max(…)` where
@@ -194,7 +207,11 @@ where
         let radius = kernel::radius(settings.radius, settings.alpha, pass);
         Ok::<_, BeamsError>((beams, radius))
     };
-    render_prepared(film, tiles, control, prepare, |(beams, of_pass), sample, rng, layers| {
+    let length = settings.samples;
+    // A multiple of the length, `u32::MAX` included.
+    let samples = tiles.samples.checked_next_multiple_of(length.get()).unwrap_or(u32::MAX / length * length.get());
+    let tiles = &tiles::Settings { samples, ..*tiles };
+    render_prepared(film, tiles, control, length, prepare, |(beams, of_pass), sample, rng, layers| {
         let world = World {
             medium: &CountingMedium { medium: view.world.medium, tally: sample.tally },
             scene: &CountingScene { scene: view.world.scene, tally: sample.tally },
@@ -204,7 +221,12 @@ where
         let width = |point: Vec3| radius(point, *of_pass);
         let largest = settings.largest.max(*of_pass);
         let seen = path::radiance_beyond(&ray, &world, &view.paths, rng, |segment, most, rng| {
-            beams.gather(segment, world.medium, largest, width, most, rng).light
+            if sample.index % length != 0 {
+                return InScattered::default();
+            }
+            let light = beams.gather(segment, world.medium, largest, width, most, rng).light;
+            let share = length.get() as f32;
+            InScattered { single: light.single * share, multiple: light.multiple * share }
         });
         sample.tally.collide(seen.collisions);
         write(&seen, layers);

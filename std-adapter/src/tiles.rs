@@ -5,6 +5,7 @@
 //! threads, tiles and passes change nothing.
 
 use core::fmt;
+use core::num::NonZero;
 use core::time::Duration;
 use std::sync::{Mutex, PoisonError};
 
@@ -144,22 +145,24 @@ where
     Ok(Outcome { samples: film.min_count(), reason, counters, seconds: clock.elapsed() })
 }
 
-/// As [`render`], one sample of every pixel at a time, for methods whose samples share something that is made
-/// anew for each: `prepare` is told the index of the samples that follow, and what it makes is lent to `integrand`.
+/// As [`render`], in passes of `length` samples of every pixel, for methods whose samples share something that is
+/// made anew for each pass: `prepare` is told the number of the pass, and what it makes is lent to `integrand`.
 ///
-/// It may use all threads of the pool it is called in. For bits that do not depend on their number, let it depend on
-/// the index alone.
+/// `prepare` may use all threads of the pool it is called in. For bits that do not depend on their number, let what it
+/// makes depend on the number of the pass alone. Time ends a render between passes; the last is cut short where
+/// [`Settings::samples`] says so.
 ///
 /// # Errors
-/// As [`render`], and what `prepare` fails with; the film then holds the samples up to there.
+/// As [`render`], and what `prepare` fails with; the film then holds the passes up to there.
 ///
 /// ```
+/// use core::num::NonZero;
 /// use fogbow::spectrum::Spectrum;
 /// use fogbow_std::{film::Film, progress::Control, tiles::{RenderError, Settings, render_prepared}};
 /// let mut film = Film::new(2, 2, &["total"]).unwrap();
-/// let settings = Settings { samples: 3, ..Settings::default() };
-/// render_prepared(&mut film, &settings, &Control::default(),
-///     |index| Ok::<f32, RenderError>(index as f32),
+/// let settings = Settings { samples: 6, ..Settings::default() };
+/// render_prepared(&mut film, &settings, &Control::default(), NonZero::new(2).unwrap(),
+///     |pass| Ok::<f32, RenderError>(pass as f32),
 ///     |prepared, _, _, layers| layers[0] = Spectrum::splat(*prepared),
 /// ).unwrap();
 /// assert_eq!(film.mean(0).unwrap().pixels[3], Spectrum::ONE);
@@ -168,6 +171,7 @@ pub fn render_prepared<T, E, P, F>(
     film: &mut Film,
     settings: &Settings,
     control: &Control<'_>,
+    length: NonZero<u32>,
     mut prepare: P,
     integrand: F,
 ) -> Result<Outcome, E>
@@ -191,11 +195,13 @@ where
                 return Ok((Reason::Cancelled, counters));
             }
             let before = reporter.elapsed();
-            let prepared = prepare(done)?;
+            let pass = done / length;
+            let prepared = prepare(pass)?;
             let integrand = |sample: &Sample<'_>, rng: &mut SampleRng, layers: &mut [Spectrum]| {
                 integrand(&prepared, sample, rng, layers);
             };
-            let (until, reporter, film_of) = (done + 1, &reporter, Mutex::new(&mut *film));
+            let until = (pass * length.get()).saturating_add(length.get()).min(settings.samples);
+            let (reporter, film_of) = (&reporter, Mutex::new(&mut *film));
             counters += Pass { film: film_of, settings, control, reporter, integrand: &integrand, until }.run();
             if film.min_count() < until {
                 return Ok((Reason::Cancelled, counters));

@@ -224,14 +224,12 @@ impl Passing {
         let half = float::sqrt((largest2 - distance2) / sine2);
         near = near.max(centre - half);
         far = far.min(centre + half);
-        (far > near).then_some(Self {
-            closest: centre.clamp(near, far),
-            interval: (near, far),
-            centre,
-            distance2,
-            sine2,
-            cosine,
-        })
+        // Also false for NaN; `clamp` takes no empty interval.
+        if !(far > near) {
+            return None;
+        }
+        let closest = centre.clamp(near, far);
+        Some(Self { closest, interval: (near, far), centre, distance2, sine2, cosine })
     }
 
     /// Radiance (W·m⁻²·sr⁻¹) from the piece; `None` where it is farther away than `radius`.

@@ -1,5 +1,7 @@
 //! `fogbow render --method photon-beams`.
 
+use core::num::NonZero;
+
 use clap::{Args, ValueEnum};
 use fogbow::host::Medium;
 use fogbow::light::Light;
@@ -23,10 +25,13 @@ pub struct BeamArguments {
     /// How wide beams are blurred.
     #[arg(long, value_enum, default_value_t = Kernel::Progressive)]
     pub kernel: Kernel,
-    /// Paths sent from the lights in each pass [default: one for two pixels, 1024 at least].
+    /// Paths sent from the lights in each pass [default: one for eight pixels, 1024 at least].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1 << 24))]
     pub beams: Option<u32>,
-    /// Radius of the blur in the first pass, in the scene's unit of length [default: 0.01 of the scene's diagonal].
+    /// Samples per pixel in each pass; beams are gathered by the first of them [default: 8].
+    #[arg(long, value_name = "N")]
+    pub pass_samples: Option<NonZero<u32>>,
+    /// Radius of the blur in the first pass, in the scene's unit of length [default: 0.005 of the scene's diagonal].
     #[arg(long, value_name = "R", value_parser = output::positive)]
     pub radius: Option<f64>,
     /// How fast the blur narrows, in (0, 1]: after i passes its square has shrunk by about i^(alpha-1).
@@ -65,7 +70,8 @@ impl BeamArguments {
     fn settings(&self, world: &World<'_>, pixels: u64) -> Settings {
         let usual = Settings::new(&world.bounds());
         Settings {
-            paths: self.beams.unwrap_or_else(|| (pixels / 2).clamp(1024, 1 << 20) as u32),
+            paths: self.beams.unwrap_or_else(|| (pixels / 8).clamp(1024, 1 << 20) as u32),
+            samples: self.pass_samples.unwrap_or(usual.samples),
             radius: self.radius.map_or(usual.radius, |r| r as f32),
             alpha: self.alpha,
             ..usual

@@ -34,8 +34,8 @@ pub struct RenderArguments {
     /// How light is computed.
     #[arg(long, value_enum, default_value_t = Method::Path)]
     pub method: Method,
-    /// Samples per pixel, for photon beams each a pass with beams of its own [default: what the scene says, for
-    /// radiance caching 64; with --time, as many as fit].
+    /// Samples per pixel, for photon beams rounded up to whole passes [default: what the scene says, for radiance
+    /// caching 64; with --time, as many as fit].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub spp: Option<u32>,
     /// Seconds to render for, on the wall clock.
