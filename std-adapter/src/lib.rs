@@ -7,6 +7,7 @@
 //! | [`tiles`] | parallel rendering, the same bits for any number of threads |
 //! | [`progress`] | progress, cancellation |
 //! | [`covariance`] | filling covariance grids in parallel; their files |
+//! | [`photon_beams`] | shooting and gathering photon beams in parallel, pass by pass |
 //! | [`radiance_cache`] | filling radiance caches in parallel; their files |
 //! | [`image`] | PNG, PFM and (feature `exr`, on by default) OpenEXR files |
 //! | [`stats`] | seconds per phase, queries of the world |
@@ -40,6 +41,7 @@ pub mod covariance;
 mod files;
 pub mod film;
 pub mod image;
+pub mod photon_beams;
 pub mod progress;
 pub mod radiance_cache;
 pub mod seed;

@@ -5,6 +5,7 @@
 //! threads, tiles and passes change nothing.
 
 use core::fmt;
+use core::num::NonZero;
 use core::time::Duration;
 use std::sync::{Mutex, PoisonError};
 
@@ -136,22 +137,104 @@ pub fn render<F>(
 where
     F: Fn(&Sample<'_>, &mut SampleRng, &mut [Spectrum]) + Sync,
 {
-    if settings.samples == 0 {
-        return Err(RenderError::NoSamples);
-    }
-    if settings.tile == 0 {
-        return Err(RenderError::NoTile);
-    }
-    let pool = rayon::ThreadPoolBuilder::new()
-        .num_threads(settings.threads)
-        .build()
-        .map_err(|error| RenderError::Threads(error.to_string()))?;
+    let pool = settings.pool()?;
     let clock = Stopwatch::start();
-    let pixels = u64::from(film.width()) * u64::from(film.height());
-    let reporter = Reporter::new(control, film.total_count(), pixels * u64::from(settings.samples), settings.time);
+    let reporter = settings.reporter(film, control);
     let (reason, counters) = pool.install(|| passes(film, settings, control, &reporter, &integrand));
     reporter.finish();
     Ok(Outcome { samples: film.min_count(), reason, counters, seconds: clock.elapsed() })
+}
+
+/// As [`render`], in passes of `length` samples of every pixel, for methods whose samples share something that is
+/// made anew for each pass: `prepare` is told the number of the pass, and what it makes is lent to `integrand`.
+///
+/// `prepare` may use all threads of the pool it is called in. For bits that do not depend on their number, let what it
+/// makes depend on the number of the pass alone. Time ends a render between passes; the last is cut short where
+/// [`Settings::samples`] says so.
+///
+/// # Errors
+/// As [`render`], and what `prepare` fails with; the film then holds the passes up to there.
+///
+/// ```
+/// use core::num::NonZero;
+/// use fogbow::spectrum::Spectrum;
+/// use fogbow_std::{film::Film, progress::Control, tiles::{RenderError, Settings, render_prepared}};
+/// let mut film = Film::new(2, 2, &["total"]).unwrap();
+/// let settings = Settings { samples: 6, ..Settings::default() };
+/// render_prepared(&mut film, &settings, &Control::default(), NonZero::new(2).unwrap(),
+///     |pass| Ok::<f32, RenderError>(pass as f32),
+///     |prepared, _, _, layers| layers[0] = Spectrum::splat(*prepared),
+/// ).unwrap();
+/// assert_eq!(film.mean(0).unwrap().pixels[3], Spectrum::ONE);
+/// ```
+pub fn render_prepared<T, E, P, F>(
+    film: &mut Film,
+    settings: &Settings,
+    control: &Control<'_>,
+    length: NonZero<u32>,
+    mut prepare: P,
+    integrand: F,
+) -> Result<Outcome, E>
+where
+    T: Sync,
+    E: From<RenderError> + Send,
+    P: FnMut(u32) -> Result<T, E> + Send,
+    F: Fn(&T, &Sample<'_>, &mut SampleRng, &mut [Spectrum]) + Sync,
+{
+    let pool = settings.pool()?;
+    let clock = Stopwatch::start();
+    let reporter = settings.reporter(film, control);
+    let (reason, counters) = pool.install(|| -> Result<_, E> {
+        let mut counters = Counters::default();
+        loop {
+            let done = film.min_count();
+            if done >= settings.samples {
+                return Ok((Reason::Done, counters));
+            }
+            if control.is_cancelled() {
+                return Ok((Reason::Cancelled, counters));
+            }
+            let before = reporter.elapsed();
+            let pass = done / length;
+            let prepared = prepare(pass)?;
+            let integrand = |sample: &Sample<'_>, rng: &mut SampleRng, layers: &mut [Spectrum]| {
+                integrand(&prepared, sample, rng, layers);
+            };
+            let until = (pass * length.get()).saturating_add(length.get()).min(settings.samples);
+            let (reporter, film_of) = (&reporter, Mutex::new(&mut *film));
+            counters += Pass { film: film_of, settings, control, reporter, integrand: &integrand, until }.run();
+            if film.min_count() < until {
+                return Ok((Reason::Cancelled, counters));
+            }
+            let now = reporter.elapsed();
+            // The next pass will take about as long as this one.
+            if settings.time.is_some_and(|budget| until < settings.samples && now + (now - before) > budget) {
+                return Ok((Reason::TimeUp, counters));
+            }
+        }
+    })?;
+    reporter.finish();
+    Ok(Outcome { samples: film.min_count(), reason, counters, seconds: clock.elapsed() })
+}
+
+impl Settings {
+    fn pool(&self) -> Result<rayon::ThreadPool, RenderError> {
+        if self.samples == 0 {
+            return Err(RenderError::NoSamples);
+        }
+        if self.tile == 0 {
+            return Err(RenderError::NoTile);
+        }
+        rayon::ThreadPoolBuilder::new()
+            .num_threads(self.threads)
+            .build()
+            .map_err(|error| RenderError::Threads(error.to_string()))
+    }
+
+    fn reporter<'a>(&self, film: &Film, control: &'a Control<'a>) -> Reporter<'a> {
+        let pixels = u64::from(film.width()) * u64::from(film.height());
+        Reporter::new(control, film.total_count(), pixels * u64::from(self.samples), self.time)
+    }
 }
 
 fn passes<F>(

@@ -22,7 +22,7 @@
 mod connect;
 pub mod trace;
 
-pub use trace::radiance;
+pub use trace::{radiance, radiance_beyond};
 
 use crate::light::Light;
 use crate::spectrum::Spectrum;
@@ -87,4 +87,13 @@ impl Radiance {
     pub fn total(&self) -> Spectrum {
         self.emitted + self.surface_direct + self.surface_indirect + self.medium_single + self.medium_multiple
     }
+}
+
+/// Radiance (W·m⁻²·sr⁻¹) scattered into a ray along its length, attenuated on its way to the ray's origin.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct InScattered {
+    /// Light that came straight from the lights.
+    pub single: Spectrum,
+    /// Light that was scattered before.
+    pub multiple: Spectrum,
 }

@@ -2,14 +2,14 @@
 
 use glam::Vec3;
 
-use super::{Radiance, Settings, World, connect};
+use super::{InScattered, Radiance, Settings, World, connect};
 use crate::host::{Hit, Medium, Rng, Scene};
 use crate::math::Ray;
 use crate::phase::deflection;
 use crate::sampling::{Generator, mis, uniform, uniform2};
 use crate::spectrum::Spectrum;
 use crate::surface::Surface;
-use crate::transmittance::flight;
+use crate::transmittance::{Flight, flight, transmittance};
 
 /// Rays leave a surface this far above it, relative to the size of the coordinates: 64 roundings.
 const OFFSET: f32 = 64.0 * f32::EPSILON;
@@ -98,6 +98,48 @@ pub fn radiance<M: Medium + ?Sized, S: Scene + ?Sized>(
     settings: &Settings,
     rng: &mut (impl Rng + ?Sized),
 ) -> Radiance {
+    walk::<false, M, S>(ray, world, settings, rng, |_, _, _| InScattered::default())
+}
+
+/// The same with the medium's part left to another method: where the eye sees into the medium, straight or by
+/// way of mirrors and glass, the path does not collide with it, and what is scattered there comes from
+/// `in_scattered`.
+///
+/// That is asked for every such segment, how often at most its light may be scattered, and given
+/// random numbers. From the first surface on that is neither mirror nor glass, paths go on as those of [`radiance`];
+/// their light counts as that of the surface, also where a medium scattered it on its way there.
+/// The medium's own glow is taken along the way.
+///
+/// ```
+/// # use fogbow::{host::Empty, math::*, medium::Homogeneous, phase::Lobe, spectrum::Spectrum};
+/// # use fogbow::{path::{self, InScattered, Settings, World}, sampling::Generator};
+/// let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::ONE, Lobe::Isotropic)?;
+/// let world = World { medium: &fog, scene: &Empty, lights: &[] };
+/// let ray = Ray::new(Vec3::ZERO, Vec3::Z);
+/// let haze = |_: &Ray, _: u32, _: &mut Generator| InScattered { single: Spectrum::ONE, ..InScattered::default() };
+/// let seen = path::radiance_beyond(&ray, &world, &Settings::default(), &mut Generator::new(1), haze);
+/// assert_eq!((seen.medium_single, seen.total()), (Spectrum::ONE, Spectrum::ONE));
+/// # Ok::<(), fogbow::medium::MediumError>(())
+/// ```
+pub fn radiance_beyond<M: Medium + ?Sized, S: Scene + ?Sized>(
+    ray: &Ray,
+    world: &World<'_, M, S>,
+    settings: &Settings,
+    rng: &mut (impl Rng + ?Sized),
+    in_scattered: impl FnMut(&Ray, u32, &mut Generator) -> InScattered,
+) -> Radiance {
+    walk::<true, M, S>(ray, world, settings, rng, in_scattered)
+}
+
+/// `BEYOND` tells [`radiance_beyond`] from [`radiance`].
+fn walk<const BEYOND: bool, M: Medium + ?Sized, S: Scene + ?Sized>(
+    ray: &Ray,
+    world: &World<'_, M, S>,
+    settings: &Settings,
+    rng: &mut (impl Rng + ?Sized),
+    mut in_scattered: impl FnMut(&Ray, u32, &mut Generator) -> InScattered,
+) -> Radiance {
+    let mut is_seen = BEYOND;
     let mut path = Path {
         radiance: Radiance::default(),
         throughput: Spectrum::ONE,
@@ -112,11 +154,26 @@ pub fn radiance<M: Medium + ?Sized, S: Scene + ?Sized>(
         let segment = hit.map_or(ray, |hit| ray.with_length(hit.distance));
         let u_distance = uniform(rng);
         let mut child = Generator::new(u64::from(rng.next_u32()) | u64::from(segment_index) << 32);
-        let flown = flight(world.medium, &segment, path.throughput, u_distance, &mut child);
+        let mut flown = if is_seen && !world.medium.is_emissive() {
+            Flight::through(&segment)
+        } else {
+            flight(world.medium, &segment, path.throughput, u_distance, &mut child)
+        };
         path.add(path.throughput * flown.emission, path.first, path.scatterings);
+        if is_seen {
+            let weight = transmittance(world.medium, &segment, &mut child);
+            flown = Flight { weight, ..Flight::through(&segment) };
+            let left = settings.max_scatterings.saturating_sub(path.scatterings);
+            if left > 0 {
+                let light = in_scattered(&segment, left, &mut child);
+                let first = if path.first == First::Nothing { First::Medium } else { path.first };
+                path.add(path.throughput * light.single, first, path.scatterings + 1);
+                path.add(path.throughput * light.multiple, first, path.scatterings + 2);
+            }
+        }
         if has_near_fields {
             let random = (uniform(rng), uniform(rng), uniform2(rng));
-            if path.scatterings < settings.max_scatterings && flown.span.1 > flown.span.0 {
+            if !is_seen && path.scatterings < settings.max_scatterings && flown.span.1 > flown.span.0 {
                 let light = connect::along(world, &segment, &flown, random, &mut child);
                 let first = if path.first == First::Nothing { First::Medium } else { path.first };
                 path.add(path.throughput * light, first, path.scatterings + 1);
@@ -196,6 +253,7 @@ pub fn radiance<M: Medium + ?Sized, S: Scene + ?Sized>(
                 break;
             };
             path.throughput *= sample.weight;
+            is_seen &= surface.is_discrete();
             path.last = Some(Vertex { point, in_medium: false, pdf: sample.pdf });
             Ray::new(leave(point, hit.normal, sample.to_light, hit.distance), sample.to_light)
         } else {

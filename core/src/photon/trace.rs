@@ -86,11 +86,11 @@ pub fn trace<M: Medium + ?Sized, S: Scene + ?Sized>(
     // Roulette keeps powers near this one.
     let usual = power.max_element();
 
-    let mut scatterings = 0;
-    for segment in 0..MAX_SEGMENTS {
+    // As many as segments before: every segment but the last ends in one.
+    for scatterings in 0..MAX_SEGMENTS {
         let (reach, hit) = reach(world.scene, &ray);
         let u_distance = uniform(rng);
-        let mut child = Generator::new(u64::from(rng.next_u32()) | u64::from(segment) << 32);
+        let mut child = Generator::new(u64::from(rng.next_u32()) | u64::from(scatterings) << 32);
         let lobe_choice = uniform(rng);
         let lobe_u = uniform2(rng);
         let survival = uniform(rng);
@@ -139,7 +139,6 @@ pub fn trace<M: Medium + ?Sized, S: Scene + ?Sized>(
         };
         let Some((after, onward)) = next else { return };
         (power, ray) = (after, onward);
-        scatterings += 1;
     }
 }
 

@@ -60,6 +60,16 @@ pub struct Flight {
     pub span: (f32, f32),
 }
 
+impl Flight {
+    /// The flight to the end of `ray` as if there were no medium.
+    #[inline]
+    #[must_use]
+    pub fn through(ray: &Ray) -> Self {
+        let (distance, weight, emission) = (ray.length, Spectrum::ONE, Spectrum::ZERO);
+        Self { distance, collision: None, weight, emission, span: (distance, distance) }
+    }
+}
+
 /// Flies along `ray` until a collision or the ray's end.
 ///
 /// `throughput` weighs the channels where extinction is coloured; `u` decides the first tentative

@@ -5,6 +5,7 @@
 mod compare;
 mod figures;
 mod output;
+mod photon_beams;
 mod plume;
 mod radiance_cache;
 mod records;
@@ -17,6 +18,7 @@ use clap::{Parser, Subcommand};
 
 pub use compare::CompareArguments;
 pub use figures::{FiguresArguments, Paper};
+pub use photon_beams::{BeamArguments, Kernel};
 pub use plume::PlumeArguments;
 pub use radiance_cache::{CacheArguments, Kind, Single};
 pub use records::RecordsArguments;

@@ -8,8 +8,9 @@ use clap::{Args, ValueEnum};
 use fogbow::host::Medium;
 use fogbow::light::Light;
 use fogbow::math::Vec2;
-use fogbow::path::{self, World as PathWorld};
+use fogbow::path::{self, Radiance, World as PathWorld};
 use fogbow::sampling::uniform2;
+use fogbow::spectrum::Spectrum;
 use fogbow_std::film::Film;
 use fogbow_std::image::write_film;
 use fogbow_std::progress::{Control, Progress};
@@ -17,6 +18,7 @@ use fogbow_std::radiance_cache::{NAMES, RadianceCaches};
 use fogbow_std::stats::{CountingMedium, CountingScene, Statistics};
 use fogbow_std::tiles::{self, Outcome, Reason, RenderError};
 
+use super::photon_beams::{BeamArguments, BeamJob};
 use super::radiance_cache::{CacheArguments, CacheJob, check_depth};
 use super::report::{Bar, Report};
 use super::{Ending, Failure, output};
@@ -32,7 +34,8 @@ pub struct RenderArguments {
     /// How light is computed.
     #[arg(long, value_enum, default_value_t = Method::Path)]
     pub method: Method,
-    /// Samples per pixel [default: what the scene says, for radiance caching 64; with --time, as many as fit].
+    /// Samples per pixel, for photon beams rounded up to whole passes [default: what the scene says, for radiance
+    /// caching 64; with --time, as many as fit].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub spp: Option<u32>,
     /// Seconds to render for, on the wall clock.
@@ -71,6 +74,9 @@ pub struct RenderArguments {
     /// Of radiance caching.
     #[command(flatten)]
     pub cache: CacheArguments,
+    /// Of photon beams.
+    #[command(flatten)]
+    pub beams: BeamArguments,
 }
 
 /// How light is computed.
@@ -80,6 +86,9 @@ pub enum Method {
     Path,
     /// Volumetric radiance caching: smooth light computed at few points and carried to all others.
     RadianceCache,
+    /// Progressive photon beams: the medium's light from beams sent by the lights, blurred less and less;
+    /// surfaces' light as with `path`.
+    PhotonBeams,
 }
 
 /// Names of the layers; the first is the image.
@@ -142,7 +151,7 @@ pub(crate) fn render(arguments: &RenderArguments) -> Result<Rendered, Failure> {
     let (width, height) = arguments.size.unwrap_or((scene.sensor.width, scene.sensor.height));
     let layers: &[&str] = match (arguments.aov, arguments.method) {
         (false, _) => &["total"],
-        (true, Method::Path) => &LAYERS,
+        (true, Method::Path | Method::PhotonBeams) => &LAYERS,
         (true, Method::RadianceCache) => &CACHE_LAYERS,
     };
     let mut film = Film::new(width, height, layers)?;
@@ -188,6 +197,16 @@ pub(crate) fn render(arguments: &RenderArguments) -> Result<Rendered, Failure> {
             film: film_of,
             settings: settings_of,
             control: control_of,
+        })?,
+        Method::PhotonBeams => world.media().with(BeamJob {
+            world: &world,
+            lights: &lights,
+            camera,
+            paths,
+            film: film_of,
+            settings: settings_of,
+            control: control_of,
+            arguments: &arguments.beams,
         })?,
         Method::RadianceCache => {
             let done = world.media().with(CacheJob {
@@ -252,10 +271,13 @@ fn outputs(arguments: &RenderArguments) -> Result<Vec<PathBuf>, Failure> {
         output::check_place(file)?;
     }
     let caches = &arguments.cache;
-    if arguments.method == Method::Path && (caches.cache_in.is_some() || caches.cache_out.is_some()) {
+    if arguments.method != Method::RadianceCache && (caches.cache_in.is_some() || caches.cache_out.is_some()) {
         return Err("--cache-in and --cache-out need --method radiance-cache".into());
     }
     caches.check()?;
+    if arguments.method == Method::PhotonBeams {
+        arguments.beams.check()?;
+    }
     if !arguments.exposure.is_finite() {
         return Err("--exposure must be a finite number".into());
     }
@@ -288,7 +310,6 @@ impl WithMedium for Job<'_> {
 
     fn with<M: Medium + Sync>(self, medium: &M) -> Self::Output {
         let (width, height) = (self.film.width() as f32, self.film.height() as f32);
-        let has_layers = self.film.layers().len() > 1;
         tiles::render(self.film, self.settings, self.control, |sample, rng, layers| {
             let world = PathWorld {
                 medium: &CountingMedium { medium, tally: sample.tally },
@@ -299,19 +320,22 @@ impl WithMedium for Job<'_> {
             let film = Vec2::new((sample.x as f32 + jitter.x) / width, (sample.y as f32 + jitter.y) / height);
             let seen = path::radiance(&self.camera.ray(film), &world, &self.paths, rng);
             sample.tally.collide(seen.collisions);
-            if has_layers {
-                let parts = [
-                    seen.total(),
-                    seen.emitted,
-                    seen.surface_direct,
-                    seen.surface_indirect,
-                    seen.medium_single,
-                    seen.medium_multiple,
-                ];
-                layers.copy_from_slice(&parts);
-            } else if let Some(total) = layers.first_mut() {
-                *total = seen.total();
-            }
+            write_layers(&seen, layers);
         })
+    }
+}
+
+/// What was seen, into [`LAYERS`] or the first of them alone.
+pub(super) fn write_layers(seen: &Radiance, layers: &mut [Spectrum]) {
+    let parts = [
+        seen.total(),
+        seen.emitted,
+        seen.surface_direct,
+        seen.surface_indirect,
+        seen.medium_single,
+        seen.medium_multiple,
+    ];
+    for (layer, part) in layers.iter_mut().zip(parts) {
+        *layer = part;
     }
 }

@@ -123,6 +123,7 @@ impl Report<'_> {
             match self.arguments.method {
                 Method::Path => "path",
                 Method::RadianceCache => "radiance-cache",
+                Method::PhotonBeams => "photon-beams",
             },
             self.size.0,
             self.size.1,

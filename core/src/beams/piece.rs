@@ -1,0 +1,176 @@
+//! Beams, cut into pieces.
+
+use bytemuck::{Pod, Zeroable};
+use glam::Vec3;
+
+use crate::host::{Medium, Rng, Scene};
+use crate::math::{Bounds, Ray};
+use crate::path::{Settings, World};
+use crate::photon::{self, Event};
+use crate::sampling::{Generator, uniform};
+use crate::spectrum::Spectrum;
+
+/// Below this share of a beam's power at its start, roulette ends it with probability one half.
+const ROULETTE_BELOW: f32 = 0.05;
+
+/// Pieces of one beam at most: endless beams in fog without end stop there.
+const MAX_PIECES: u32 = 1 << 16;
+
+/// A straight part of a beam along which power falls by one exponential.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Pod, Zeroable)]
+#[repr(C)]
+pub struct Piece {
+    /// Where it starts (m).
+    pub origin: Vec3,
+    /// How long it is (m).
+    pub length: f32,
+    /// Where light flies (unit).
+    pub direction: Vec3,
+    /// How often its light was scattered before.
+    pub scatterings: u32,
+    /// Power (W) at its start, of all light that one path stands for.
+    pub power: Spectrum,
+    /// Extinction (m⁻¹) by which power falls along it: `power · e^{−rate·l}`.
+    pub rate: Spectrum,
+    /// Nothing; it fills 64 bytes.
+    pub padding: [u32; 2],
+}
+
+impl Piece {
+    /// Where it ends (m).
+    #[inline]
+    #[must_use]
+    pub fn end(&self) -> Vec3 {
+        self.origin + self.direction * self.length
+    }
+}
+
+/// Cuts a beam along `reach`, whose power is `power` (W) at its start, into pieces where there is a medium.
+///
+/// Residual ratio tracking (Novák et al. 2014) with the minorant as control: pieces follow the minorant's
+/// exponential and end at tentative collisions, where power is multiplied by `1 − (σₜ − σ_min)/(σ_max − σ_min)`.
+/// The expected power at every point is the exact one; in constant media every power is. Pieces longer than
+/// `longest` (m) are cut, so that boxes around them fit; what is weak ends by roulette.
+///
+/// ```
+/// # use fogbow::{beams, math::*, medium::Homogeneous, phase::Lobe, sampling::Generator, spectrum::Spectrum};
+/// let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::splat(0.5), Lobe::Isotropic)?;
+/// let (reach, mut found) = (Ray::between(Vec3::ZERO, Vec3::Z), Vec::new());
+/// beams::pieces(&fog, &reach, Spectrum::ONE, 0, 0.75, &mut Generator::new(1), &mut |piece| found.push(piece));
+/// assert_eq!((found.len(), found[0].length, found[1].length), (2, 0.75, 0.25));
+/// assert!((found[1].power[0] - (-0.375f32).exp()).abs() < 1e-6);
+/// # Ok::<(), fogbow::medium::MediumError>(())
+/// ```
+pub fn pieces(
+    medium: &(impl Medium + ?Sized),
+    reach: &Ray,
+    power: Spectrum,
+    scatterings: u32,
+    longest: f32,
+    rng: &mut Generator,
+    keep: &mut impl FnMut(Piece),
+) {
+    let weak = ROULETTE_BELOW * power.max_element();
+    let mut power = power;
+    let mut t = 0.0;
+    let mut left = MAX_PIECES;
+    // NaN ends the walk, too.
+    while t < reach.length && left > 0 {
+        let stretch = medium.stretch(reach, t);
+        let end = stretch.until.min(reach.length);
+        let (low, range) = (stretch.minorant, (stretch.majorant - stretch.minorant).max_element());
+        if stretch.majorant.max_element() <= 0.0 {
+            t = end;
+            left -= 1;
+            continue;
+        }
+        while t < end && left > 0 {
+            let step = if range > 0.0 { -crate::math::float::ln(1.0 - uniform(rng)) / range } else { f32::INFINITY };
+            let tentative = t + step;
+            let next = tentative.min(end);
+            loop {
+                let until = (t + longest).min(next);
+                let length = until - t;
+                if length > 0.0 {
+                    let (origin, direction) = (reach.at(t), reach.direction);
+                    keep(Piece { origin, length, direction, scatterings, power, rate: low, padding: [0; 2] });
+                    power *= (low * length).transmitted();
+                }
+                left = left.saturating_sub(1);
+                // A step too small for the distance so far is one to the end.
+                t = if until > t { until } else { next };
+                if power.max_element() < weak {
+                    if uniform(rng) < 0.5 {
+                        return;
+                    }
+                    power *= 2.0;
+                }
+                if !(t < next) || left == 0 {
+                    break;
+                }
+            }
+            if tentative < end {
+                power *= Spectrum::ONE - (medium.extinction(reach.at(t)) - low) / range;
+                if !(power.max_element() > 0.0) {
+                    return;
+                }
+            }
+        }
+    }
+}
+
+/// Sends one photon from the lights ([`photon::trace`](photon::trace())) and gives the pieces of its beams to
+/// `keep`: of every flight the whole way to the surface ahead, also where the photon collides before, because
+/// beams hold the probability of getting there in their power. Takes one path; [`Beams::build`]
+/// is told how many there were.
+///
+/// Light of a beam is scattered once more on its way to the eye, so [`Settings::max_scatterings`] bounds
+/// what eyes see.
+///
+/// ```
+/// # use fogbow::{beams, host::Empty, light::{Light, PointLight}, math::*, medium::Homogeneous, phase::Lobe};
+/// # use fogbow::{path::{Settings, World}, sampling::Generator, spectrum::Spectrum};
+/// let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::ONE, Lobe::Isotropic)?;
+/// let lamps = [Light::Point(PointLight::from_flux(Vec3::ZERO, Spectrum::ONE)?)];
+/// let world = World { medium: &fog, scene: &Empty, lights: &lamps };
+/// let bounds = Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE };
+/// let settings = Settings { max_scatterings: 2, ..Settings::default() };
+/// let mut most = 0;
+/// beams::shoot(&world, &bounds, &settings, 0.5, &mut Generator::new(1), &mut |piece| most = most.max(piece.scatterings));
+/// assert_eq!(most, 1);
+/// # Ok::<(), Box<dyn core::error::Error>>(())
+/// ```
+///
+/// [`Beams::build`]: super::Beams::build
+pub fn shoot<M: Medium + ?Sized, S: Scene + ?Sized>(
+    world: &World<'_, M, S>,
+    bounds: &Bounds,
+    settings: &Settings,
+    longest: f32,
+    rng: &mut (impl Rng + ?Sized),
+    keep: &mut impl FnMut(Piece),
+) {
+    let mut child = Generator::child(rng);
+    let mut scatterings = 0;
+    photon::trace(world, bounds, settings, rng, &mut |event| match *event {
+        Event::Emitted { .. } => scatterings = 0,
+        Event::Flew { reach, power, .. } => {
+            pieces(world.medium, reach, power, scatterings, longest, &mut child, keep);
+        }
+        Event::Collided { .. } | Event::Met { .. } => scatterings += 1,
+    });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_piece_is_plain_data_of_64_bytes() {
+        assert_eq!((size_of::<Piece>(), align_of::<Piece>()), (64, 4));
+        let piece = Piece { length: 2.0, direction: Vec3::Y, ..Piece::default() };
+        let bytes: &[u8] = bytemuck::bytes_of(&piece);
+        assert_eq!(*bytemuck::from_bytes::<Piece>(bytes), piece);
+        assert_eq!(piece.end(), Vec3::Y * 2.0);
+    }
+}

@@ -1,0 +1,122 @@
+//! `fogbow render --method photon-beams`.
+
+use core::num::NonZero;
+
+use clap::{Args, ValueEnum};
+use fogbow::host::Medium;
+use fogbow::light::Light;
+use fogbow::math::{Vec2, Vec3};
+use fogbow::path;
+use fogbow::sampling::uniform2;
+use fogbow_std::film::Film;
+use fogbow_std::photon_beams::{self, Settings, View};
+use fogbow_std::progress::Control;
+use fogbow_std::tiles::{self, Outcome};
+
+use super::render::write_layers;
+use super::{Failure, output};
+use crate::camera::Camera;
+use crate::world::{WithMedium, World};
+
+/// Options of `--method photon-beams`.
+#[derive(Debug, Clone, Args)]
+#[command(next_help_heading = "Photon beams")]
+pub struct BeamArguments {
+    /// How wide beams are blurred.
+    #[arg(long, value_enum, default_value_t = Kernel::Progressive)]
+    pub kernel: Kernel,
+    /// Paths sent from the lights in each pass [default: one for eight pixels, 1024 at least].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1 << 24))]
+    pub beams: Option<u32>,
+    /// Samples per pixel in each pass; beams are gathered by the first of them [default: 8].
+    #[arg(long, value_name = "N")]
+    pub pass_samples: Option<NonZero<u32>>,
+    /// Radius of the blur in the first pass, in the scene's unit of length [default: 0.005 of the scene's diagonal].
+    #[arg(long, value_name = "R", value_parser = output::positive)]
+    pub radius: Option<f64>,
+    /// How fast the blur narrows, in (0, 1]: after i passes its square has shrunk by about i^(alpha-1).
+    #[arg(long, value_name = "ALPHA", value_parser = alpha, default_value_t = 0.6)]
+    pub alpha: f32,
+}
+
+/// How wide beams are blurred.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Kernel {
+    /// The same everywhere, narrower from pass to pass.
+    Progressive,
+    /// Wider where light is smooth, by its covariances.
+    Covariance,
+}
+
+fn alpha(text: &str) -> Result<f32, String> {
+    match text.parse::<f32>() {
+        Ok(value) if value > 0.0 && value <= 1.0 => Ok(value),
+        _ => Err("must be a number greater than 0, at most 1".to_owned()),
+    }
+}
+
+impl BeamArguments {
+    /// # Errors
+    /// A kernel that is not there.
+    pub(super) fn check(&self) -> Result<(), String> {
+        match self.kernel {
+            Kernel::Progressive => Ok(()),
+            Kernel::Covariance => {
+                Err("--kernel covariance needs the covariance grid, which is not there yet".to_owned())
+            }
+        }
+    }
+
+    fn settings(&self, world: &World<'_>, pixels: u64) -> Settings {
+        let usual = Settings::new(&world.bounds());
+        Settings {
+            paths: self.beams.unwrap_or_else(|| (pixels / 8).clamp(1024, 1 << 20) as u32),
+            samples: self.pass_samples.unwrap_or(usual.samples),
+            radius: self.radius.map_or(usual.radius, |r| r as f32),
+            alpha: self.alpha,
+            ..usual
+        }
+    }
+}
+
+/// A render by photon beams, to be done with a medium of any type.
+pub(super) struct BeamJob<'a> {
+    pub(super) world: &'a World<'a>,
+    pub(super) lights: &'a [Light<'a>],
+    pub(super) camera: Camera,
+    pub(super) paths: path::Settings,
+    pub(super) film: &'a mut Film,
+    pub(super) settings: &'a tiles::Settings,
+    pub(super) control: &'a Control<'a>,
+    pub(super) arguments: &'a BeamArguments,
+}
+
+impl WithMedium for BeamJob<'_> {
+    type Output = Result<Outcome, Failure>;
+
+    fn with<M: Medium + Sync>(self, medium: &M) -> Self::Output {
+        let (width, height) = (self.film.width(), self.film.height());
+        let settings = self.arguments.settings(self.world, u64::from(width) * u64::from(height));
+        let view = View {
+            world: path::World { medium, scene: self.world, lights: self.lights },
+            bounds: self.world.bounds(),
+            paths: self.paths,
+        };
+        // Here a kernel says how wide it is at a point, given the pass's radius.
+        let radius = |_: Vec3, pass: f32| pass;
+        let outcome = photon_beams::render(
+            self.film,
+            self.settings,
+            &settings,
+            self.control,
+            &view,
+            |sample, rng| {
+                let at = Vec2::new(sample.x as f32, sample.y as f32) + uniform2(rng);
+                self.camera.ray(at / Vec2::new(width as f32, height as f32))
+            },
+            radius,
+            write_layers,
+        )?;
+        Ok(outcome)
+    }
+}

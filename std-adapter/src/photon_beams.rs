@@ -1,0 +1,234 @@
+//! Progressive photon beams in parallel, the same bits for any number of threads.
+//!
+//! A pass shoots photons, makes a tree over their beams and takes some samples of every pixel, with a blur
+//! narrower than that of the pass before. Photons are dealt into jobs of fixed size, each with random numbers
+//! of its own, and their beams are put together in the order of jobs.
+
+use core::fmt;
+use core::num::NonZero;
+
+use fogbow::beams::{self, Beams, Piece, kernel};
+use fogbow::host::{Medium, Scene};
+use fogbow::math::{Bounds, Ray, Vec3};
+use fogbow::path::{self, InScattered, Radiance, World};
+use fogbow::sampling::uniform::mix;
+use fogbow::spectrum::Spectrum;
+use fogbow::storage::Full;
+use rayon::iter::{IndexedParallelIterator, IntoParallelIterator, ParallelIterator};
+
+use crate::film::Film;
+use crate::progress::Control;
+use crate::seed::{SampleRng, independent};
+use crate::stats::{CountingMedium, CountingScene};
+use crate::tiles::{self, Outcome, RenderError, Sample, render_prepared};
+
+/// How to shoot and gather.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Settings {
+    /// Paths sent from the lights in each pass.
+    pub paths: u32,
+    /// Samples per pixel in each pass. The first gathers beams for all of them, because these cost
+    /// more than the rest of a sample and are less noisy.
+    pub samples: NonZero<u32>,
+    /// Radius of the blur in the first pass (m).
+    pub radius: f32,
+    /// By which it narrows: see [`kernel::radius`].
+    pub alpha: f32,
+    /// Radius (m) that no kernel exceeds but the pass's own, whatever a radius function says: beams are
+    /// looked for within it, so it costs where it is larger than needed. 0 where all kernels have the
+    /// pass's radius.
+    pub largest: f32,
+    /// Length (m) above which pieces of beams are cut. Shorter: more pieces, tighter boxes. Changes nothing
+    /// in the mean.
+    pub longest: f32,
+}
+
+impl Settings {
+    /// Paths for a scene of some 10 000 pixels; lengths in proportion to the diagonal of `bounds`.
+    #[must_use]
+    pub fn new(bounds: &Bounds) -> Self {
+        let size = bounds.size().length();
+        let size = if size.is_finite() { size } else { 1.0 };
+        Self {
+            paths: 2048,
+            samples: NonZero::<u32>::MIN.saturating_add(7),
+            radius: 0.005 * size,
+            alpha: 0.6,
+            largest: 0.0,
+            longest: 0.1 * size,
+        }
+    }
+}
+
+/// What there is to see.
+#[derive(Debug)]
+pub struct View<'a, M: ?Sized, S: ?Sized> {
+    /// Medium, surfaces, lights.
+    pub world: World<'a, M, S>,
+    /// A box around surfaces and media: see [`fogbow::light::Light::emit`].
+    pub bounds: Bounds,
+    /// How long paths may grow, from the eye and from the lights.
+    pub paths: path::Settings,
+}
+
+/// Why rendering ended without a result.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum BeamsError {
+    /// The medium glows; photons leave lights only, so light of the medium that it scatters itself
+    /// would be missing.
+    Glowing,
+    /// No paths, or a radius, length or `alpha` out of range.
+    Settings,
+    /// More pieces of beams than 32 bits count.
+    TooMany,
+    /// What [`tiles::render`] fails with.
+    Render(RenderError),
+}
+
+impl fmt::Display for BeamsError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Glowing => f.write_str("photon beams do not know light of glowing media: take another method"),
+            Self::Settings => f.write_str("photon beams need paths, positive lengths, and alpha in (0, 1]"),
+            Self::TooMany => f.write_str("too many photon beams"),
+            Self::Render(error) => error.fmt(f),
+        }
+    }
+}
+
+impl core::error::Error for BeamsError {}
+
+impl From<RenderError> for BeamsError {
+    fn from(error: RenderError) -> Self {
+        Self::Render(error)
+    }
+}
+
+impl From<Full> for BeamsError {
+    fn from(_: Full) -> Self {
+        Self::TooMany
+    }
+}
+
+/// Paths of one job: part of the result. More: threads wait for each other. Fewer: more lists to put together.
+const JOB: u32 = 64;
+
+/// The beams of pass number `pass`. Uses the threads of the rayon pool it is called in.
+///
+/// # Errors
+/// [`BeamsError::TooMany`].
+///
+/// ```
+/// use fogbow::{host::Empty, light::{Light, PointLight}, math::*, medium::Homogeneous, path::World, phase::Phase, spectrum::Spectrum};
+/// use fogbow_std::photon_beams::{Settings, View, shoot};
+/// let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::ONE, Phase::ISOTROPIC)?;
+/// let lamps = [Light::Point(PointLight::from_flux(Vec3::ZERO, Spectrum::ONE)?)];
+/// let bounds = Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE };
+/// let world = World { medium: &fog, scene: &Empty, lights: &lamps };
+/// let view = View { world, bounds, paths: fogbow::path::Settings::default() };
+/// let settings = Settings { paths: 100, ..Settings::new(&bounds) };
+/// let beams = shoot(&view, &settings, 0, 7)?;
+/// assert_eq!(beams.pieces(), shoot(&view, &settings, 0, 7)?.pieces());
+/// assert_ne!(beams.pieces(), shoot(&view, &settings, 1, 7)?.pieces());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn shoot<M, S>(
+    view: &View<'_, M, S>,
+    settings: &Settings,
+    pass: u32,
+    seed: u64,
+) -> Result<Beams<'static>, BeamsError>
+where
+    M: Medium + Sync + ?Sized,
+    S: Scene + Sync + ?Sized,
+{
+    // Photons must have nothing to do with the pixels' numbers.
+    let seed = mix(seed ^ 0x9e3d_11b6_0f7c_52a4) ^ u64::from(pass);
+    let jobs = settings.paths.div_ceil(JOB);
+    let shot: Vec<Vec<Piece>> = (0..jobs)
+        .into_par_iter()
+        .with_max_len(1)
+        .map(|job| {
+            let mut pieces = Vec::new();
+            for path in job * JOB..(job * JOB).saturating_add(JOB).min(settings.paths) {
+                let mut rng = independent(seed, u64::from(pass) << 32 | u64::from(job), path);
+                beams::shoot(&view.world, &view.bounds, &view.paths, settings.longest, &mut rng, &mut |piece| {
+                    pieces.push(piece);
+                });
+            }
+            pieces
+        })
+        .collect();
+    let count = shot.iter().map(Vec::len).sum();
+    let mut beams = Beams::new(Vec::with_capacity(count), Vec::with_capacity(count / 2 + 1));
+    for piece in shot.into_iter().flatten() {
+        beams.push(piece)?;
+    }
+    beams.build(settings.paths)?;
+    Ok(beams)
+}
+
+/// Adds samples to `film` as [`tiles::render`] does, in passes of [`Settings::samples`] with photons of their own.
+///
+/// [`tiles::Settings::samples`] is rounded up to whole passes, so that light of the medium and of surfaces count alike.
+///
+/// `ray` is the eye ray of a sample; `radius` is told a point (m) and the pass's radius (m) and says how wide
+/// the kernel is there: `|_, pass| pass` for progressive photon beams, `|point, pass| pass.max(…)` where
+/// something is known of how fast light changes. `write` puts what was seen into the film's layers.
+///
+/// # Errors
+/// See [`BeamsError`].
+#[expect(clippy::too_many_arguments, reason = "the host's film, world, camera and settings")]
+pub fn render<M, S>(
+    film: &mut Film,
+    tiles: &tiles::Settings,
+    settings: &Settings,
+    control: &Control<'_>,
+    view: &View<'_, M, S>,
+    ray: impl Fn(&Sample<'_>, &mut SampleRng) -> Ray + Sync,
+    radius: impl Fn(Vec3, f32) -> f32 + Sync,
+    write: impl Fn(&Radiance, &mut [Spectrum]) + Sync,
+) -> Result<Outcome, BeamsError>
+where
+    M: Medium + Sync,
+    S: Scene + Sync,
+{
+    let positive = |x: f32| x > 0.0 && x.is_finite();
+    let lengths = [settings.radius, settings.longest, settings.alpha];
+    let is_bound = settings.largest >= 0.0 && settings.largest.is_finite();
+    if settings.paths == 0 || !lengths.into_iter().all(positive) || !is_bound || settings.alpha > 1.0 {
+        return Err(BeamsError::Settings);
+    }
+    if view.world.medium.is_emissive() {
+        return Err(BeamsError::Glowing);
+    }
+    let prepare = |pass: u32| {
+        let beams = shoot(view, settings, pass, tiles.seed)?;
+        let radius = kernel::radius(settings.radius, settings.alpha, pass);
+        Ok::<_, BeamsError>((beams, radius))
+    };
+    let length = settings.samples;
+    // A multiple of the length, `u32::MAX` included.
+    let samples = tiles.samples.checked_next_multiple_of(length.get()).unwrap_or(u32::MAX / length * length.get());
+    let tiles = &tiles::Settings { samples, ..*tiles };
+    render_prepared(film, tiles, control, length, prepare, |(beams, of_pass), sample, rng, layers| {
+        let world = World {
+            medium: &CountingMedium { medium: view.world.medium, tally: sample.tally },
+            scene: &CountingScene { scene: view.world.scene, tally: sample.tally },
+            lights: view.world.lights,
+        };
+        let ray = ray(sample, rng);
+        let width = |point: Vec3| radius(point, *of_pass);
+        let largest = settings.largest.max(*of_pass);
+        let seen = path::radiance_beyond(&ray, &world, &view.paths, rng, |segment, most, rng| {
+            if sample.index % length != 0 {
+                return InScattered::default();
+            }
+            let light = beams.gather(segment, world.medium, largest, width, most, rng).light;
+            let share = length.get() as f32;
+            InScattered { single: light.single * share, multiple: light.multiple * share }
+        });
+        sample.tally.collide(seen.collisions);
+        write(&seen, layers);
+    })
+}
