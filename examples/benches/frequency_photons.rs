@@ -5,6 +5,7 @@
 //! cargo bench -p fogbow-examples --bench frequency_photons -- [SCENE.xml]
 //! ```
 
+use core::ops::ControlFlow;
 use std::path::PathBuf;
 
 use fogbow::covariance::{FrequencyPhotons, Lattice, OccluderCell, Occluders, Voxel};
@@ -45,6 +46,7 @@ impl WithMedium for Job<'_> {
                     lattice.traverse(&reach.with_length(*distance), |cell, from, to| {
                         plain[cell] += power.mean() * (to - from);
                         crossings += 1;
+                        ControlFlow::Continue(())
                     });
                 }
             });

@@ -1,5 +1,7 @@
 //! A box cut into equal cells, and the walk of a ray through them.
 
+use core::ops::ControlFlow;
+
 use glam::Vec3;
 
 use crate::math::{Bounds, Ray};
@@ -154,21 +156,25 @@ impl Lattice {
     }
 
     /// Calls `visit(cell, enter, leave)` for every cell that `ray` crosses, in order, with the distances (m) at
-    /// which it does; they join without gaps.
+    /// which it does, until it breaks; they join without gaps.
     ///
     /// Amanatides and Woo 1987.
     ///
     /// ```
+    /// # use core::ops::ControlFlow;
     /// # use fogbow::{covariance::Lattice, math::{Bounds, Ray, Vec3}};
     /// let lattice = Lattice::new(Bounds { min: Vec3::ZERO, max: Vec3::ONE }, [4, 4, 4])?;
     /// let mut length = 0.0;
-    /// lattice.traverse(&Ray::between(Vec3::new(-1.0, 0.3, 0.1), Vec3::new(2.0, 0.4, 0.9)), |_, a, b| length += b - a);
+    /// lattice.traverse(&Ray::between(Vec3::new(-1.0, 0.3, 0.1), Vec3::new(2.0, 0.4, 0.9)), |_, a, b| {
+    ///     length += b - a;
+    ///     ControlFlow::Continue(())
+    /// });
     /// let chord = 3.0_f32.hypot(0.1).hypot(0.8) / 3.0;
     /// assert!((length - chord).abs() < 1e-5);
     /// # Ok::<(), fogbow::covariance::LatticeError>(())
     /// ```
     #[inline]
-    pub fn traverse(&self, ray: &Ray, mut visit: impl FnMut(usize, f32, f32)) {
+    pub fn traverse(&self, ray: &Ray, mut visit: impl FnMut(usize, f32, f32) -> ControlFlow<()>) {
         let Some((near, far)) = self.bounds.intersect(ray) else { return };
         let (start, end) = (near.max(0.0), far.min(ray.length));
         if !(start < end) {
@@ -204,7 +210,9 @@ impl Lattice {
             };
             let leave = next[axis].min(end);
             if leave > at {
-                visit(index as usize, at, leave);
+                if visit(index as usize, at, leave).is_break() {
+                    return;
+                }
                 at = leave;
             }
             if !(next[axis] < end) || left[axis] == 0 {
@@ -216,7 +224,7 @@ impl Lattice {
         }
         if at < end {
             // The last layer by rounding: what is left of the ray belongs to its cell.
-            visit(index as usize, at, end);
+            let _ = visit(index as usize, at, end);
         }
     }
 }

@@ -7,6 +7,8 @@
 //! at a collision:   turn · scatter             at a surface: turn · project · curve · lobe · curve · unproject
 //! ```
 
+use core::ops::ControlFlow;
+
 use glam::Vec3;
 
 use super::emission::emitted;
@@ -106,6 +108,7 @@ impl<'a, M: Medium + ?Sized, S: Scene + ?Sized> FrequencyPhotons<'a, M, S> {
             if let Some(voxel) = voxels.get_mut(cell) {
                 voxel.add(&light, power * length);
             }
+            ControlFlow::Continue(())
         });
         self.light = Some(light.travelled((distance - at).max(0.0)));
     }
