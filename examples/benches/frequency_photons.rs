@@ -5,10 +5,9 @@
 //! cargo bench -p fogbow-examples --bench frequency_photons -- [SCENE.xml]
 //! ```
 
-use core::ops::ControlFlow;
 use std::path::PathBuf;
 
-use fogbow::covariance::{FrequencyPhotons, Lattice, OccluderCell, Occluders, Voxel};
+use fogbow::covariance::{Crossing, FrequencyPhotons, Lattice, OccluderCell, Occluders, Voxel};
 use fogbow::host::Medium;
 use fogbow::path;
 use fogbow::photon::{self, Event};
@@ -43,11 +42,10 @@ impl WithMedium for Job<'_> {
             let mut crossings = 0_u64;
             let energy = walks(&mut |event| {
                 if let Event::Flew { reach, distance, power } = event {
-                    lattice.traverse(&reach.with_length(*distance), |cell, from, to| {
-                        plain[cell] += power.mean() * (to - from);
+                    for Crossing { cell, enter, leave } in lattice.cells(&reach.with_length(*distance)) {
+                        plain[cell] += power.mean() * (leave - enter);
                         crossings += 1;
-                        ControlFlow::Continue(())
-                    });
+                    }
                 }
             });
             let mut cells = vec![OccluderCell::default(); lattice.cell_count()];

@@ -1,12 +1,10 @@
 //! The covariance grid: anywhere in the volume, how fast the light varies and in which direction.
 
-use core::ops::ControlFlow;
-
 use glam::Vec3;
 
 use super::lattice::{Lattice, LatticeError};
 use super::metrics::Voxel;
-use crate::math::{Ray, Symmetric3, float};
+use crate::math::Symmetric3;
 
 /// A filled grid, ready to be asked.
 #[derive(Debug, Clone, Copy)]
@@ -64,46 +62,6 @@ impl<'a> Grid<'a> {
             sum.merge(&Voxel { sum: voxel.sum.times(weight), weight: voxel.weight * weight });
         }
         Some(sum)
-    }
-
-    /// Where the step that starts at `from` (m) on `ray` ends, as a length (m): where `∫ 2√v dt = 1`, with
-    /// `v = ωᵀΓω` in each cell and `2√v` within `1/most..=1/least`.
-    ///
-    /// B's Alg. 1 asks for `v` at the step's start alone: from darkness beside a shaft of light it steps over
-    /// the shaft. Where no photon came by, and outside, light counts as even.
-    ///
-    /// ```
-    /// # use fogbow::{covariance::{Grid, Lattice, Voxel}, math::*};
-    /// let lattice = Lattice::new(Bounds { min: Vec3::ZERO, max: Vec3::new(2.0, 1.0, 1.0) }, [2, 1, 1])?;
-    /// let sum = Symmetric3::from_upper([25.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
-    /// let voxels = [Voxel::EMPTY, Voxel { sum, weight: 1.0 }];
-    /// let grid = Grid::new(lattice, &voxels, 1)?;
-    /// let ray = Ray::new(Vec3::new(0.0, 0.5, 0.5), Vec3::X);
-    /// assert!((grid.step(&ray, 0.0, 0.01, 2.0) - 1.05).abs() < 1e-6);   // half in darkness, half in 0.05 m of light
-    /// assert!((grid.step(&ray, 1.2, 0.01, 2.0) - 0.1).abs() < 1e-6);
-    /// # Ok::<(), fogbow::covariance::LatticeError>(())
-    /// ```
-    #[inline]
-    #[must_use]
-    pub fn step(&self, ray: &Ray, from: f32, least: f32, most: f32) -> f32 {
-        let rest = Ray { origin: ray.at(from), direction: ray.direction, length: most.min(ray.length - from) };
-        let (even, finest) = (1.0 / most, 1.0 / least);
-        let (mut done, mut at, mut end) = (0.0, 0.0, None);
-        self.lattice.traverse(&rest, |cell, enter, leave| {
-            done += (enter - at) * even;
-            let density = self.voxels[cell]
-                .covariance()
-                .map_or(even, |gamma| (2.0 * float::safe_sqrt(gamma.along(ray.direction))).max(even).min(finest));
-            let here = enter + (1.0 - done) / density;
-            if here <= leave {
-                end = Some(here);
-                return ControlFlow::Break(());
-            }
-            done += (leave - enter) * density;
-            at = leave;
-            ControlFlow::Continue(())
-        });
-        end.unwrap_or(at + (1.0 - done) * most).max(least)
     }
 
     /// Fluence (W·m⁻²) at `point`, interpolated: flux times length in a cell over its volume. `None` outside.

@@ -1,7 +1,5 @@
 //! A box cut into equal cells, and the walk of a ray through them.
 
-use core::ops::ControlFlow;
-
 use glam::Vec3;
 
 use crate::math::{Bounds, Ray};
@@ -155,35 +153,40 @@ impl Lattice {
         Some(out)
     }
 
-    /// Calls `visit(cell, enter, leave)` for every cell that `ray` crosses, in order, with the distances (m) at
-    /// which it does, until it breaks; they join without gaps.
+    /// The cells that `ray` crosses, in order, with the distances (m) at which it enters and leaves them; they join
+    /// without gaps.
     ///
     /// Amanatides and Woo 1987.
     ///
     /// ```
-    /// # use core::ops::ControlFlow;
     /// # use fogbow::{covariance::Lattice, math::{Bounds, Ray, Vec3}};
     /// let lattice = Lattice::new(Bounds { min: Vec3::ZERO, max: Vec3::ONE }, [4, 4, 4])?;
-    /// let mut length = 0.0;
-    /// lattice.traverse(&Ray::between(Vec3::new(-1.0, 0.3, 0.1), Vec3::new(2.0, 0.4, 0.9)), |_, a, b| {
-    ///     length += b - a;
-    ///     ControlFlow::Continue(())
-    /// });
-    /// let chord = 3.0_f32.hypot(0.1).hypot(0.8) / 3.0;
-    /// assert!((length - chord).abs() < 1e-5);
+    /// let ray = Ray::between(Vec3::new(-1.0, 0.3, 0.1), Vec3::new(2.0, 0.4, 0.9));
+    /// let length: f32 = lattice.cells(&ray).map(|crossing| crossing.leave - crossing.enter).sum();
+    /// assert!((length - 3.0_f32.hypot(0.1).hypot(0.8) / 3.0).abs() < 1e-5);
     /// # Ok::<(), fogbow::covariance::LatticeError>(())
     /// ```
     #[inline]
-    pub fn traverse(&self, ray: &Ray, mut visit: impl FnMut(usize, f32, f32) -> ControlFlow<()>) {
-        let Some((near, far)) = self.bounds.intersect(ray) else { return };
+    #[must_use]
+    pub fn cells(&self, ray: &Ray) -> Cells {
+        let nothing = Cells {
+            index: 0,
+            at: 0.0,
+            end: 0.0,
+            next: [f32::INFINITY; 3],
+            advance: [0.0; 3],
+            stride: [0; 3],
+            left: [0; 3],
+        };
+        let Some((near, far)) = self.bounds.intersect(ray) else { return nothing };
         let (start, end) = (near.max(0.0), far.min(ray.length));
         if !(start < end) {
-            return;
+            return nothing;
         }
-        let mut cell = self.cell_of(ray.at(start));
+        let cell = self.cell_of(ray.at(start));
         let [nx, ny, _] = self.size.map(|n| n as isize);
         let strides = [1, nx, nx * ny];
-        let (mut next, mut advance, mut stride, mut left) = ([f32::INFINITY; 3], [0.0; 3], [0_isize; 3], [0_i32; 3]);
+        let mut cells = Cells { index: self.flat(cell) as isize, at: start, end, ..nothing };
         for axis in 0..3 {
             let d = ray.direction[axis];
             if d == 0.0 {
@@ -191,40 +194,65 @@ impl Lattice {
             }
             let forward = d > 0.0;
             let face = cell[axis] + i32::from(forward);
-            next[axis] = (self.bounds.min[axis] + face as f32 * self.cell[axis] - ray.origin[axis]) / d;
-            advance[axis] = self.cell[axis] / d.abs();
-            stride[axis] = if forward { strides[axis] } else { -strides[axis] };
-            left[axis] = if forward { self.size[axis] as i32 - 1 - cell[axis] } else { cell[axis] };
-            cell[axis] = cell[axis].max(0);
+            cells.next[axis] = (self.bounds.min[axis] + face as f32 * self.cell[axis] - ray.origin[axis]) / d;
+            cells.advance[axis] = self.cell[axis] / d.abs();
+            cells.stride[axis] = if forward { strides[axis] } else { -strides[axis] };
+            cells.left[axis] = if forward { self.size[axis] as i32 - 1 - cell[axis] } else { cell[axis] };
         }
-        let mut index = self.flat(cell) as isize;
-        let mut at = start;
-        // Every step leaves one layer for good, so that the walk ends whatever rounding does.
-        loop {
-            let axis = if next[0] < next[1] {
-                if next[0] < next[2] { 0 } else { 2 }
-            } else if next[1] < next[2] {
+        cells
+    }
+}
+
+/// The part of a ray within a cell.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Crossing {
+    /// Index of the cell.
+    pub cell: usize,
+    /// Distance (m) at which the ray enters it.
+    pub enter: f32,
+    /// Distance (m) at which the ray leaves it.
+    pub leave: f32,
+}
+
+/// The cells along a ray: see [`Lattice::cells`].
+#[derive(Debug, Clone)]
+pub struct Cells {
+    index: isize,
+    at: f32,
+    end: f32,
+    next: [f32; 3],
+    advance: [f32; 3],
+    stride: [isize; 3],
+    left: [i32; 3],
+}
+
+impl Iterator for Cells {
+    type Item = Crossing;
+
+    #[inline]
+    fn next(&mut self) -> Option<Crossing> {
+        // Every turn leaves one layer for good, so that the walk ends whatever rounding does.
+        while self.at < self.end {
+            let [x, y, z] = self.next;
+            let axis = if x < y {
+                if x < z { 0 } else { 2 }
+            } else if y < z {
                 1
             } else {
                 2
             };
-            let leave = next[axis].min(end);
-            if leave > at {
-                if visit(index as usize, at, leave).is_break() {
-                    return;
-                }
-                at = leave;
+            let (cell, enter) = (self.index as usize, self.at);
+            let is_last = !(self.next[axis] < self.end) || self.left[axis] == 0;
+            // In the last layer by rounding, what is left of the ray belongs to its cell.
+            let leave = if is_last { self.end } else { self.next[axis] };
+            self.left[axis] -= 1;
+            self.next[axis] += self.advance[axis];
+            self.index += self.stride[axis];
+            self.at = self.at.max(leave);
+            if leave > enter {
+                return Some(Crossing { cell, enter, leave });
             }
-            if !(next[axis] < end) || left[axis] == 0 {
-                break;
-            }
-            left[axis] -= 1;
-            next[axis] += advance[axis];
-            index += stride[axis];
         }
-        if at < end {
-            // The last layer by rounding: what is left of the ray belongs to its cell.
-            let _ = visit(index as usize, at, end);
-        }
+        None
     }
 }

@@ -19,6 +19,7 @@
 //! | `occluders` | [`Occluders`]: where surfaces lie, and what passing them does |
 //! | `photon` | [`FrequencyPhotons`]: light fields carried along photon walks (Alg. 2) |
 //! | `grid` | [`Grid`]: Γ anywhere in the volume |
+//! | `steps` | [`Steps`] along an eye ray (Alg. 1) |
 //! | [`bytes`] | grids saved and sent |
 //!
 //! Where the model is blind: it knows nothing of an unoccluded point light's `1/r²`, for the spectrum of such
@@ -35,13 +36,15 @@ mod metrics;
 mod occluders;
 pub mod operators;
 mod photon;
+mod steps;
 
 pub use emission::emitted;
 pub use grid::{Grid, merge};
-pub use lattice::{Lattice, LatticeError, MAX_EDGE};
+pub use lattice::{Cells, Crossing, Lattice, LatticeError, MAX_EDGE};
 pub use light_field::{LightField, Patch};
 pub use lobe::{phase_covariance, phase_hessian};
 pub use matrix::{LIMIT, Symmetric4};
 pub use metrics::{ImageCovariance, Voxel, filter_precision, hessian_bound, kernel_radius, sample_density, step};
 pub use occluders::{NEAREST, OccluderCell, Occluders};
 pub use photon::FrequencyPhotons;
+pub use steps::{Rule, Steps};

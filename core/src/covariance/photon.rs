@@ -7,12 +7,10 @@
 //! at a collision:   turn · scatter             at a surface: turn · project · curve · lobe · curve · unproject
 //! ```
 
-use core::ops::ControlFlow;
-
 use glam::Vec3;
 
 use super::emission::emitted;
-use super::lattice::Lattice;
+use super::lattice::{Crossing, Lattice};
 use super::light_field::{LightField, Patch};
 use super::metrics::Voxel;
 use super::occluders::Occluders;
@@ -84,7 +82,7 @@ impl<'a, M: Medium + ?Sized, S: Scene + ?Sized> FrequencyPhotons<'a, M, S> {
         // Bounds hold along stretches; only where they are not equal is there a Hessian to ask for.
         let (mut even_until, mut even) = (0.0, true);
         let mut at = 0.0;
-        self.lattice.traverse(&ray, |cell, enter, leave| {
+        for Crossing { cell, enter, leave } in self.lattice.cells(&ray) {
             let middle = 0.5 * (enter + leave);
             let length = leave - enter;
             light = light.travelled(middle - at);
@@ -108,8 +106,7 @@ impl<'a, M: Medium + ?Sized, S: Scene + ?Sized> FrequencyPhotons<'a, M, S> {
             if let Some(voxel) = voxels.get_mut(cell) {
                 voxel.add(&light, power * length);
             }
-            ControlFlow::Continue(())
-        });
+        }
         self.light = Some(light.travelled((distance - at).max(0.0)));
     }
 

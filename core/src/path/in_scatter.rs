@@ -9,8 +9,13 @@ use crate::phase::{Phase, deflection};
 use crate::sampling::{Generator, uniform, uniform2};
 use crate::spectrum::Spectrum;
 
+/// Up to this number every light is connected to. More: choosing one at random would be cheaper, but which was chosen
+/// is the most part of the noise.
+const FEW: usize = 4;
+
 /// Radiance `∫ p L dω` (W·m⁻²·sr⁻¹) scattered at `point` towards `to_eye` (unit), *without* `σₛ`: an unbiased
-/// estimate from one connection to a light and, for light scattered before, one path.
+/// estimate from a connection to each light (one of them, where there are more than a few) and, for light scattered
+/// before, one path.
 ///
 /// Light is scattered [`Settings::max_scatterings`] times at most, here included. Next to lights without extent the
 /// connection's `1/r²` has no bound. Light that a glowing medium sends here straight is left out.
@@ -41,7 +46,16 @@ pub fn in_scattered<M: Medium + ?Sized, S: Scene + ?Sized>(
     let mut child = Generator::child(rng);
     // Of lights alone, so that nothing is weighed against their being hit: as for a surface, near fields included.
     let value = |to_light: Vec3| (phase.value(deflection(to_light, to_eye)), 0.0);
-    let single = connect::next_event(world, point, false, |_| point, value, random, &mut child);
+    let mut single = Spectrum::ZERO;
+    if world.lights.len() <= FEW {
+        // The random numbers are shared: what differs from light to light is no noise between points then.
+        for light in world.lights {
+            let world = World { lights: core::slice::from_ref(light), ..*world };
+            single += connect::next_event(&world, point, false, |_| point, value, random, &mut child);
+        }
+    } else {
+        single = connect::next_event(world, point, false, |_| point, value, random, &mut child);
+    }
     let mut multiple = Spectrum::ZERO;
     if settings.max_scatterings > 1 {
         let sample = phase.sample(to_eye, u);

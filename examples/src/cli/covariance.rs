@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use fogbow::bytes::Crc;
-use fogbow::covariance::Grid;
 use fogbow::covariance::bytes::BytesError;
+use fogbow::covariance::{Grid, Rule, Steps};
 use fogbow::host::Medium;
 use fogbow::light::Light;
 use fogbow::math::Ray;
@@ -47,9 +47,19 @@ pub struct MarchArguments {
     /// 1/8].
     #[arg(long, value_name = "LENGTH", value_parser = output::positive)]
     pub step_length: Option<f64>,
-    /// Shortest step with covariances [default: half a cell of the grid].
+    /// How fine `--step covariance` is: about the number of steps where light fills a ray.
+    #[arg(long, value_name = "N", value_parser = steps, default_value_t = 16.0)]
+    pub steps: f32,
+    /// Shortest step with covariances [default: a twentieth of the grid's cell].
     #[arg(long, value_name = "LENGTH", value_parser = output::positive)]
     pub step_least: Option<f64>,
+}
+
+fn steps(text: &str) -> Result<f32, String> {
+    match text.parse::<f32>() {
+        Ok(value) if (0.1..=1e4).contains(&value) => Ok(value),
+        _ => Err("must be a number from 0.1 to 10000".to_owned()),
+    }
 }
 
 /// How steps along eye rays are chosen.
@@ -57,8 +67,10 @@ pub struct MarchArguments {
 pub enum Step {
     /// All of one length.
     Uniform,
-    /// Short where light varies along the ray, by its covariance.
+    /// Short where light varies along the ray, by its covariance, and where it is bright: for least error.
     Covariance,
+    /// Half a cycle of what varies most, by its covariance, bright or not (Belcour et al. 2014, Alg. 1).
+    Frequency,
 }
 
 /// Fills or reads a grid, with a medium of any type.
@@ -133,29 +145,33 @@ impl CovarianceArguments {
 }
 
 impl MarchArguments {
-    /// Lengths of steps in a scene: with the grid's, the shortest and the longest.
-    pub(super) fn steps<'a>(&self, size: f32, grid: Option<&'a Grid<'a>>) -> Steps<'a> {
+    /// Steps in a world of this diagonal, along rays through `grid` if there is one.
+    pub(super) fn stride<'a>(&self, size: f32, grid: Option<&'a Grid<'a>>) -> Stride<'a> {
         let given = |length: Option<f64>| length.map(|l| l as f32);
         let longest = given(self.step_length).unwrap_or(if grid.is_some() { size / 8.0 } else { size / 32.0 });
-        let least = grid.map_or(longest, |grid| 0.5 * grid.lattice().cell().min_element());
+        let least = grid.map_or(longest, |grid| 0.05 * grid.lattice().cell().min_element());
         let least = given(self.step_least).unwrap_or(least).min(longest);
-        Steps { grid, least, longest }
+        let rule = match self.step {
+            Step::Uniform => None,
+            Step::Covariance => Some(Rule::Error { count: self.steps }),
+            Step::Frequency => Some(Rule::Frequency),
+        };
+        Stride { along: grid.zip(rule), limits: (least, longest) }
     }
 }
 
-/// Lengths of steps along eye rays.
+/// How long steps along eye rays are.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Steps<'a> {
-    grid: Option<&'a Grid<'a>>,
-    least: f32,
-    longest: f32,
+pub(super) struct Stride<'a> {
+    along: Option<(&'a Grid<'a>, Rule)>,
+    limits: (f32, f32),
 }
 
-impl Steps<'_> {
-    /// The step (m) that starts at `distance` on `ray`.
-    #[inline]
-    pub(super) fn at(&self, ray: &Ray, distance: f32) -> f32 {
-        let Some(grid) = self.grid else { return self.longest };
-        grid.step(ray, distance, self.least, self.longest)
+impl<'a> Stride<'a> {
+    /// Lengths (m) of the steps along `ray` by where they start (m), asked in order.
+    pub(super) fn steps(&self, ray: &Ray) -> impl FnMut(f32) -> f32 + use<'a> {
+        let longest = self.limits.1;
+        let mut steps = self.along.map(|(grid, rule)| Steps::new(grid, ray, rule, self.limits));
+        move |from| steps.as_mut().map_or(longest, |steps| steps.after(from))
     }
 }

@@ -40,7 +40,7 @@ impl WithMedium for MarchJob<'_> {
             return Err("ray marching does not know light of glowing media: take another method".into());
         }
         let (width, height) = (self.film.width() as f32, self.film.height() as f32);
-        let steps = self.arguments.steps(self.world.bounds().size().length(), self.grid);
+        let stride = self.arguments.stride(self.world.bounds().size().length(), self.grid);
         let outcome = tiles::render(self.film, self.settings, self.control, |sample, rng, layers| {
             let world = PathWorld {
                 medium: &CountingMedium { medium, tally: sample.tally },

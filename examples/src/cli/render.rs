@@ -293,7 +293,7 @@ impl RenderArguments {
     /// Whether anything asked for takes a covariance grid.
     fn needs_grid(&self) -> bool {
         match self.method {
-            Method::March => self.march.step == Step::Covariance,
+            Method::March => self.march.step != Step::Uniform,
             Method::PhotonBeams => self.beams.kernel == Kernel::Covariance,
             Method::Path | Method::RadianceCache => false,
         }
