@@ -54,20 +54,14 @@ impl WithMedium for MarchJob<'_> {
                 let settings = path::Settings { max_scatterings: most, ..self.paths };
                 let mut light = InScattered::default();
                 let offset = uniform(rng);
-                march::steps(
-                    segment,
-                    world.medium,
-                    |at| steps.at(segment, at),
-                    offset,
-                    |at, properties, weight| {
-                        sample.tally.collide(1);
-                        let (point, to_eye) = (segment.at(at), -segment.direction);
-                        let here = path::in_scattered(&world, point, to_eye, &properties.phase, &settings, rng);
-                        let factor: Spectrum = weight * properties.scattering;
-                        light.single += factor * here.single;
-                        light.multiple += factor * here.multiple;
-                    },
-                );
+                march::steps(segment, world.medium, stride.steps(segment), offset, |at, properties, weight| {
+                    sample.tally.collide(1);
+                    let (point, to_eye) = (segment.at(at), -segment.direction);
+                    let here = path::in_scattered(&world, point, to_eye, &properties.phase, &settings, rng);
+                    let factor: Spectrum = weight * properties.scattering;
+                    light.single += factor * here.single;
+                    light.multiple += factor * here.multiple;
+                });
                 light
             });
             sample.tally.collide(seen.collisions);
