@@ -20,6 +20,7 @@
 //! | `photon` | [`FrequencyPhotons`]: light fields carried along photon walks (Alg. 2) |
 //! | `grid` | [`Grid`]: Γ anywhere in the volume |
 //! | `steps` | [`Steps`] along an eye ray (Alg. 1) |
+//! | `radii` | [`Radii`] of kernels anywhere in the volume (Eq. 19) |
 //! | [`bytes`] | grids saved and sent |
 //!
 //! Where the model is blind: it knows nothing of an unoccluded point light's `1/r²`, for the spectrum of such
@@ -36,6 +37,7 @@ mod metrics;
 mod occluders;
 pub mod operators;
 mod photon;
+mod radii;
 mod steps;
 
 pub use emission::emitted;
@@ -47,4 +49,5 @@ pub use matrix::{LIMIT, Symmetric4};
 pub use metrics::{ImageCovariance, Voxel, filter_precision, hessian_bound, kernel_radius, sample_density, step};
 pub use occluders::{NEAREST, OccluderCell, Occluders};
 pub use photon::FrequencyPhotons;
+pub use radii::Radii;
 pub use steps::{Rule, Steps};

@@ -4,7 +4,7 @@ use core::num::NonZero;
 
 use clap::{Args, ValueEnum};
 use fogbow::beams::kernel;
-use fogbow::covariance::{self, Grid};
+use fogbow::covariance::{Grid, Radii};
 use fogbow::host::Medium;
 use fogbow::light::Light;
 use fogbow::math::{Vec2, Vec3};
@@ -102,11 +102,13 @@ impl WithMedium for BeamJob<'_> {
             bounds: self.world.bounds(),
             paths: self.paths,
         };
+        let mut storage = vec![0.0; self.grid.map_or(0, |grid| grid.lattice().cell_count())];
         let (most, bias) = (settings.largest, self.arguments.bias as f32);
-        let radius = |point: Vec3, pass: f32| match self.grid.and_then(|grid| grid.covariance(point)) {
-            Some(gamma) => pass.max(covariance::kernel_radius(gamma.trace(), bias, kernel::SECOND_MOMENT, most)),
-            None => pass,
+        let radii = match self.grid {
+            Some(grid) => Some(Radii::new(grid, bias, kernel::SECOND_MOMENT, most, &mut storage)?),
+            None => None,
         };
+        let radius = |point: Vec3, pass: f32| radii.map_or(pass, |radii| radii.at(point).max(pass));
         let outcome = photon_beams::render(
             self.film,
             self.settings,
