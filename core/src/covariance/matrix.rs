@@ -2,11 +2,11 @@
 
 use bytemuck::{Pod, Zeroable};
 
-use crate::math::symmetric::{inverse_of, jacobi, rebuilt};
+use crate::math::symmetric::{SQUARED, inverse_of, jacobi, rebuilt};
 use crate::math::{Eigen, Symmetric2, float};
 
-/// Entries of covariances never exceed this (cycles²): a million cycles per metre or radian is beyond
-/// anything light in a medium shows, and fourth powers of it are still finite.
+/// What operators return never exceeds this (cycles²): a million cycles per metre or radian is beyond
+/// anything light in a medium shows, and `f32` holds its third power.
 pub const LIMIT: f32 = 1e12;
 
 /// A symmetric 4×4 matrix over `(u, v, θ, φ)` in blocks of two:
@@ -114,48 +114,68 @@ impl Symmetric4 {
         Self::from_rows(rebuilt(&eigen, |value| inverse_of(value, largest)))
     }
 
-    /// What every operator ends with: rounding may have pushed a variance below zero or a covariance beyond
-    /// what its variances carry; numbers beyond [`LIMIT`] are scaled back row and column together, which
-    /// keeps the matrix positive semi-definite.
+    /// What operators are made of: `f` of this matrix, [tidied](Symmetric4::tidy).
+    ///
+    /// Where that leaves the range of covariances, it is done again from a matrix within [`LIMIT`]: then `f32`
+    /// holds whatever an operator makes of it, and what is too large can be scaled back.
+    #[inline]
+    #[must_use]
+    pub(super) fn changed(&self, f: impl Fn(&Self) -> Self) -> Self {
+        let out = f(self);
+        if out.is_bounded() { out.tidy() } else { Self::beyond(&f(&self.bounded())) }
+    }
+
+    #[cold]
+    fn beyond(out: &Self) -> Self {
+        out.bounded().tidy()
+    }
+
+    /// Whether all variances are numbers within [`LIMIT`].
+    #[inline]
+    pub(super) fn is_bounded(&self) -> bool {
+        let Self { spatial: x, angular: p, .. } = self;
+        x.xx.abs() + x.yy.abs() + (p.xx.abs() + p.yy.abs()) <= LIMIT
+    }
+
+    /// Rounding may have pushed a variance below zero, or a covariance beyond what its variances carry.
     #[inline]
     #[must_use]
     pub(super) fn tidy(self) -> Self {
-        let Self { spatial: mut x, mixed: mut c, angular: mut p } = self;
-        let largest = float::max(float::max(x.xx, x.yy), float::max(p.xx, p.yy));
-        if !(largest <= LIMIT) {
-            return self.bounded();
-        }
-        x = x.tidy();
-        p = p.tidy();
-        for (i, entry) in c.iter_mut().enumerate() {
-            let row = if i < 2 { x.xx } else { x.yy };
-            let column = if i % 2 == 0 { p.xx } else { p.yy };
-            let most = row * column;
-            if !(*entry * *entry <= most) {
-                *entry = float::sqrt(most).copysign(*entry);
+        let Self { spatial, mixed: mut c, angular } = self;
+        let (x, p) = (spatial.tidy(), angular.tidy());
+        let (u, v, t, f) = (x.xx, x.yy, p.xx, p.yy);
+        let fits = |c: f32, most: f32| c * c <= most && (most > SQUARED || c == 0.0);
+        if !(fits(c[0], u * t) && fits(c[1], u * f) && fits(c[2], v * t) && fits(c[3], v * f)) {
+            let most = [(u, t), (u, f), (v, t), (v, f)].map(|(a, b)| float::sqrt(a) * float::sqrt(b));
+            for (entry, most) in c.iter_mut().zip(most) {
+                if !(entry.abs() <= most) {
+                    *entry = most.copysign(*entry);
+                }
             }
         }
         Self { spatial: x, mixed: c, angular: p }
     }
 
-    /// [`Symmetric4::tidy`] for what is beyond [`LIMIT`].
+    /// Rows and columns scaled so that no variance exceeds [`LIMIT`]: positive semi-definite input stays so.
     #[cold]
-    fn bounded(self) -> Self {
-        let clean = |x: f32| if x.is_nan() { 0.0 } else { x.clamp(-1e36, 1e36) };
-        let upper = self.to_upper().map(clean);
-        let diagonal = [upper[0], upper[4], upper[7], upper[9]];
-        let s = diagonal.map(|d| if d > LIMIT { float::sqrt(LIMIT / d) } else { 1.0 });
-        let mut k = 0;
-        let mut out = [0.0; 10];
-        for i in 0..4 {
-            for j in i..4 {
-                out[k] = (upper[k] * s[i] * s[j]).clamp(-LIMIT, LIMIT);
-                k += 1;
+    #[must_use]
+    pub(super) fn bounded(&self) -> Self {
+        let Self { spatial: x, angular: p, .. } = self;
+        let [u, v, t, f] = [x.xx, x.yy, p.xx, p.yy].map(|variance| {
+            // Powers of two, which round nothing.
+            let mut factor = 1.0;
+            while variance * factor * factor > LIMIT {
+                factor *= 0.5;
             }
-        }
-        for k in [0, 4, 7, 9] {
-            out[k] = out[k].max(0.0);
-        }
-        Self::from_upper(out).tidy()
+            factor
+        });
+        let scaled = self.to_upper();
+        let by = [u * u, u * v, u * t, u * f, v * v, v * t, v * f, t * t, t * f, f * f];
+        let entry = |k: usize| {
+            let x = scaled[k] * by[k];
+            // What no variance carries.
+            if x.is_nan() { 0.0 } else { x.clamp(-LIMIT, LIMIT) }
+        };
+        Self::from_upper(core::array::from_fn(entry)).tidy()
     }
 }
