@@ -407,8 +407,18 @@ fn paths(quick: bool) {
     let mut best = [f64::INFINITY; 2];
     for _ in 0..5 {
         let times = [
-            timed(|| walks.iter().for_each(|w| drop(black_box(walk(w))))).1,
-            timed(|| walks.iter().for_each(|w| drop(black_box(walk_dense(w))))).1,
+            timed(|| {
+                walks.iter().for_each(|w| {
+                    black_box(walk(w));
+                })
+            })
+            .1,
+            timed(|| {
+                walks.iter().for_each(|w| {
+                    black_box(walk_dense(w));
+                })
+            })
+            .1,
         ];
         for i in 0..2 {
             best[i] = best[i].min(times[i] * 1e9 / (6 * count) as f64);

@@ -576,7 +576,6 @@ fn huge_and_tiny_covariances_stay_positive_semi_definite() {
             ("scattered", a.scattered(cos, &lobe)),
             ("rotated", a.rotated(cos, (1.0 - cos * cos).sqrt())),
             ("scaled", a.scaled([d, 1.0 / d, cos, d])),
-            ("curved", a.curved(&mask, cos)),
             ("combined", a.combined(d, &a.travelled(d), 1.0)),
         ];
         for (name, result) in results {
@@ -584,11 +583,10 @@ fn huge_and_tiny_covariances_stay_positive_semi_definite() {
             // What cancels leaves rounding in units of the input: of all of it where scattering brings it down.
             let before = if name == "scattered" { largest(&a) } else { largest(&a).min(f64::from(LIMIT)) };
             let most = largest(&result).max(before);
-            // Subnormal numbers round by more than their last bit, and curvatures blow that up: still a wave of
-            // 10¹⁰ metres.
+            // Subnormal numbers round by more than their last bit, and flights blow that up: a wave of 10¹⁰ metres.
             let tiny = 1e-20;
             let least = least_eigenvalue(rows(&result).map(|r| r.map(|x| x / most.max(1e-60))));
-            assert!(least * most >= -COVARIANCE * most - tiny, "{i}, {name}: {least:.2e}\n{a:?}\n{result:?}");
+            assert!(least * most >= -4.0 * COVARIANCE * most - tiny, "{i}, {name}: {least:.2e}\n{a:?}\n{result:?}");
             assert_finite(&result.to_upper(), || format!("{i}, {name}: {a:?}"));
         }
     }
