@@ -155,27 +155,26 @@ impl Bench {
     fn times<A, B>(&self, ours: impl Fn(&Case) -> A, theirs: impl Fn(&Case) -> B) -> [f64; 2] {
         let mut best = [f64::INFINITY; 2];
         for _ in 0..self.turns {
-            let times = [
-                timed(|| {
-                    for _ in 0..self.rounds {
-                        for case in black_box(&self.cases) {
-                            black_box(ours(case));
-                        }
-                    }
-                }),
-                timed(|| {
-                    for _ in 0..self.rounds {
-                        for case in black_box(&self.cases) {
-                            black_box(theirs(case));
-                        }
-                    }
-                }),
-            ];
-            for (best, ((), time)) in best.iter_mut().zip(times) {
-                *best = best.min(time * 1e9 / (self.rounds * COUNT) as f64);
+            let times = [self.time(&ours), self.time(&theirs)];
+            for (best, time) in best.iter_mut().zip(times) {
+                *best = best.min(time);
             }
         }
         best
+    }
+
+    /// Nanoseconds; results go where a caller would keep them.
+    fn time<T>(&self, f: impl Fn(&Case) -> T) -> f64 {
+        let mut results: Vec<T> = self.cases.iter().map(&f).collect();
+        let ((), time) = timed(|| {
+            for _ in 0..self.rounds {
+                for (result, case) in results.iter_mut().zip(black_box(&self.cases)) {
+                    *result = f(case);
+                }
+                black_box(&mut results);
+            }
+        });
+        time * 1e9 / (self.rounds * COUNT) as f64
     }
 
     fn operator(&self, name: &str, ours: impl Fn(&Case) -> Symmetric4, theirs: impl Fn(&Case) -> Matrix4<f32>) {

@@ -90,7 +90,7 @@ pub fn emitted(light: &Light<'_>, ray: &Ray, normal: Option<Vec3>, point_radius:
         Light::Constant(_) => Symmetric4::ZERO,
         Light::Environment(map) => Symmetric4::separable(Symmetric2::ZERO, sky(map, &frame)),
     };
-    LightField { covariance: covariance.changed(|c| *c), frame }
+    LightField { covariance: covariance.mended(), frame }
 }
 
 /// Angular covariance of an image around the world: its relative Hessian over a texel.

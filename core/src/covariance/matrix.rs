@@ -2,7 +2,7 @@
 
 use bytemuck::{Pod, Zeroable};
 
-use crate::math::symmetric::{SQUARED, inverse_of, jacobi, rebuilt};
+use crate::math::symmetric::{inverse_of, jacobi, rebuilt};
 use crate::math::{Eigen, Symmetric2, float};
 
 /// What operators return never exceeds this (cycles²): a million cycles per metre or radian is beyond
@@ -114,7 +114,7 @@ impl Symmetric4 {
         Self::from_rows(rebuilt(&eigen, |value| inverse_of(value, largest)))
     }
 
-    /// What operators are made of: `f` of this matrix, [tidied](Symmetric4::tidy).
+    /// What operators are made of: `f` of this matrix, mended where rounding asks for it.
     ///
     /// Where that leaves the range of covariances, it is done again from a matrix within [`LIMIT`]: then `f32`
     /// holds whatever an operator makes of it, and what is too large can be scaled back.
@@ -122,44 +122,65 @@ impl Symmetric4 {
     #[must_use]
     pub(super) fn changed(&self, f: impl Fn(&Self) -> Self) -> Self {
         let out = f(self);
-        if out.is_bounded() { out.tidy() } else { Self::beyond(&f(&self.bounded())) }
+        if out.is_sound() { out } else { self.mend(&out, f) }
     }
 
     #[cold]
-    fn beyond(out: &Self) -> Self {
-        out.bounded().tidy()
+    #[inline(never)]
+    fn mend(&self, out: &Self, f: impl Fn(&Self) -> Self) -> Self {
+        if out.is_bounded() { out.tidy() } else { f(&self.bounded()).bounded() }
+    }
+
+    /// Whether all variances are numbers within [`LIMIT`], none negative, and carry the covariances, up to rounding.
+    #[inline]
+    fn is_sound(&self) -> bool {
+        let Self { spatial: x, mixed: c, angular: p } = self;
+        let fits = |c: f32, a: f32, b: f32| c * c <= a * b * (1.0 + 4.0 * f32::EPSILON);
+        // One branch, not ten.
+        (x.xx >= 0.0)
+            & (x.yy >= 0.0)
+            & (p.xx >= 0.0)
+            & (p.yy >= 0.0)
+            & (x.xx + x.yy + (p.xx + p.yy) <= LIMIT)
+            & fits(c[0], x.xx, p.xx)
+            & fits(c[1], x.xx, p.yy)
+            & fits(c[2], x.yy, p.xx)
+            & fits(c[3], x.yy, p.yy)
+            & fits(x.xy, x.xx, x.yy)
+            & fits(p.xy, p.xx, p.yy)
     }
 
     /// Whether all variances are numbers within [`LIMIT`].
-    #[inline]
-    pub(super) fn is_bounded(&self) -> bool {
+    fn is_bounded(&self) -> bool {
         let Self { spatial: x, angular: p, .. } = self;
         x.xx.abs() + x.yy.abs() + (p.xx.abs() + p.yy.abs()) <= LIMIT
     }
 
-    /// Rounding may have pushed a variance below zero, or a covariance beyond what its variances carry.
+    /// This matrix, or what is left of it as a covariance.
     #[inline]
     #[must_use]
-    pub(super) fn tidy(self) -> Self {
-        let Self { spatial, mixed: mut c, angular } = self;
-        let (x, p) = (spatial.tidy(), angular.tidy());
-        let (u, v, t, f) = (x.xx, x.yy, p.xx, p.yy);
-        let fits = |c: f32, most: f32| c * c <= most && (most > SQUARED || c == 0.0);
-        if !(fits(c[0], u * t) && fits(c[1], u * f) && fits(c[2], v * t) && fits(c[3], v * f)) {
-            let most = [(u, t), (u, f), (v, t), (v, f)].map(|(a, b)| float::sqrt(a) * float::sqrt(b));
-            for (entry, most) in c.iter_mut().zip(most) {
-                if !(entry.abs() <= most) {
-                    *entry = most.copysign(*entry);
-                }
-            }
-        }
-        Self { spatial: x, mixed: c, angular: p }
+    pub(super) fn mended(&self) -> Self {
+        self.changed(|a| *a)
+    }
+
+    /// Rounding may have pushed a variance below zero, or a covariance beyond what its variances carry.
+    #[cold]
+    #[must_use]
+    fn tidy(&self) -> Self {
+        let (x, p) = (self.spatial.tidy(), self.angular.tidy());
+        let [u, v, t, f] = [x.xx, x.yy, p.xx, p.yy].map(float::sqrt);
+        let most = [u * t, u * f, v * t, v * f];
+        let mixed = [0, 1, 2, 3].map(|i| {
+            let c: f32 = self.mixed[i];
+            if c.abs() <= most[i] { c } else { most[i].copysign(c) }
+        });
+        Self { spatial: x, mixed, angular: p }
     }
 
     /// Rows and columns scaled so that no variance exceeds [`LIMIT`]: positive semi-definite input stays so.
     #[cold]
     #[must_use]
-    pub(super) fn bounded(&self) -> Self {
+    fn bounded(&self) -> Self {
         let Self { spatial: x, angular: p, .. } = self;
         let [u, v, t, f] = [x.xx, x.yy, p.xx, p.yy].map(|variance| {
             // Powers of two, which round nothing.

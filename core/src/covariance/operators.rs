@@ -244,7 +244,6 @@ impl Symmetric4 {
         // By the larger first: sums of huge weights, and inverses of tiny ones, leave what `f32` holds.
         let (a, b) = (weight / larger, other_weight / larger);
         let (a, b) = (a / (a + b), b / (a + b));
-        let other = if other.is_bounded() { *other } else { other.bounded() };
         self.changed(|this| this.times(a).plus(&other.times(b)))
     }
 
@@ -259,7 +258,7 @@ impl Symmetric4 {
     #[inline]
     #[must_use]
     pub fn slice(&self) -> Symmetric2 {
-        let a = if self.is_bounded() { self.tidy() } else { self.bounded() };
+        let a = self.mended();
         let [x, p] = [&a.spatial, &a.angular].map(Wide::new);
         let p = p.not_singular(TINY);
         let c = a.mixed.map(f64::from);
@@ -342,13 +341,14 @@ impl Wide {
         [c[0] * yy - c[1] * xy, c[1] * xx - c[0] * xy, c[2] * yy - c[3] * xy, c[3] * xx - c[2] * xy]
     }
 
-    /// `A − D Cᵀ`, for a symmetric `D Cᵀ`.
+    /// `A − D Cᵀ`, for a symmetric positive semi-definite `D Cᵀ`.
     #[inline]
     fn without(&self, d: &[f64; 4], c: &[f64; 4]) -> Symmetric2 {
+        let less = |a: f64, b: f64| if b > 0.0 { a - b } else { a };
         Symmetric2 {
-            xx: (self.xx - (d[0] * c[0] + d[1] * c[1])) as f32,
+            xx: less(self.xx, d[0] * c[0] + d[1] * c[1]) as f32,
             xy: (self.xy - (d[0] * c[2] + d[1] * c[3])) as f32,
-            yy: (self.yy - (d[2] * c[2] + d[3] * c[3])) as f32,
+            yy: less(self.yy, d[2] * c[2] + d[3] * c[3]) as f32,
         }
     }
 }

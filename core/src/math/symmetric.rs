@@ -10,9 +10,6 @@ use super::float;
 /// Inverses of tiny numbers stop here.
 const HUGE: f32 = 1e30;
 
-/// Below this, squares lose bits or vanish.
-pub(crate) const SQUARED: f32 = 1e-30;
-
 /// `[[xx, xy], [xy, yy]]`.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Pod, Zeroable)]
 #[repr(C)]
@@ -274,10 +271,7 @@ impl Symmetric2 {
     pub(crate) fn tidy(mut self) -> Self {
         self.xx = float::max(self.xx, 0.0);
         self.yy = float::max(self.yy, 0.0);
-        let most = self.xx * self.yy;
-        if !(self.xy * self.xy <= most && (most > SQUARED || self.xy == 0.0))
-            && !(self.xy.abs() <= float::sqrt(self.xx) * float::sqrt(self.yy))
-        {
+        if !(self.xy * self.xy <= self.xx * self.yy) {
             self.xy = float::sqrt(self.xx) * float::sqrt(self.yy).copysign(self.xy);
         }
         self
