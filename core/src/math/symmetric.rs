@@ -204,7 +204,7 @@ impl Symmetric2 {
     ///
     /// ```
     /// # use fogbow::math::Symmetric2;
-    /// assert_eq!(Symmetric2::diagonal(-2.0, 3.0).absolute(), Symmetric2::diagonal(2.0, 3.0));
+    /// assert_eq!(Symmetric2::diagonal(-1.0, 3.0).absolute(), Symmetric2::diagonal(1.0, 3.0));
     /// ```
     #[inline]
     #[must_use]
