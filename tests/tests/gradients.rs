@@ -5,7 +5,7 @@ use fogbow::light::{Falloff, Source};
 use fogbow::math::{Affine3, Bounds, Frame, Mat3, Ray, Vec2, Vec3};
 use fogbow::medium::{Density, Grid, Homogeneous, MinMax, Placed, Region};
 use fogbow::multiple_scatter::Weight;
-use fogbow::phase::{Lobe, Phase, deflection};
+use fogbow::phase::{Deflection, Lobe, Phase, deflection};
 use fogbow::sampling::warp::uniform_sphere;
 use fogbow::sh::{self, Coefficient};
 use fogbow::single_scatter::{Arrival, Contribution, connect, moments};
@@ -145,6 +145,13 @@ proptest! {
         prop_assume!(ray.length > 0.1);
         let f = |p| phase.value(deflection(Ray::between(p, light).direction, to_eye));
         check!(phase.gradient(ray.direction, to_eye, ray.length), f, x, 0.3 * ray.length);
+    }
+
+    #[test]
+    fn second_derivative_of_every_phase_function(phase in phase(), cos in -0.98..0.98_f32) {
+        let at = |p: Vec3| Deflection::from_cos(p.x);
+        let gradient = Gradient { x: phase.second_derivative(at(Vec3::X * cos)), ..Gradient::ZERO };
+        check!(gradient, |p| phase.derivative(at(p)), Vec3::X * cos, 0.1);
     }
 
     #[test]

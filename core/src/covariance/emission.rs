@@ -12,16 +12,13 @@ use crate::math::{Frame, Ray, Symmetric2};
 /// Angular radius (rad) that stands for the sun's, which [`Light::Sun`] has none of: finer than any grid.
 const SUN_RADIUS: f32 = 1e-3;
 
-/// Covariance of the spectrum of a Gaussian with this covariance: `M⁻¹/(4π²)`, bounded.
+/// Covariance of the spectrum of a Gaussian with this covariance: `M⁻¹/(4π²)`.
+///
+/// Seen edge-on a light is a line, sharp across it: its width counts as `√least` at least, and as a thousandth of
+/// its length, so that the inverse is one.
 fn spectrum_of(m: &Symmetric2, least: f32) -> Symmetric2 {
-    let m = Symmetric2 { xx: m.xx + least, xy: m.xy, yy: m.yy + least };
-    let (inverse, is_regular) = m.inverse_and_rank();
-    if is_regular {
-        inverse.times(PER_HESSIAN)
-    } else {
-        // Seen edge-on a light is a line: sharp across it.
-        Symmetric2::diagonal(PER_HESSIAN / m.xx.max(1e-18), PER_HESSIAN / m.yy.max(1e-18))
-    }
+    let least = least + 1e-6 * m.trace();
+    Symmetric2 { xx: m.xx + least, xy: m.xy, yy: m.yy + least }.pseudo_inverse().times(PER_HESSIAN)
 }
 
 /// The light field of a photon that leaves `light` along `ray`; `normal` is that of the light's surface there.
@@ -93,7 +90,7 @@ pub fn emitted(light: &Light<'_>, ray: &Ray, normal: Option<Vec3>, point_radius:
         Light::Constant(_) => Symmetric4::ZERO,
         Light::Environment(map) => Symmetric4::separable(Symmetric2::ZERO, sky(map, &frame)),
     };
-    LightField { covariance: covariance.tidy(), frame }
+    LightField { covariance: covariance.mended(), frame }
 }
 
 /// Angular covariance of an image around the world: its relative Hessian over a texel.

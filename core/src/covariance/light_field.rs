@@ -3,9 +3,9 @@
 use glam::Vec3;
 
 use super::lobe::phase_covariance;
-use super::matrix::Symmetric4;
+use super::matrix::{LIMIT, Symmetric4};
 use super::operators::phong_lobe;
-use crate::math::{Frame, Symmetric2, Symmetric3};
+use crate::math::{Frame, Symmetric2, Symmetric3, float};
 use crate::phase::{self, Phase};
 use crate::surface::{Surface, lambert, phong};
 
@@ -43,9 +43,9 @@ impl Patch {
     fn facing(&self, direction: Vec3) -> Self {
         if self.normal.dot(direction) > 0.0 {
             // Convex from one side is concave from the other.
-            Self { normal: -self.normal, curvature: self.curvature.times(-1.0), ..*self }
+            Self { normal: -self.normal, curvature: self.curvature.bounded(LIMIT).times(-1.0), ..*self }
         } else {
-            *self
+            Self { curvature: self.curvature.bounded(LIMIT), ..*self }
         }
     }
 }
@@ -54,7 +54,12 @@ impl Patch {
 fn across(v: Vec3, w: Vec3) -> Option<Vec3> {
     let rest = v - w * v.dot(w);
     let length2 = rest.length_squared();
-    (length2 > 1e-12).then(|| rest / crate::math::float::sqrt(length2))
+    if !(length2 > 1e-12) {
+        return None;
+    }
+    let unit = rest / float::sqrt(length2);
+    // Where little was left, its rounding was blown up: once more.
+    Some(if length2 < 1e-2 { (unit - w * unit.dot(w)).normalize() } else { unit })
 }
 
 impl LightField {
@@ -75,7 +80,8 @@ impl LightField {
     #[inline]
     #[must_use]
     pub fn occluded(&self, occluders: &Symmetric3) -> Self {
-        Self { covariance: self.covariance.masked(&occluders.within(self.frame.u, self.frame.v)), ..*self }
+        let mask = occluders.bounded(LIMIT).within(self.frame.u, self.frame.v);
+        Self { covariance: self.covariance.masked(&mask), ..*self }
     }
 
     /// Attenuated along `distance` (m) of a medium whose extinction has this Hessian (m⁻³):
@@ -83,7 +89,7 @@ impl LightField {
     #[inline]
     #[must_use]
     pub fn attenuated(&self, hessian: &Symmetric3, distance: f32) -> Self {
-        let hessian = hessian.within(self.frame.u, self.frame.v);
+        let hessian = hessian.bounded(1e30).within(self.frame.u, self.frame.v);
         Self { covariance: self.covariance.attenuated(&hessian, distance), ..*self }
     }
 
@@ -125,7 +131,9 @@ impl LightField {
     #[must_use]
     pub fn convolved(&self, outgoing: Vec3, cos_alpha: f32, lobe: &Symmetric2) -> Self {
         let incoming = self.frame.w;
-        let normal = incoming.cross(outgoing);
+        // Of a small difference, not of two long vectors: its rounding would tilt the plane.
+        let normal =
+            if cos_alpha > 0.0 { incoming.cross(outgoing - incoming) } else { incoming.cross(outgoing + incoming) };
         let length = normal.length();
         let (aligned, v) = if length < 1e-6 {
             // Straight on or back: any plane will do, the frame's own first axis changes least.
@@ -160,7 +168,7 @@ impl LightField {
         let other = tangent.cross(n);
         let mut covariance = self.turned_to(tangent).covariance.projected(cos_in);
         covariance = covariance.curved(&patch.curvature.within(tangent, other), cos_in);
-        covariance = covariance.masked(&patch.texture.within(tangent, other));
+        covariance = covariance.masked(&patch.texture.bounded(LIMIT).within(tangent, other));
         if let Some(lobe) = reflection_lobe(surface, n, -self.frame.w, outgoing) {
             covariance = covariance.reflected_in_lobe(&lobe);
         }

@@ -5,8 +5,8 @@ use bytemuck::{Pod, Zeroable};
 use crate::math::symmetric::{inverse_of, jacobi, rebuilt};
 use crate::math::{Eigen, Symmetric2, float};
 
-/// Entries of covariances never exceed this (cycles²): a million cycles per metre or radian is beyond
-/// anything light in a medium shows, and fourth powers of it are still finite.
+/// What operators return never exceeds this (cycles²): a million cycles per metre or radian is beyond
+/// anything light in a medium shows, and `f32` holds its third power.
 pub const LIMIT: f32 = 1e12;
 
 /// A symmetric 4×4 matrix over `(u, v, θ, φ)` in blocks of two:
@@ -114,48 +114,89 @@ impl Symmetric4 {
         Self::from_rows(rebuilt(&eigen, |value| inverse_of(value, largest)))
     }
 
-    /// What every operator ends with: rounding may have pushed a variance below zero or a covariance beyond
-    /// what its variances carry; numbers beyond [`LIMIT`] are scaled back row and column together, which
-    /// keeps the matrix positive semi-definite.
+    /// What operators are made of: `f` of this matrix, mended where rounding asks for it.
+    ///
+    /// Where that leaves the range of covariances, it is done again from a matrix within [`LIMIT`]: then `f32`
+    /// holds whatever an operator makes of it, and what is too large can be scaled back.
     #[inline]
     #[must_use]
-    pub(super) fn tidy(self) -> Self {
-        let Self { spatial: mut x, mixed: mut c, angular: mut p } = self;
-        let largest = float::max(float::max(x.xx, x.yy), float::max(p.xx, p.yy));
-        if !(largest <= LIMIT) {
-            return self.bounded();
-        }
-        x = x.tidy();
-        p = p.tidy();
-        for (i, entry) in c.iter_mut().enumerate() {
-            let row = if i < 2 { x.xx } else { x.yy };
-            let column = if i % 2 == 0 { p.xx } else { p.yy };
-            let most = row * column;
-            if !(*entry * *entry <= most) {
-                *entry = float::sqrt(most).copysign(*entry);
-            }
-        }
-        Self { spatial: x, mixed: c, angular: p }
+    pub(super) fn changed(&self, f: impl Fn(&Self) -> Self) -> Self {
+        let out = f(self);
+        if out.is_sound() { out } else { self.mend(&out, f) }
     }
 
-    /// [`Symmetric4::tidy`] for what is beyond [`LIMIT`].
     #[cold]
-    fn bounded(self) -> Self {
-        let clean = |x: f32| if x.is_nan() { 0.0 } else { x.clamp(-1e36, 1e36) };
-        let upper = self.to_upper().map(clean);
-        let diagonal = [upper[0], upper[4], upper[7], upper[9]];
-        let s = diagonal.map(|d| if d > LIMIT { float::sqrt(LIMIT / d) } else { 1.0 });
-        let mut k = 0;
-        let mut out = [0.0; 10];
-        for i in 0..4 {
-            for j in i..4 {
-                out[k] = (upper[k] * s[i] * s[j]).clamp(-LIMIT, LIMIT);
-                k += 1;
+    #[inline(never)]
+    fn mend(&self, out: &Self, f: impl Fn(&Self) -> Self) -> Self {
+        if out.is_bounded() { out.tidy() } else { f(&self.bounded()).bounded() }
+    }
+
+    /// Whether all variances are numbers within [`LIMIT`], none negative, and carry the covariances, up to rounding.
+    #[inline]
+    fn is_sound(&self) -> bool {
+        let Self { spatial: x, mixed: c, angular: p } = self;
+        let fits = |c: f32, a: f32, b: f32| c * c <= a * b * (1.0 + 4.0 * f32::EPSILON);
+        // One branch, not ten.
+        (x.xx >= 0.0)
+            & (x.yy >= 0.0)
+            & (p.xx >= 0.0)
+            & (p.yy >= 0.0)
+            & (x.xx + x.yy + (p.xx + p.yy) <= LIMIT)
+            & fits(c[0], x.xx, p.xx)
+            & fits(c[1], x.xx, p.yy)
+            & fits(c[2], x.yy, p.xx)
+            & fits(c[3], x.yy, p.yy)
+            & fits(x.xy, x.xx, x.yy)
+            & fits(p.xy, p.xx, p.yy)
+    }
+
+    /// Whether all variances are numbers within [`LIMIT`].
+    fn is_bounded(&self) -> bool {
+        let Self { spatial: x, angular: p, .. } = self;
+        x.xx.abs() + x.yy.abs() + (p.xx.abs() + p.yy.abs()) <= LIMIT
+    }
+
+    /// This matrix, or what is left of it as a covariance.
+    #[inline]
+    #[must_use]
+    pub(super) fn mended(&self) -> Self {
+        self.changed(|a| *a)
+    }
+
+    /// Rounding may have pushed a variance below zero, or a covariance beyond what its variances carry.
+    #[cold]
+    #[must_use]
+    fn tidy(&self) -> Self {
+        let (x, p) = (self.spatial.tidy(), self.angular.tidy());
+        let [u, v, t, f] = [x.xx, x.yy, p.xx, p.yy].map(float::sqrt);
+        let most = [u * t, u * f, v * t, v * f];
+        let mixed = [0, 1, 2, 3].map(|i| {
+            let c: f32 = self.mixed[i];
+            if c.abs() <= most[i] { c } else { most[i].copysign(c) }
+        });
+        Self { spatial: x, mixed, angular: p }
+    }
+
+    /// Rows and columns scaled so that no variance exceeds [`LIMIT`]: positive semi-definite input stays so.
+    #[cold]
+    #[must_use]
+    fn bounded(&self) -> Self {
+        let Self { spatial: x, angular: p, .. } = self;
+        let [u, v, t, f] = [x.xx, x.yy, p.xx, p.yy].map(|variance| {
+            // Powers of two, which round nothing.
+            let mut factor = 1.0;
+            while variance * factor * factor > LIMIT {
+                factor *= 0.5;
             }
-        }
-        for k in [0, 4, 7, 9] {
-            out[k] = out[k].max(0.0);
-        }
-        Self::from_upper(out).tidy()
+            factor
+        });
+        let scaled = self.to_upper();
+        let by = [u * u, u * v, u * t, u * f, v * v, v * t, v * f, t * t, t * f, f * f];
+        let entry = |k: usize| {
+            let x = scaled[k] * by[k];
+            // What no variance carries.
+            if x.is_nan() { 0.0 } else { x.clamp(-LIMIT, LIMIT) }
+        };
+        Self::from_upper(core::array::from_fn(entry)).tidy()
     }
 }

@@ -5,10 +5,13 @@ use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
 use super::light_field::LightField;
-use super::matrix::Symmetric4;
+use super::matrix::{LIMIT, Symmetric4};
 use super::operators::PER_HESSIAN;
 use crate::math::float::{self, PI};
 use crate::math::{Frame, Symmetric2, Symmetric3};
+
+/// Largest energy of one contribution: with it, millions of the largest covariances have a finite sum.
+const MOST_ENERGY: f32 = 1e20;
 
 /// The covariance of the fluence at a place, as it is gathered: the sum of what light fields add to it, and of
 /// the energy with which they do.
@@ -25,9 +28,10 @@ impl Voxel {
     /// Nothing gathered.
     pub const EMPTY: Self = Self { sum: Symmetric3::ZERO, weight: 0.0 };
 
-    /// Adds a light field with energy `energy`.
+    /// Adds a light field with energy `energy`; more than 10²⁰ counts as that.
     #[inline]
     pub fn add(&mut self, light: &LightField, energy: f32) {
+        let energy = float::min(energy, MOST_ENERGY);
         self.sum = self.sum.plus(&light.volumetric().times(energy));
         self.weight += energy;
     }
@@ -49,7 +53,7 @@ impl Voxel {
     #[inline]
     #[must_use]
     pub fn covariance(&self) -> Option<Symmetric3> {
-        (self.weight > 0.0).then(|| self.sum.times(1.0 / self.weight))
+        (self.weight > 0.0).then(|| Symmetric3::from_upper(self.sum.to_upper().map(|x| x / self.weight)))
     }
 }
 
@@ -58,7 +62,7 @@ impl Voxel {
 #[inline]
 #[must_use]
 pub fn hessian_bound(fluence: f32, covariance: &Symmetric3) -> Symmetric3 {
-    covariance.times(4.0 * PI * PI * fluence)
+    covariance.times(float::min(4.0 * PI * PI * fluence, f32::MAX))
 }
 
 /// Length (m) of an integration step along the unit vector `direction`: `1/(2√v)` with `v = ωᵀΓω`, within
@@ -139,12 +143,14 @@ impl ImageCovariance {
         hessian: Option<&Symmetric3>,
     ) {
         let Frame { u, v, .. } = self.frame;
+        let contribution = float::min(contribution, MOST_ENERGY);
         let seen = |spatial: Symmetric2| Symmetric4::separable(spatial, Symmetric2::ZERO).travelled(distance);
         if let Some(hessian) = hessian {
-            let mask = seen(hessian.within(u, v).absolute().times(length * PER_HESSIAN));
+            let mask = hessian.bounded(1e30).within(u, v).absolute().bounded(1e30);
+            let mask = seen(mask.times(PER_HESSIAN * float::min(length, 1e30)).bounded(LIMIT));
             self.attenuation = self.attenuation.plus(&mask);
         }
-        let segment = seen(covariance.within(u, v)).plus(&self.attenuation);
+        let segment = seen(covariance.bounded(LIMIT).within(u, v)).plus(&self.attenuation);
         self.sum = self.sum.plus(&segment.times(contribution));
         self.weight += contribution;
     }
@@ -152,7 +158,7 @@ impl ImageCovariance {
     /// The covariance at the camera; `None` if nothing contributes.
     #[must_use]
     pub fn value(&self) -> Option<Symmetric4> {
-        (self.weight > 0.0).then(|| self.sum.times(1.0 / self.weight))
+        (self.weight > 0.0).then(|| Symmetric4::from_upper(self.sum.to_upper().map(|x| x / self.weight)))
     }
 
     /// Its block over directions (cycles²/rad²), which for a pinhole is that of the image.
@@ -167,7 +173,9 @@ impl ImageCovariance {
 #[inline]
 #[must_use]
 pub fn sample_density(image: &Symmetric2) -> f32 {
-    float::safe_sqrt(image.determinant())
+    let Symmetric2 { xx, xy, yy } = *image;
+    let [xx, xy, yy] = [xx, xy, yy].map(f64::from);
+    libm::sqrt((xx * yy - xy * xy).max(0.0)) as f32
 }
 
 /// Precision matrix (rad⁻²) of the filter that an image of covariance `image` (cycles²/rad²) bears:

@@ -16,8 +16,15 @@ pub const PER_HESSIAN: f32 = 1.0 / (4.0 * PI * PI);
 /// would grow without bound at grazing angles.
 pub const LEAST_COSINE: f32 = 1e-2;
 
-/// Angular variances this much larger than those of the light let everything pass.
-const PASSES_ALL: f32 = 1e6;
+/// Relative: four times the rounding of an `f32`, for four rows. Larger, results err by as much; smaller, a
+/// matrix whose entries were rounded one by one may have a negative eigenvalue.
+const SLACK: f64 = 2.4e-7;
+
+/// Keeps what divides from being zero, and is itself zero in `f32`.
+const TINY: f64 = 1e-50;
+
+/// What remains of a difference below this part of its terms is rounding: a few of [`SLACK`].
+const ROUNDING: f32 = 1e-6;
 
 impl Symmetric4 {
     /// After a flight of `distance` (m) through free space.
@@ -38,8 +45,7 @@ impl Symmetric4 {
     #[must_use]
     pub fn travelled(&self, distance: f32) -> Self {
         let d = distance.clamp(-LIMIT, LIMIT);
-        let Self { spatial: x, mixed: c, angular: p } = *self;
-        let travelled = Self {
+        self.changed(|&Self { spatial: x, mixed: c, angular: p }| Self {
             spatial: x,
             mixed: [c[0] - d * x.xx, c[1] - d * x.xy, c[2] - d * x.xy, c[3] - d * x.yy],
             angular: Symmetric2 {
@@ -47,8 +53,7 @@ impl Symmetric4 {
                 xy: p.xy - d * (c[1] + c[2] - d * x.xy),
                 yy: p.yy - d * (2.0 * c[3] - d * x.yy),
             },
-        };
-        travelled.tidy()
+        })
     }
 
     /// Multiplied in space by a mask with the spectral covariance `mask` (cycles²/m²): an occluder, a
@@ -56,7 +61,8 @@ impl Symmetric4 {
     #[inline]
     #[must_use]
     pub fn masked(&self, mask: &Symmetric2) -> Self {
-        Self { spatial: self.spatial.plus(mask), ..*self }.tidy()
+        let mask = mask.bounded(LIMIT);
+        self.changed(|a| Self { spatial: a.spatial.plus(&mask), ..*a })
     }
 
     /// Attenuated along `distance` (m) by a medium whose extinction has the Hessian `hessian` (m⁻³) across
@@ -71,7 +77,8 @@ impl Symmetric4 {
     #[inline]
     #[must_use]
     pub fn attenuated(&self, hessian: &Symmetric2, distance: f32) -> Self {
-        self.masked(&hessian.absolute().times(distance * PER_HESSIAN))
+        // In this order no product of finite numbers is lost before it is small.
+        self.masked(&hessian.absolute().bounded(1e30).times(PER_HESSIAN * float::min(distance, 1e30)).bounded(LIMIT))
     }
 
     /// Convolved over directions with a lobe of angular covariance `lobe` (cycles²/rad²), turned by an angle
@@ -79,70 +86,52 @@ impl Symmetric4 {
     ///
     /// ```text
     /// ((V Σ V)⁻¹ + [[0, 0], [0, σ_ρ⁻¹]])⁻¹,  V = diag(cos α, 1, 1, 1)
-    /// Q = (σ_ρ + P)⁺:   P′ = σ_ρ Q P,  C′ = C Q σ_ρ,  X′ = X − C Q Cᵀ
+    /// Q = (σ_ρ + P)⁻¹:   P′ = σ_ρ Q P,  C′ = C Q σ_ρ,  X′ = X − C Q Cᵀ
     /// ```
     ///
-    /// B Eq. 11–13 without inverses (sheet § 2.4), so that singular light fields and lobes are no special
-    /// case. Exact for Gaussian lobes; 20–30 % off for Henyey–Greenstein with g = 0.8.
+    /// B Eq. 11–13 without inverses of `Σ` or `σ_ρ` (sheet § 2.4), so that singular light fields and lobes are no
+    /// special case. `P′` is a sum of positive terms, thanks to an identity of 2×2 matrices. Inside, numbers are
+    /// `f64`, and `P` is larger by the rounding of its `f32`: what entries that were each rounded say together
+    /// is then possible, and nothing divides by zero. Exact for Gaussian lobes; 20–30 % off for
+    /// Henyey–Greenstein with g = 0.8.
     ///
     /// ```
     /// # use fogbow::{covariance::Symmetric4, math::Symmetric2};
     /// let light = Symmetric4::separable(Symmetric2::diagonal(2.0, 2.0), Symmetric2::diagonal(3.0, 3.0));
     /// let seen = light.scattered(1.0, &Symmetric2::diagonal(1.5, 1.5));
-    /// assert_eq!(seen.angular, Symmetric2::diagonal(1.0, 1.0));   // 1/(1/3 + 1/1.5)
+    /// assert!((seen.angular.xx - 1.0).abs() < 1e-6);   // 1/(1/3 + 1/1.5)
     /// ```
     #[inline]
     #[must_use]
     pub fn scattered(&self, cos_alpha: f32, lobe: &Symmetric2) -> Self {
-        let Self { spatial, mixed: c, angular: p } = *self;
-        let x = spatial.scaled(cos_alpha, 1.0);
-        let c = [c[0] * cos_alpha, c[1] * cos_alpha, c[2], c[3]];
-        if lobe.xx + lobe.yy > PASSES_ALL * p.trace() && lobe.xx.min(lobe.yy) > PASSES_ALL * p.trace() {
-            return Self { spatial: x, mixed: c, angular: p }.tidy();
-        }
-        let (q, is_regular) = lobe.plus(&p).inverse_and_rank();
-        // C Q
-        let cq = [
-            c[0] * q.xx + c[1] * q.xy,
-            c[0] * q.xy + c[1] * q.yy,
-            c[2] * q.xx + c[3] * q.xy,
-            c[2] * q.xy + c[3] * q.yy,
-        ];
-        let spatial = Symmetric2 {
-            xx: x.xx - (cq[0] * c[0] + cq[1] * c[1]),
-            xy: x.xy - (cq[0] * c[2] + cq[1] * c[3]),
-            yy: x.yy - (cq[2] * c[2] + cq[3] * c[3]),
-        };
-        let (mixed, angular);
-        if is_regular {
-            mixed = [
-                cq[0] * lobe.xx + cq[1] * lobe.xy,
-                cq[0] * lobe.xy + cq[1] * lobe.yy,
-                cq[2] * lobe.xx + cq[3] * lobe.xy,
-                cq[2] * lobe.xy + cq[3] * lobe.yy,
-            ];
-            // σ_ρ Q P, and its transpose P Q σ_ρ: the same but for rounding.
-            let sq = product(lobe, &q);
-            angular = Symmetric2 {
-                xx: sq[0] * p.xx + sq[1] * p.xy,
-                xy: 0.5 * (sq[0] * p.xy + sq[1] * p.yy + sq[2] * p.xx + sq[3] * p.xy),
-                yy: sq[2] * p.xy + sq[3] * p.yy,
-            };
-        } else {
-            mixed = [
-                c[0] - (cq[0] * p.xx + cq[1] * p.xy),
-                c[1] - (cq[0] * p.xy + cq[1] * p.yy),
-                c[2] - (cq[2] * p.xx + cq[3] * p.xy),
-                c[3] - (cq[2] * p.xy + cq[3] * p.yy),
-            ];
-            let pq = product(&p, &q);
-            angular = Symmetric2 {
-                xx: p.xx - (pq[0] * p.xx + pq[1] * p.xy),
-                xy: p.xy - 0.5 * (pq[0] * p.xy + pq[1] * p.yy + pq[2] * p.xx + pq[3] * p.xy),
-                yy: p.yy - (pq[2] * p.xy + pq[3] * p.yy),
-            };
-        }
-        Self { spatial, mixed, angular }.tidy()
+        self.changed(|a| {
+            let [x, p, s] = [&a.spatial.scaled(cos_alpha, 1.0), &a.angular, lobe].map(Wide::new);
+            let (p, s) = (p.not_singular(TINY), s.not_singular(0.0));
+            let c = [a.mixed[0] * cos_alpha, a.mixed[1] * cos_alpha, a.mixed[2], a.mixed[3]].map(f64::from);
+            // |σ_ρ + P| in parts that are not negative.
+            let (det_p, det_s) = (p.determinant(), s.determinant());
+            let cross = s.xx * p.yy + s.yy * p.xx - 2.0 * s.xy * p.xy;
+            let scale = 1.0 / (det_p + det_s + if cross > 0.0 { cross } else { 0.0 });
+            let (of_light, of_lobe) = (scale * det_s, scale * det_p);
+            let sum = Wide { xx: s.xx + p.xx, xy: s.xy + p.xy, yy: s.yy + p.yy };
+            let cq = sum.adjoint_after(&c, scale);
+            let cp = p.adjoint_after(&c, scale);
+            Self {
+                spatial: x.without(&cq, &c),
+                mixed: [
+                    of_light * c[0] + (cp[0] * s.xx + cp[1] * s.xy),
+                    of_light * c[1] + (cp[0] * s.xy + cp[1] * s.yy),
+                    of_light * c[2] + (cp[2] * s.xx + cp[3] * s.xy),
+                    of_light * c[3] + (cp[2] * s.xy + cp[3] * s.yy),
+                ]
+                .map(|x| x as f32),
+                angular: Symmetric2 {
+                    xx: (of_light * p.xx + of_lobe * s.xx) as f32,
+                    xy: (of_light * p.xy + of_lobe * s.xy) as f32,
+                    yy: (of_light * p.yy + of_lobe * s.yy) as f32,
+                },
+            }
+        })
     }
 
     /// Reflected by a surface whose lobe has the angular covariance `lobe` (cycles²/rad²), in the surface's own
@@ -157,35 +146,35 @@ impl Symmetric4 {
     #[inline]
     #[must_use]
     pub fn rotated(&self, cos: f32, sin: f32) -> Self {
-        let Self { spatial, mixed: m, angular } = *self;
         let (c, s) = (cos, sin);
         let block = |a: &Symmetric2| Symmetric2 {
             xx: c * c * a.xx + 2.0 * c * s * a.xy + s * s * a.yy,
             xy: c * s * (a.yy - a.xx) + (c * c - s * s) * a.xy,
             yy: s * s * a.xx - 2.0 * c * s * a.xy + c * c * a.yy,
         };
-        // Rᵀ C R
-        let rows = [c * m[0] + s * m[2], c * m[1] + s * m[3], c * m[2] - s * m[0], c * m[3] - s * m[1]];
-        let mixed = [
-            c * rows[0] + s * rows[1],
-            c * rows[1] - s * rows[0],
-            c * rows[2] + s * rows[3],
-            c * rows[3] - s * rows[2],
-        ];
-        Self { spatial: block(&spatial), mixed, angular: block(&angular) }.tidy()
+        self.changed(|&Self { spatial, mixed: m, angular }| {
+            // Rᵀ C R
+            let rows = [c * m[0] + s * m[2], c * m[1] + s * m[3], c * m[2] - s * m[0], c * m[3] - s * m[1]];
+            let mixed = [
+                c * rows[0] + s * rows[1],
+                c * rows[1] - s * rows[0],
+                c * rows[2] + s * rows[3],
+                c * rows[3] - s * rows[2],
+            ];
+            Self { spatial: block(&spatial), mixed, angular: block(&angular) }
+        })
     }
 
     /// Of the light field `f(λ₁u, λ₂v, λ₃θ, λ₄φ)`: `Λ Σ Λ`.
     #[inline]
     #[must_use]
-    pub fn scaled(&self, [u, v, theta, phi]: [f32; 4]) -> Self {
-        let Self { spatial, mixed: c, angular } = *self;
-        Self {
+    pub fn scaled(&self, factors: [f32; 4]) -> Self {
+        let [u, v, theta, phi] = factors.map(|x| x.clamp(-LIMIT, LIMIT));
+        self.changed(|&Self { spatial, mixed: c, angular }| Self {
             spatial: spatial.scaled(u, v),
             mixed: [c[0] * u * theta, c[1] * u * phi, c[2] * v * theta, c[3] * v * phi],
             angular: angular.scaled(theta, phi),
-        }
-        .tidy()
+        })
     }
 
     /// On a surface met at an angle of this cosine, in the plane of `u` (step 2 of sheet § 2.2).
@@ -211,30 +200,27 @@ impl Symmetric4 {
     #[inline]
     #[must_use]
     pub fn curved(&self, curvature: &Symmetric2, cosine: f32) -> Self {
-        let Self { spatial: x, mixed: c, angular: p } = *self;
         let bound = |k: f32| k.clamp(-LIMIT, LIMIT);
         let (tt, ts, ss) = (bound(curvature.xx), bound(curvature.xy), bound(curvature.yy));
         let n = [tt, cosine * ts, ts, cosine * ss];
-        // N P
-        let np = [
-            n[0] * p.xx + n[1] * p.xy,
-            n[0] * p.xy + n[1] * p.yy,
-            n[2] * p.xx + n[3] * p.xy,
-            n[2] * p.xy + n[3] * p.yy,
-        ];
-        let mixed = [c[0] - np[0], c[1] - np[1], c[2] - np[2], c[3] - np[3]];
-        // X − C Nᵀ − N Cᵀ + N P Nᵀ = X − C Nᵀ − N C′ᵀ
-        let spatial = Symmetric2 {
-            xx: x.xx - (c[0] + mixed[0]) * n[0] - (c[1] + mixed[1]) * n[1],
-            xy: x.xy
-                - 0.5
-                    * ((c[0] + mixed[0]) * n[2]
-                        + (c[1] + mixed[1]) * n[3]
-                        + (c[2] + mixed[2]) * n[0]
-                        + (c[3] + mixed[3]) * n[1]),
-            yy: x.yy - (c[2] + mixed[2]) * n[2] - (c[3] + mixed[3]) * n[3],
-        };
-        Self { spatial, mixed, angular: p }.tidy()
+        self.changed(|&Self { spatial: x, mixed: c, angular: p }| {
+            // N P
+            let np = [
+                n[0] * p.xx + n[1] * p.xy,
+                n[0] * p.xy + n[1] * p.yy,
+                n[2] * p.xx + n[3] * p.xy,
+                n[2] * p.xy + n[3] * p.yy,
+            ];
+            let mixed = [c[0] - np[0], c[1] - np[1], c[2] - np[2], c[3] - np[3]];
+            // X − C Nᵀ − N Cᵀ + N P Nᵀ = X − (C + C′) Nᵀ, made symmetric
+            let both = [c[0] + mixed[0], c[1] + mixed[1], c[2] + mixed[2], c[3] + mixed[3]];
+            let spatial = Symmetric2 {
+                xx: x.xx - both[0] * n[0] - both[1] * n[1],
+                xy: x.xy - 0.5 * (both[0] * n[2] + both[1] * n[3] + both[2] * n[0] + both[3] * n[1]),
+                yy: x.yy - both[2] * n[2] - both[3] * n[3],
+            };
+            Self { spatial, mixed, angular: p }
+        })
     }
 
     /// With the second axis, and the angle about the first, counted the other way: from the mirror image of
@@ -250,24 +236,15 @@ impl Symmetric4 {
     #[inline]
     #[must_use]
     pub fn combined(&self, weight: f32, other: &Self, other_weight: f32) -> Self {
-        let total = weight + other_weight;
-        if !(total > 0.0) {
+        let (weight, other_weight) = (float::max(weight, 0.0), float::max(other_weight, 0.0));
+        let larger = float::max(weight, other_weight);
+        if !(larger > 0.0) {
             return Self::ZERO;
         }
-        let (a, b) = if total.is_finite() {
-            (weight / total, other_weight / total)
-        } else {
-            // The sum overflows, halves do not.
-            let half = 0.5 * weight + 0.5 * other_weight;
-            (0.5 * weight / half, 0.5 * other_weight / half)
-        };
-        let mixed = [0, 1, 2, 3].map(|i| a * self.mixed[i] + b * other.mixed[i]);
-        Self {
-            spatial: self.spatial.times(a).plus(&other.spatial.times(b)),
-            mixed,
-            angular: self.angular.times(a).plus(&other.angular.times(b)),
-        }
-        .tidy()
+        // By the larger first: sums of huge weights, and inverses of tiny ones, leave what `f32` holds.
+        let (a, b) = (weight / larger, other_weight / larger);
+        let (a, b) = (a / (a + b), b / (a + b));
+        self.changed(|this| this.times(a).plus(&other.times(b)))
     }
 
     /// Covariance (cycles²/m²) across the ray of the fluence, the light field summed over directions: the
@@ -277,29 +254,21 @@ impl Symmetric4 {
     /// S = X − C P⁺ Cᵀ
     /// ```
     ///
-    /// Sheet § 2.5 (in place of B Eq. 16). What remains below 10⁻⁶ of `X` is rounding, and returned as 0.
+    /// Sheet § 2.5 (in place of B Eq. 16). Variances below 10⁻⁶ of those in `X` are rounding, and returned as 0.
     #[inline]
     #[must_use]
     pub fn slice(&self) -> Symmetric2 {
-        let Self { spatial: x, mixed: c, angular: p } = *self;
-        let q = p.pseudo_inverse();
-        let cq = [
-            c[0] * q.xx + c[1] * q.xy,
-            c[0] * q.xy + c[1] * q.yy,
-            c[2] * q.xx + c[3] * q.xy,
-            c[2] * q.xy + c[3] * q.yy,
-        ];
-        let least = 1e-6 * x.trace();
-        let mut s = Symmetric2 {
-            xx: x.xx - (cq[0] * c[0] + cq[1] * c[1]),
-            xy: x.xy - 0.5 * (cq[0] * c[2] + cq[1] * c[3] + cq[2] * c[0] + cq[3] * c[1]),
-            yy: x.yy - (cq[2] * c[2] + cq[3] * c[3]),
-        };
-        if !(s.xx > least) {
-            s.xx = 0.0;
+        let a = self.mended();
+        let [x, p] = [&a.spatial, &a.angular].map(Wide::new);
+        let p = p.not_singular(TINY);
+        let c = a.mixed.map(f64::from);
+        let cq = p.adjoint_after(&c, 1.0 / p.determinant());
+        let mut s = x.without(&cq, &c);
+        if !(s.xx > ROUNDING * a.spatial.xx) {
+            (s.xx, s.xy) = (0.0, 0.0);
         }
-        if !(s.yy > least) {
-            s.yy = 0.0;
+        if !(s.yy > ROUNDING * a.spatial.yy) {
+            (s.yy, s.xy) = (0.0, 0.0);
         }
         s.tidy()
     }
@@ -336,10 +305,52 @@ impl Symmetric4 {
     }
 }
 
-/// `A B`, row by row.
-#[inline]
-fn product(a: &Symmetric2, b: &Symmetric2) -> [f32; 4] {
-    [a.xx * b.xx + a.xy * b.xy, a.xx * b.xy + a.xy * b.yy, a.xy * b.xx + a.yy * b.xy, a.xy * b.xy + a.yy * b.yy]
+/// A [`Symmetric2`] in `f64`, which holds products of its entries exactly.
+#[derive(Clone, Copy)]
+struct Wide {
+    xx: f64,
+    xy: f64,
+    yy: f64,
+}
+
+impl Wide {
+    #[inline]
+    fn new(a: &Symmetric2) -> Self {
+        Self { xx: f64::from(a.xx), xy: f64::from(a.xy), yy: f64::from(a.yy) }
+    }
+
+    /// With variances larger by what rounding to `f32` took away, and by `least`.
+    #[inline]
+    fn not_singular(self, least: f64) -> Self {
+        Self { xx: self.xx * (1.0 + SLACK) + least, xy: self.xy, yy: self.yy * (1.0 + SLACK) + least }
+    }
+
+    /// Not below what [`Wide::not_singular`] leaves of a positive semi-definite matrix.
+    #[inline]
+    fn determinant(&self) -> f64 {
+        let most = self.xx * self.yy;
+        let det = most - self.xy * self.xy;
+        let least = SLACK * most;
+        if det > least { det } else { least }
+    }
+
+    /// `C adj(A) f`, with the 2×2 matrix `C` row by row.
+    #[inline]
+    fn adjoint_after(&self, c: &[f64; 4], f: f64) -> [f64; 4] {
+        let (xx, xy, yy) = (self.xx * f, self.xy * f, self.yy * f);
+        [c[0] * yy - c[1] * xy, c[1] * xx - c[0] * xy, c[2] * yy - c[3] * xy, c[3] * xx - c[2] * xy]
+    }
+
+    /// `A − D Cᵀ`, for a symmetric positive semi-definite `D Cᵀ`.
+    #[inline]
+    fn without(&self, d: &[f64; 4], c: &[f64; 4]) -> Symmetric2 {
+        let less = |a: f64, b: f64| if b > 0.0 { a - b } else { a };
+        Symmetric2 {
+            xx: less(self.xx, d[0] * c[0] + d[1] * c[1]) as f32,
+            xy: (self.xy - (d[0] * c[2] + d[1] * c[3])) as f32,
+            yy: less(self.yy, d[2] * c[2] + d[3] * c[3]) as f32,
+        }
+    }
 }
 
 /// Angular covariance (cycles²/rad²) of a Phong lobe `cosⁿ`: `n/(4π²) I` (sheet § 2.4).

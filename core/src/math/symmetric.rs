@@ -104,7 +104,8 @@ pub(crate) fn jacobi<const N: usize>(mut a: [[f32; N]; N]) -> Eigen<N> {
         *o = i;
     }
     order.sort_unstable_by(|&i, &j| a[j][j].total_cmp(&a[i][i]));
-    Eigen { values: order.map(|i| a[i][i] * largest), vectors: order.map(|i| vectors[i]) }
+    let value = |i: usize| (a[i][i] * largest).clamp(-f32::MAX, f32::MAX);
+    Eigen { values: order.map(value), vectors: order.map(|i| vectors[i]) }
 }
 
 /// `Σ f(λ) v vᵀ`.
@@ -114,11 +115,12 @@ pub(crate) fn rebuilt<const N: usize>(eigen: &Eigen<N>, f: impl Fn(f32) -> f32) 
         let value = f(*value);
         for i in 0..N {
             for j in 0..N {
-                out[i][j] += value * v[i] * v[j];
+                out[i][j] += value * (v[i] * v[j]);
             }
         }
     }
-    out
+    // Near the largest number a last bit may be one too many.
+    out.map(|row| row.map(|x| x.clamp(-f32::MAX, f32::MAX)))
 }
 
 /// One over an eigenvalue; 0 where it is a rounding of 0 beside the largest.
@@ -198,17 +200,17 @@ impl Symmetric2 {
     /// |A| = (A² + |det A| I)/(|λ₁| + |λ₂|)   where the signs of λ differ,   ±A elsewhere
     /// ```
     ///
-    /// No trigonometry; sheet § 2.3.
+    /// No trigonometry; sheet § 2.3. Where that exceeds what `f32` holds, it is scaled back as a whole.
     ///
     /// ```
     /// # use fogbow::math::Symmetric2;
-    /// assert_eq!(Symmetric2::diagonal(-2.0, 3.0).absolute(), Symmetric2::diagonal(2.0, 3.0));
+    /// assert_eq!(Symmetric2::diagonal(-1.0, 3.0).absolute(), Symmetric2::diagonal(1.0, 3.0));
     /// ```
     #[inline]
     #[must_use]
     pub fn absolute(&self) -> Self {
-        let mean = 0.5 * (self.xx + self.yy);
-        let half = 0.5 * (self.xx - self.yy);
+        let mean = 0.5 * self.xx + 0.5 * self.yy;
+        let half = 0.5 * self.xx - 0.5 * self.yy;
         let radius = float::hypot(half, self.xy);
         if mean >= radius {
             return *self;
@@ -216,8 +218,8 @@ impl Symmetric2 {
         if mean <= -radius {
             return self.times(-1.0);
         }
-        if !(radius > 0.0 && radius < f32::MAX) {
-            return Self::ZERO;
+        if !(radius > 1e-30 && radius < 1e38) {
+            return self.absolute_beyond(radius);
         }
         // In units of the radius, so that squares neither overflow nor vanish.
         let a = self.times(1.0 / radius);
@@ -227,36 +229,40 @@ impl Symmetric2 {
         out.times(0.5 * radius)
     }
 
+    /// [`Symmetric2::absolute`] where `radius` is tiny or huge.
+    #[cold]
+    fn absolute_beyond(&self, radius: f32) -> Self {
+        if radius < 1.0 {
+            return self.times(1e30).absolute().times(1e-30);
+        }
+        let out = self.times(1e-6).absolute();
+        out.times(float::min(1e6, 0.999 * f32::MAX / float::max(out.xx, out.yy)))
+    }
+
     /// Moore–Penrose inverse of a positive semi-definite matrix: the inverse, that of rank one where the
-    /// determinant drowns in rounding, or zero.
+    /// determinant drowns in rounding, or zero; entries do not exceed 10³⁰.
     ///
     /// ```
     /// # use fogbow::math::Symmetric2;
     /// assert_eq!(Symmetric2::diagonal(4.0, 0.0).pseudo_inverse(), Symmetric2::diagonal(0.25, 0.0));
     /// ```
-    #[inline]
     #[must_use]
     pub fn pseudo_inverse(&self) -> Self {
-        self.inverse_and_rank().0
-    }
-
-    /// [`Symmetric2::pseudo_inverse`], and whether it is a true inverse.
-    #[inline]
-    pub(crate) fn inverse_and_rank(&self) -> (Self, bool) {
-        let trace = self.trace();
-        if !(trace > 0.0) {
-            return (Self::ZERO, false);
+        // Products of two `f32` are exact in `f64`, which also holds the squares of all of them.
+        let Self { xx, xy, yy } = self.tidy();
+        let [xx, xy, yy] = [xx, xy, yy].map(f64::from);
+        let (det, trace) = (xx * yy - xy * xy, xx + yy);
+        let bounded = |x: f64| x.clamp(-f64::from(HUGE), f64::from(HUGE)) as f32;
+        if det > 1e-6 * xx * yy {
+            let f = 1.0 / det;
+            Self { xx: bounded(yy * f), xy: bounded(-xy * f), yy: bounded(xx * f) }
+        } else if trace > 0.0 {
+            // A/‖A‖²
+            let f = 1.0 / (trace * trace);
+            Self { xx: bounded(xx * f), xy: bounded(xy * f), yy: bounded(yy * f) }
+        } else {
+            Self::ZERO
         }
-        // By the trace first: squares of huge or tiny entries would leave what f32 holds.
-        let scale = 1.0 / trace;
-        let a = self.times(scale);
-        let det = float::difference_of_products(a.xx, a.yy, a.xy, a.xy);
-        if det > 1e-6 {
-            let f = scale / det;
-            return (Self { xx: a.yy * f, xy: -a.xy * f, yy: a.xx * f }, true);
-        }
-        let norm2 = a.xx * a.xx + 2.0 * a.xy * a.xy + a.yy * a.yy;
-        (a.times(scale / norm2), false)
     }
 
     /// Nothing negative on the diagonal, nothing off it that the diagonal cannot carry.
@@ -265,11 +271,18 @@ impl Symmetric2 {
     pub(crate) fn tidy(mut self) -> Self {
         self.xx = float::max(self.xx, 0.0);
         self.yy = float::max(self.yy, 0.0);
-        let most = self.xx * self.yy;
-        if !(self.xy * self.xy <= most) {
-            self.xy = float::sqrt(most).copysign(self.xy);
+        if !(self.xy * self.xy <= self.xx * self.yy) {
+            self.xy = float::sqrt(self.xx) * float::sqrt(self.yy).copysign(self.xy);
         }
         self
+    }
+
+    /// Scaled back as a whole if a variance exceeds `most`; positive semi-definite input stays so.
+    #[inline]
+    #[must_use]
+    pub(crate) fn bounded(&self, most: f32) -> Self {
+        let larger = float::max(self.xx.abs(), self.yy.abs());
+        if larger <= most { *self } else { self.times(most / larger) }
     }
 }
 
@@ -365,6 +378,14 @@ impl Symmetric3 {
             yz: self.yz * factor,
             zz: self.zz * factor,
         }
+    }
+
+    /// Scaled back as a whole if an entry exceeds `most`: what comes of it fits `f32` then.
+    #[inline]
+    #[must_use]
+    pub(crate) fn bounded(&self, most: f32) -> Self {
+        let largest = self.to_upper().iter().fold(0.0_f32, |m, x| float::max(x.abs(), m));
+        if largest <= most { *self } else { self.times(most / largest) }
     }
 
     fn rows(&self) -> [[f32; 3]; 3] {
