@@ -99,10 +99,11 @@ fn directions_leave_as_their_densities_say() {
     let quad = Light::Quad(QuadLight::new(Vec3::ZERO, edge.cross(axis), edge, COLOUR).unwrap());
     // A cone that ends at a border of bins.
     let below = 1.0 - (0.5 * PI).cos();
-    let densities: [(&str, &Light<'_>, Box<dyn Fn(f32) -> f32>); 3] = [
-        ("emitted, Phong", &phong, Box::new(|c| cosine_power_pdf(c, 9.0))),
-        ("emitted, spot", &spot, Box::new(|c| if 1.0 - c < below { uniform_cone_pdf(below) } else { 0.0 })),
-        ("emitted, quad", &quad, Box::new(cosine_hemisphere_pdf)),
+    type Density<'a> = (&'a str, &'a Light<'a>, &'a dyn Fn(f32) -> f32);
+    let densities: [Density<'_>; 3] = [
+        ("emitted, Phong", &phong, &|c| cosine_power_pdf(c, 9.0)),
+        ("emitted, spot", &spot, &|c| if 1.0 - c < below { uniform_cone_pdf(below) } else { 0.0 }),
+        ("emitted, quad", &quad, &cosine_hemisphere_pdf),
     ];
     for (name, light, density) in densities {
         // The quad's normal is ± the axis.
