@@ -44,7 +44,7 @@ pub struct BeamArguments {
 pub enum Kernel {
     /// The same everywhere, narrower from pass to pass.
     Progressive,
-    /// Wider where light is smooth, by its covariances.
+    /// Wider where light is smooth, by its covariances: not there yet.
     Covariance,
 }
 
