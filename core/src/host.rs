@@ -6,7 +6,7 @@
 use glam::Vec3;
 pub use rand_core::Rng;
 
-use crate::math::Ray;
+use crate::math::{Ray, Symmetric3};
 use crate::phase::Phase;
 use crate::spectrum::{Gradient, Hessian, Spectrum};
 use crate::surface::Surface;
@@ -229,6 +229,13 @@ pub trait Scene {
     /// The nearest surface along `ray`, or `None` if nothing lies within its length.
     fn closest_hit(&self, ray: &Ray) -> Option<Hit>;
 
+    /// The curvature (m⁻¹) of the surface that `ray` meets at `hit`: its shape operator, with the normal in its
+    /// kernel; positive where the surface is convex towards `hit.normal`. The default says flat.
+    fn curvature(&self, ray: &Ray, hit: &Hit) -> Symmetric3 {
+        let _ = (ray, hit);
+        Symmetric3::ZERO
+    }
+
     /// Whether any surface other than a [`Surface::Null`] lies strictly between the ends of `ray`.
     fn is_blocked(&self, ray: &Ray) -> bool {
         let mut rest = *ray;
@@ -253,6 +260,9 @@ pub trait Scene {
 impl<S: Scene + ?Sized> Scene for &S {
     fn closest_hit(&self, ray: &Ray) -> Option<Hit> {
         (**self).closest_hit(ray)
+    }
+    fn curvature(&self, ray: &Ray, hit: &Hit) -> Symmetric3 {
+        (**self).curvature(ray, hit)
     }
     fn is_blocked(&self, ray: &Ray) -> bool {
         (**self).is_blocked(ray)

@@ -9,6 +9,7 @@ pub use glam;
 pub use rand_core;
 
 pub mod beams;
+pub mod bytes;
 pub mod cache;
 pub mod covariance;
 pub mod host;

@@ -8,7 +8,7 @@ use core::ops::{Add, AddAssign, Div, DivAssign, Index, Mul, MulAssign, Neg, Sub}
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
-use crate::math::float;
+use crate::math::{Symmetric3, float};
 
 /// One value per colour channel. A type of its own, so that a colour cannot be dotted with a
 /// direction.
@@ -363,6 +363,15 @@ impl Hessian {
             + self.xy * (a.x * b.y + a.y * b.x)
             + self.xz * (a.x * b.z + a.z * b.x)
             + self.yz * (a.y * b.z + a.z * b.y)
+    }
+}
+
+impl Hessian {
+    /// The mean of the channels.
+    #[inline]
+    #[must_use]
+    pub fn mean(&self) -> Symmetric3 {
+        Symmetric3::from_upper([self.xx, self.xy, self.xz, self.yy, self.yz, self.zz].map(Spectrum::mean))
     }
 }
 

@@ -6,6 +6,7 @@
 //! | [`seed`] | the random numbers of each pixel and sample: independent, or low-discrepancy |
 //! | [`tiles`] | parallel rendering, the same bits for any number of threads |
 //! | [`progress`] | progress, cancellation |
+//! | [`covariance`] | filling covariance grids in parallel; their files |
 //! | [`photon_beams`] | shooting and gathering photon beams in parallel, pass by pass |
 //! | [`radiance_cache`] | filling radiance caches in parallel; their files |
 //! | [`image`] | PNG, PFM and (feature `exr`, on by default) OpenEXR files |
@@ -36,6 +37,8 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+pub mod covariance;
+mod files;
 pub mod film;
 pub mod image;
 pub mod photon_beams;

@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use fogbow::glam::Vec3;
 use fogbow::host::{Face, Gradients, Hit, Medium, Properties, Scene, Stretch};
-use fogbow::math::Ray;
+use fogbow::math::{Ray, Symmetric3};
 use fogbow::spectrum::{Hessian, Spectrum};
 
 /// How often the world was asked.
@@ -130,6 +130,9 @@ impl<S: Scene> Scene for CountingScene<'_, S> {
     fn is_blocked(&self, ray: &Ray) -> bool {
         raise(&self.tally.shadow_rays);
         self.scene.is_blocked(ray)
+    }
+    fn curvature(&self, ray: &Ray, hit: &Hit) -> Symmetric3 {
+        self.scene.curvature(ray, hit)
     }
 }
 

@@ -9,8 +9,9 @@ use std::path::{Path, PathBuf};
 use serde_json::{Map, Value, json};
 
 use fogbow::cache::{Blend, Extrapolation, Limits, exponent_limit, valid_radius, weight};
+use fogbow::covariance::{self, ImageCovariance, LightField, Symmetric4, Voxel};
 use fogbow::light::{Falloff, Source};
-use fogbow::math::{Ray, Vec3};
+use fogbow::math::{Frame, Ray, Symmetric2, Symmetric3, Vec3};
 use fogbow::multiple_scatter::Weight;
 use fogbow::phase::{self, Deflection, Lobe, Phase};
 use fogbow::sampling::distance::truncated_exponential;
@@ -22,16 +23,7 @@ use fogbow::transmittance::thickness::{Marching, Steps, optical_thickness_with_g
 use crate::hosts::{Analytic, Field};
 
 /// Topics of systems that are still to come; each is taken off when its system lands.
-pub const NOT_YET: &[&str] = &[
-    "bias_compensation",
-    "covariance_ops",
-    "hg_covariance",
-    "image_covariance",
-    "sampling_metrics",
-    "scattering_covariance",
-    "volumetric_covariance",
-    "vpl",
-];
+pub const NOT_YET: &[&str] = &["bias_compensation", "vpl"];
 
 /// The folder named by `FOGBOW_GOLDEN_DIR`, else the repository's own. A relative name counts from
 /// where the command was typed if that is this package or the repository's top.
@@ -149,6 +141,12 @@ pub fn outputs(topic: &str, input: &Map<String, Value>) -> Option<Value> {
         "truncated_exponential" => truncated(&input),
         "valid_radius" => radius(&input),
         "extrapolation" => extrapolation(&input),
+        "covariance_ops" => covariance_operator(&input),
+        "hg_covariance" => phase_hessians(&input),
+        "image_covariance" => image_covariance(&input),
+        "sampling_metrics" => sampling_metrics(&input),
+        "scattering_covariance" => scattering_covariance(&input),
+        "volumetric_covariance" => volumetric_covariance(&input),
         _ => return None,
     })
 }
@@ -180,6 +178,28 @@ impl<'a> Input<'a> {
         let list = self.get(key).as_array().unwrap_or_else(|| panic!("{key:?} is no list"));
         assert_eq!(list.len(), 3, "{key:?} is no vector");
         [0, 1, 2].map(|i| list[i].as_f64().expect("a number"))
+    }
+    fn array<const N: usize>(&self, key: &str) -> [f32; N] {
+        let list = self.get(key).as_array().unwrap_or_else(|| panic!("{key:?} is no list"));
+        assert_eq!(list.len(), N, "{key:?} has another length");
+        core::array::from_fn(|i| list[i].as_f64().expect("a number") as f32)
+    }
+    fn symmetric2(&self, key: &str) -> Symmetric2 {
+        let [xx, xy, yy] = self.array(key);
+        Symmetric2 { xx, xy, yy }
+    }
+    fn symmetric3(&self, key: &str) -> Symmetric3 {
+        Symmetric3::from_upper(self.array(key))
+    }
+    fn symmetric4(&self, key: &str) -> Symmetric4 {
+        Symmetric4::from_upper(self.array(key))
+    }
+    /// A frame from its third axis and, made orthogonal to it, its first.
+    fn frame(&self) -> Frame {
+        let w = self.direction("w");
+        let u = self.direction("u");
+        let u = (u - w * u.dot(w)).normalize();
+        Frame { u, v: w.cross(u), w }
     }
     fn vector(&self, key: &str) -> Vec3 {
         Vec3::from(self.doubles(key).map(|c| c as f32))
@@ -413,4 +433,86 @@ fn extrapolation(input: &Input<'_>) -> Value {
         }
     }
     json!({ "weight": blend.weight(), "L": blend.value().map(|l| l.0) })
+}
+
+fn covariance_operator(input: &Input<'_>) -> Value {
+    let sigma = input.symmetric4("sigma");
+    let out = match input.text("op") {
+        "travel" => sigma.travelled(input.number("d")),
+        "occlude" => sigma.masked(&input.symmetric2("o")),
+        "brdf" => sigma.reflected_in_lobe(&input.symmetric2("b")),
+        "rotate" => {
+            let (sin, cos) = f64::from(input.number("phi")).sin_cos();
+            sigma.rotated(cos as f32, sin as f32)
+        }
+        "scale" => sigma.scaled(input.array("lambda")),
+        "project_in" => sigma.projected(input.number("cos")),
+        "project_out" => sigma.unprojected(input.number("cos")),
+        "curvature" => sigma.curved(&input.symmetric2("k"), input.number("cos")),
+        "attenuate" => sigma.attenuated(&input.symmetric2("hessian"), input.number("dt")),
+        "combine" => sigma.combined(input.number("i1"), &input.symmetric4("sigma2"), input.number("i2")),
+        "slice_spatial" => {
+            let s = sigma.slice();
+            return json!({ "cov2": [s.xx, s.xy, s.yy] });
+        }
+        op => panic!("unknown operator {op:?}"),
+    };
+    json!({ "sigma_out": out.to_upper() })
+}
+
+fn phase_hessians(input: &Input<'_>) -> Value {
+    let phase = Phase::from(input.lobe());
+    let deflection = Deflection::from_cos(input.number("cos_alpha"));
+    let (h11, h22) = covariance::phase_hessian(&phase, deflection);
+    let sigma = covariance::phase_covariance(&phase, deflection);
+    json!({ "h11": h11, "h22": h22, "sigma_rho": [sigma.xx, sigma.xy, sigma.yy] })
+}
+
+fn scattering_covariance(input: &Input<'_>) -> Value {
+    let out = input.symmetric4("sigma").scattered(input.number("cos_alpha"), &input.symmetric2("sigma_rho"));
+    json!({ "sigma_out": out.to_upper() })
+}
+
+fn volumetric_covariance(input: &Input<'_>) -> Value {
+    let mut voxel = Voxel::EMPTY;
+    for ray in input.objects("rays") {
+        voxel.add(&LightField { covariance: ray.symmetric4("sigma"), frame: ray.frame() }, ray.number("intensity"));
+    }
+    json!({ "gamma": voxel.covariance().map(Symmetric3::to_upper), "weight": voxel.weight })
+}
+
+fn sampling_metrics(input: &Input<'_>) -> Value {
+    let (gamma, w) = (input.symmetric3("gamma"), input.direction("w"));
+    let trace = gamma.trace();
+    json!({
+        "v": gamma.along(w),
+        "trace": trace,
+        "step": covariance::step(&gamma, w, input.number("step_min"), input.number("step_max")),
+        "r_sigma": covariance::kernel_radius(
+            trace,
+            input.number("rel_bias"),
+            input.number("kernel_a"),
+            input.number("r_max"),
+        ),
+    })
+}
+
+fn image_covariance(input: &Input<'_>) -> Value {
+    let mut image = ImageCovariance::new(input.frame());
+    let frame = input.frame();
+    for segment in input.objects("segments") {
+        // The vectors give the Hessian across the ray.
+        let hessian = Symmetric3::embedded(&segment.symmetric2("hessian"), frame.u, frame.v);
+        let (t, dt, k) = (segment.number("t"), segment.number("dt"), segment.number("k"));
+        image.add(t, dt, k, &segment.symmetric3("gamma"), Some(&hessian));
+    }
+    let angular = image.angular();
+    json!({
+        "sigma": image.value().map(Symmetric4::to_upper),
+        "sqrt_det_angular": angular.map(|p| covariance::sample_density(&p)),
+        "filter": angular.map(|p| {
+            let filter = covariance::filter_precision(&p);
+            [filter.xx, filter.xy, filter.yy]
+        }),
+    })
 }

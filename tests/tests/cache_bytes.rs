@@ -3,7 +3,8 @@
 
 use std::path::{Path, PathBuf};
 
-use fogbow::cache::bytes::{self, Attachment, BytesError, Crc, HEADER_BYTES, Header, Kind, byte_count, read_into};
+use fogbow::bytes::Crc;
+use fogbow::cache::bytes::{self, Attachment, BytesError, HEADER_BYTES, Header, Kind, byte_count, read_into};
 use fogbow::cache::{Basis, Block, Cache, Facing, Index, Limits, Node, Reading, Record, SurfaceCache, VolumeCache};
 use fogbow::math::Vec3;
 use fogbow::sh::Coefficient;

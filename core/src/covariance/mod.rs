@@ -1,1 +1,47 @@
-//! Layer 7: covariances of light fields in participating media.
+//! Layer 7: covariances of light fields in participating media, after Belcour et al. 2014.
+//!
+//! Around a ray, light is a function of place across it `(u, v)` and direction `(θ, φ)`. The covariance of
+//! that function's spectrum says how fast light varies, in which direction and with what correlation:
+//!
+//! ```text
+//! Σ_ij = ∫ Ω_i Ω_j |f̂| dΩ / ∫ |f̂| dΩ  ≈  |Hess f| / (4π² f)        (cycles²)
+//! ```
+//!
+//! | file | holds |
+//! |---|---|
+//! | `matrix` | [`Symmetric4`], packed |
+//! | [`operators`] | travel, occlusion, attenuation, scattering, reflection, refraction, mixing (B Fig. 3, Eq. 3–13) |
+//! | `lobe` | [`phase_covariance`] of any phase function (Eq. 13–14) |
+//! | `light_field` | [`LightField`]: a covariance with its frame, operators in world coordinates |
+//! | `metrics` | [`Voxel`], and what its covariance is good for: steps, radii, densities, filters (Eq. 17–20) |
+//! | `emission` | [`emitted`]: with what light leaves a light |
+//! | `lattice` | [`Lattice`]: a box of cells and the walk of a ray through them |
+//! | `occluders` | [`Occluders`]: where surfaces lie, and what passing them does |
+//! | `photon` | [`FrequencyPhotons`]: light fields carried along photon walks (Alg. 2) |
+//! | `grid` | [`Grid`]: Γ anywhere in the volume |
+//! | [`bytes`] | grids saved and sent |
+//!
+//! Where the model is blind: it knows nothing of an unoccluded point light's `1/r²`, for the spectrum of such
+//! a light field has no content of its own across the ray.
+
+pub mod bytes;
+mod emission;
+mod grid;
+mod lattice;
+mod light_field;
+mod lobe;
+mod matrix;
+mod metrics;
+mod occluders;
+pub mod operators;
+mod photon;
+
+pub use emission::emitted;
+pub use grid::{Grid, merge};
+pub use lattice::{Lattice, LatticeError, MAX_EDGE};
+pub use light_field::{LightField, Patch};
+pub use lobe::{phase_covariance, phase_hessian};
+pub use matrix::{LIMIT, Symmetric4};
+pub use metrics::{ImageCovariance, Voxel, filter_precision, hessian_bound, kernel_radius, sample_density, step};
+pub use occluders::{NEAREST, OccluderCell, Occluders};
+pub use photon::FrequencyPhotons;

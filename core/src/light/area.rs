@@ -76,6 +76,13 @@ impl QuadLight {
         Ok(Self { corner, edge_u, edge_v, normal, area, solid_within, radiance })
     }
 
+    /// The two edges (m).
+    #[inline]
+    #[must_use]
+    pub fn edges(&self) -> [Vec3; 2] {
+        [self.edge_u, self.edge_v]
+    }
+
     /// Area (m²).
     #[must_use]
     pub fn area(&self) -> f32 {

@@ -126,6 +126,12 @@ impl<'a> EnvironmentMap<'a> {
         Ok(Self { width, height, texels, table, to_world, mean })
     }
 
+    /// Angle (rad) between rows of texels.
+    #[must_use]
+    pub fn resolution(&self) -> f32 {
+        PI / (self.height - 1).max(1) as f32
+    }
+
     /// Mean radiance over all directions.
     #[must_use]
     pub fn mean_radiance(&self) -> Spectrum {

@@ -49,11 +49,41 @@ pub struct EyeRay {
 pub fn eye_ray(
     ray: &Ray,
     medium: &(impl Medium + ?Sized),
-    mut step: impl FnMut(f32) -> f32,
+    step: impl FnMut(f32) -> f32,
     mut in_scattering: impl FnMut(Vec3, Vec3, &Properties) -> Spectrum,
     offset: f32,
 ) -> EyeRay {
     let to_eye = -ray.direction;
+    let mut scattered = Spectrum::ZERO;
+    let seen = steps(ray, medium, step, offset, |distance, properties, weight| {
+        scattered += weight * properties.scattering * in_scattering(ray.at(distance), to_eye, properties);
+    });
+    EyeRay { radiance: scattered + seen.radiance, ..seen }
+}
+
+/// The points of [`eye_ray`]: calls `visit(distance, properties, weight)` once per step where light is scattered;
+/// the sum of `weight · σₛ · L_i` over the calls is what is scattered towards the ray's origin.
+///
+/// Returned are light emitted on the way and the transmittance of the whole ray.
+///
+/// ```
+/// # use fogbow::{march::steps, math::{Ray, Vec3}, medium::Homogeneous, phase::Lobe, spectrum::Spectrum};
+/// let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::ONE, Lobe::Isotropic).unwrap();
+/// let ray = Ray::new(Vec3::ZERO, Vec3::X).with_length(2.0);
+/// let (mut count, mut sum) = (0, 0.0);
+/// steps(&ray, &fog, |_| 0.5, 0.5, |_, properties, weight| {
+///     count += 1;
+///     sum += (weight * properties.scattering)[0];   // L_i = 1
+/// });
+/// assert!(count == 4 && (sum - (1.0 - (-2.0_f32).exp())).abs() < 1e-6);
+/// ```
+pub fn steps(
+    ray: &Ray,
+    medium: &(impl Medium + ?Sized),
+    mut step: impl FnMut(f32) -> f32,
+    offset: f32,
+    mut visit: impl FnMut(f32, &Properties, Spectrum),
+) -> EyeRay {
     let mut radiance = Spectrum::ZERO;
     let mut thickness = Spectrum::ZERO;
     let mut at = 0.0_f32;
@@ -100,12 +130,9 @@ pub fn eye_ray(
                 extinction = properties.extinction();
                 weight = extinction.map(|sigma| attenuated_length(sigma, length));
             }
-            if !(properties.scattering.is_black() && properties.emission.is_black()) {
-                let mut source = properties.emission;
-                if !properties.scattering.is_black() {
-                    source += properties.scattering * in_scattering(ray.at(at + distance), to_eye, &properties);
-                }
-                radiance += transmittance * weight * source;
+            radiance += transmittance * weight * properties.emission;
+            if !properties.scattering.is_black() {
+                visit(at + distance, &properties, transmittance * weight);
             }
             // From the stretch's beginning where it can be: the rounding of many steps adds up.
             thickness = if constant { before + extinction * (end - entry) } else { thickness + extinction * length };

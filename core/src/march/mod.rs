@@ -10,11 +10,11 @@
 //!
 //! | file | holds |
 //! |---|---|
-//! | `eye_ray` | [`eye_ray`], [`EyeRay`]: by steps |
+//! | `eye_ray` | [`eye_ray`], [`EyeRay`]: by steps; [`steps`], their points |
 //! | `points` | [`scattering_points`]: by points as dense as light is scattered |
 
 mod eye_ray;
 mod points;
 
-pub use eye_ray::{EyeRay, eye_ray};
+pub use eye_ray::{EyeRay, eye_ray, steps};
 pub use points::scattering_points;

@@ -111,6 +111,13 @@ pub fn atanh(x: f32) -> f32 {
     libm::atanhf(x)
 }
 
+/// `√(x² + y²)` without overflow of the squares.
+#[inline]
+#[must_use]
+pub fn hypot(x: f32, y: f32) -> f32 {
+    libm::hypotf(x, y)
+}
+
 /// Cube root.
 #[inline]
 #[must_use]

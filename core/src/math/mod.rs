@@ -7,14 +7,17 @@
 //! | [`ray`] | [`Ray`] |
 //! | [`bounds`] | [`Bounds`]: axis-aligned boxes |
 //! | [`quadrature`] | Gauss–Legendre nodes |
+//! | [`symmetric`] | symmetric 2×2 and 3×3 matrices |
 
 pub mod bounds;
 pub mod float;
 pub mod frame;
 pub mod quadrature;
 pub mod ray;
+pub mod symmetric;
 
 pub use bounds::Bounds;
 pub use frame::Frame;
 pub use glam::{Affine3, Mat3, Vec2, Vec3};
 pub use ray::Ray;
+pub use symmetric::{Eigen, Symmetric2, Symmetric3};

@@ -4,6 +4,7 @@
 //! |---|---|
 //! | `mod` | [`World`], [`Settings`], [`Radiance`] by component |
 //! | [`trace`](mod@trace) | [`radiance`]: the walk |
+//! | `in_scatter` | [`in_scattered`]: light scattered towards the eye at one point |
 //! | `connect` | next-event estimation, equiangular connections, their MIS weights |
 //!
 //! ```text
@@ -20,8 +21,10 @@
 //!   (Veach 1997) weighs them against connections.
 
 mod connect;
+mod in_scatter;
 pub mod trace;
 
+pub use in_scatter::in_scattered;
 pub use trace::{radiance, radiance_beyond};
 
 use crate::light::Light;

@@ -41,6 +41,16 @@ pub fn derivative(deflection: Deflection, g: f32, alpha: f32) -> f32 {
     value(deflection, g, alpha) * slope
 }
 
+/// `d²p / d(cos θ)² = p (15g²/D² + (12αgc/D + 2α)/(1 + αc²))` (sr⁻¹).
+#[inline]
+#[must_use]
+pub fn second_derivative(deflection: Deflection, g: f32, alpha: f32) -> f32 {
+    let c = deflection.cos;
+    let slope = g / denominator(deflection, g);
+    let factor = alpha * (2.0 + 12.0 * slope * c) / (1.0 + alpha * c * c);
+    value(deflection, g, alpha) * (15.0 * slope * slope + factor)
+}
+
 /// Share of the cumulative distribution below the cosine `c` (`f64`: its terms cancel).
 ///
 /// With `s = √D`, `c = (1 + g² − s²)/(2g)`, the integral of `HG·(1 + αc²)` over the azimuth is

@@ -51,6 +51,14 @@ pub fn derivative(deflection: Deflection, g: f32) -> f32 {
     3.0 * g * value(deflection, g) / denominator(deflection, g)
 }
 
+/// `d²p / d(cos θ)² = 15 g² p / D²` (sr⁻¹).
+#[inline]
+#[must_use]
+pub fn second_derivative(deflection: Deflection, g: f32) -> f32 {
+    let slope = g / denominator(deflection, g);
+    15.0 * slope * slope * value(deflection, g)
+}
+
 /// Draws a cosine with density [`value`] from the uniform number `u`; `u = 0` gives −1.
 ///
 /// ```text

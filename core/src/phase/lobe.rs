@@ -104,6 +104,19 @@ impl Lobe {
         }
     }
 
+    /// Second derivative of the value with respect to `cos θ` (sr⁻¹).
+    #[inline]
+    #[must_use]
+    pub fn second_derivative(&self, deflection: Deflection) -> f32 {
+        match *self {
+            Self::Isotropic => 0.0,
+            Self::HenyeyGreenstein { g } => henyey_greenstein::second_derivative(deflection, g),
+            Self::Schlick { k } => schlick::second_derivative(deflection, k),
+            Self::Rayleigh => rayleigh::SECOND_DERIVATIVE,
+            Self::Draine { g, alpha } => draine::second_derivative(deflection, g, alpha),
+        }
+    }
+
     /// Draws a cosine with density [`Lobe::value`].
     #[inline]
     #[must_use]

@@ -168,6 +168,13 @@ impl Phase {
         self.sum(|lobe| lobe.derivative(deflection))
     }
 
+    /// Second derivative of the value with respect to `cos θ` (sr⁻¹).
+    #[inline]
+    #[must_use]
+    pub fn second_derivative(&self, deflection: Deflection) -> Spectrum {
+        self.sum(|lobe| lobe.second_derivative(deflection))
+    }
+
     /// Gradient (sr⁻¹ m⁻¹) of the value when the point moves and a light `distance` (m) away stays.
     ///
     /// ```text

@@ -27,6 +27,9 @@ pub fn derivative(deflection: Deflection) -> f32 {
     3.0 / (8.0 * PI) * deflection.cos
 }
 
+/// `d²p / d(cos θ)² = 3 / (8π)` (sr⁻¹).
+pub const SECOND_DERIVATIVE: f32 = 3.0 / (8.0 * PI);
+
 /// Draws a cosine with density [`value`] from the uniform number `u`; `u = 0` gives −1.
 ///
 /// Inverts `c³ + 3c = 4(2u − 1)` by Cardano's formula, in the form that does not cancel.

@@ -44,6 +44,14 @@ pub fn derivative(deflection: Deflection, k: f32) -> f32 {
     2.0 * k * value(deflection, k) / denominator(deflection, k)
 }
 
+/// `d²p / d(cos θ)² = 6 k² p / D²` (sr⁻¹).
+#[inline]
+#[must_use]
+pub fn second_derivative(deflection: Deflection, k: f32) -> f32 {
+    let slope = k / denominator(deflection, k);
+    6.0 * slope * slope * value(deflection, k)
+}
+
 /// Draws a cosine with density [`value`] from the uniform number `u`; `u = 0` gives −1.
 ///
 /// ```text

@@ -3,7 +3,9 @@
 //! Exit codes: 0 done, 1 stopped early, 2 bad input.
 
 mod compare;
+mod covariance;
 mod figures;
+mod march;
 mod output;
 mod photon_beams;
 mod plume;
@@ -17,6 +19,7 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 
 pub use compare::CompareArguments;
+pub use covariance::{CovarianceArguments, MarchArguments, Step};
 pub use figures::{FiguresArguments, Paper};
 pub use photon_beams::{BeamArguments, Kernel};
 pub use plume::PlumeArguments;

@@ -3,6 +3,8 @@
 use core::num::NonZero;
 
 use clap::{Args, ValueEnum};
+use fogbow::beams::kernel;
+use fogbow::covariance::{self, Grid};
 use fogbow::host::Medium;
 use fogbow::light::Light;
 use fogbow::math::{Vec2, Vec3};
@@ -34,6 +36,12 @@ pub struct BeamArguments {
     /// Radius of the blur in the first pass, in the scene's unit of length [default: 0.005 of the scene's diagonal].
     #[arg(long, value_name = "R", value_parser = output::positive)]
     pub radius: Option<f64>,
+    /// Bias that `--kernel covariance` allows, as a part of the light itself.
+    #[arg(long, value_name = "BETA", value_parser = output::positive, default_value_t = 0.02)]
+    pub bias: f64,
+    /// Greatest radius of `--kernel covariance` [default: 0.05 of the scene's diagonal].
+    #[arg(long, value_name = "R", value_parser = output::positive)]
+    pub radius_most: Option<f64>,
     /// How fast the blur narrows, in (0, 1]: after i passes its square has shrunk by about i^(alpha-1).
     #[arg(long, value_name = "ALPHA", value_parser = alpha, default_value_t = 0.6)]
     pub alpha: f32,
@@ -44,7 +52,7 @@ pub struct BeamArguments {
 pub enum Kernel {
     /// The same everywhere, narrower from pass to pass.
     Progressive,
-    /// Wider where light is smooth, by its covariances: not there yet.
+    /// Wider where light is smooth, by its covariances.
     Covariance,
 }
 
@@ -56,24 +64,15 @@ fn alpha(text: &str) -> Result<f32, String> {
 }
 
 impl BeamArguments {
-    /// # Errors
-    /// A kernel that is not there.
-    pub(super) fn check(&self) -> Result<(), String> {
-        match self.kernel {
-            Kernel::Progressive => Ok(()),
-            Kernel::Covariance => {
-                Err("--kernel covariance needs the covariance grid, which is not there yet".to_owned())
-            }
-        }
-    }
-
     fn settings(&self, world: &World<'_>) -> Settings {
         let usual = Settings::new(&world.bounds());
+        let most = self.radius_most.map_or(10.0 * usual.radius, |r| r as f32);
         Settings {
             paths: self.beams.unwrap_or(usual.paths),
             samples: self.pass_samples.unwrap_or(usual.samples),
             radius: self.radius.map_or(usual.radius, |r| r as f32),
             alpha: self.alpha,
+            largest: if self.kernel == Kernel::Covariance { most } else { 0.0 },
             ..usual
         }
     }
@@ -89,6 +88,7 @@ pub(super) struct BeamJob<'a> {
     pub(super) settings: &'a tiles::Settings,
     pub(super) control: &'a Control<'a>,
     pub(super) arguments: &'a BeamArguments,
+    pub(super) grid: Option<&'a Grid<'a>>,
 }
 
 impl WithMedium for BeamJob<'_> {
@@ -106,8 +106,11 @@ impl WithMedium for BeamJob<'_> {
             let pieces = (u64::from(width) * u64::from(height) * 4).clamp(1 << 14, 1 << 22) as u32;
             settings.paths = photon_beams::paths_for(&view, &settings, pieces, self.settings.seed)?;
         }
-        // Here a kernel says how wide it is at a point, given the pass's radius.
-        let radius = |_: Vec3, pass: f32| pass;
+        let (most, bias) = (settings.largest, self.arguments.bias as f32);
+        let radius = |point: Vec3, pass: f32| match self.grid.and_then(|grid| grid.covariance(point)) {
+            Some(gamma) => pass.max(covariance::kernel_radius(gamma.trace(), bias, kernel::SECOND_MOMENT, most)),
+            None => pass,
+        };
         let outcome = photon_beams::render(
             self.film,
             self.settings,

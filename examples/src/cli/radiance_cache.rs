@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
-use fogbow::cache::bytes::Crc;
+use fogbow::bytes::Crc;
 use fogbow::cache::{Estimator, Extrapolation, EyeSettings, Limits, Seen, radiance};
 use fogbow::host::Medium;
 use fogbow::light::Light;

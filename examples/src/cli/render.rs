@@ -11,6 +11,7 @@ use fogbow::math::Vec2;
 use fogbow::path::{self, Radiance, World as PathWorld};
 use fogbow::sampling::uniform2;
 use fogbow::spectrum::Spectrum;
+use fogbow_std::covariance::CovarianceGrid;
 use fogbow_std::film::Film;
 use fogbow_std::image::write_film;
 use fogbow_std::progress::{Control, Progress};
@@ -18,7 +19,9 @@ use fogbow_std::radiance_cache::{NAMES, RadianceCaches};
 use fogbow_std::stats::{CountingMedium, CountingScene, Statistics};
 use fogbow_std::tiles::{self, Outcome, Reason, RenderError};
 
-use super::photon_beams::{BeamArguments, BeamJob};
+use super::covariance::{CovarianceArguments, GridJob, MarchArguments, Step};
+use super::march::MarchJob;
+use super::photon_beams::{BeamArguments, BeamJob, Kernel};
 use super::radiance_cache::{CacheArguments, CacheJob, check_depth};
 use super::report::{Bar, Report};
 use super::{Ending, Failure, output};
@@ -77,6 +80,12 @@ pub struct RenderArguments {
     /// Of photon beams.
     #[command(flatten)]
     pub beams: BeamArguments,
+    /// Of ray marching.
+    #[command(flatten)]
+    pub march: MarchArguments,
+    /// Of covariance grids.
+    #[command(flatten)]
+    pub covariance: CovarianceArguments,
 }
 
 /// How light is computed.
@@ -89,6 +98,9 @@ pub enum Method {
     /// Progressive photon beams: the medium's light from beams sent by the lights, blurred less and less;
     /// surfaces' light as with `path`.
     PhotonBeams,
+    /// Ray marching: the medium's light from steps along eye rays, each with a connection to a light and a path;
+    /// surfaces' light as with `path`.
+    March,
 }
 
 /// Names of the layers; the first is the image.
@@ -151,7 +163,7 @@ pub(crate) fn render(arguments: &RenderArguments) -> Result<Rendered, Failure> {
     let (width, height) = arguments.size.unwrap_or((scene.sensor.width, scene.sensor.height));
     let layers: &[&str] = match (arguments.aov, arguments.method) {
         (false, _) => &["total"],
-        (true, Method::Path | Method::PhotonBeams) => &LAYERS,
+        (true, Method::Path | Method::PhotonBeams | Method::March) => &LAYERS,
         (true, Method::RadianceCache) => &CACHE_LAYERS,
     };
     let mut film = Film::new(width, height, layers)?;
@@ -186,6 +198,22 @@ pub(crate) fn render(arguments: &RenderArguments) -> Result<Rendered, Failure> {
     };
     let lights = world.lights();
     let camera = world.camera_for(width, height);
+    let covariances = if arguments.needs_grid() {
+        Some(world.media().with(GridJob {
+            arguments: &arguments.covariance,
+            scene: &arguments.scene,
+            world: &world,
+            lights: &lights,
+            paths,
+            threads: arguments.threads,
+            seed: arguments.seed,
+            control: &control,
+            statistics: &mut statistics,
+        })?)
+    } else {
+        None
+    };
+    let grid = covariances.as_ref().map(CovarianceGrid::view);
     let (film_of, settings_of, control_of) = (&mut film, &settings, &control);
     let mut cached = None;
     let outcome = match arguments.method {
@@ -207,6 +235,18 @@ pub(crate) fn render(arguments: &RenderArguments) -> Result<Rendered, Failure> {
             settings: settings_of,
             control: control_of,
             arguments: &arguments.beams,
+            grid: grid.as_ref(),
+        })?,
+        Method::March => world.media().with(MarchJob {
+            world: &world,
+            lights: &lights,
+            camera,
+            paths,
+            film: film_of,
+            settings: settings_of,
+            control: control_of,
+            arguments: &arguments.march,
+            grid: grid.as_ref(),
         })?,
         Method::RadianceCache => {
             let done = world.media().with(CacheJob {
@@ -249,6 +289,17 @@ pub(crate) fn render(arguments: &RenderArguments) -> Result<Rendered, Failure> {
     Ok(Rendered { film, outcome, statistics, camera, caches: cached.map(|c| c.caches) })
 }
 
+impl RenderArguments {
+    /// Whether anything asked for takes a covariance grid.
+    fn needs_grid(&self) -> bool {
+        match self.method {
+            Method::March => self.march.step == Step::Covariance,
+            Method::PhotonBeams => self.beams.kernel == Kernel::Covariance,
+            Method::Path | Method::RadianceCache => false,
+        }
+    }
+}
+
 /// The files to write, all of them checked.
 fn outputs(arguments: &RenderArguments) -> Result<Vec<PathBuf>, Failure> {
     let mut outputs = arguments.output.clone();
@@ -275,8 +326,11 @@ fn outputs(arguments: &RenderArguments) -> Result<Vec<PathBuf>, Failure> {
         return Err("--cache-in and --cache-out need --method radiance-cache".into());
     }
     caches.check()?;
-    if arguments.method == Method::PhotonBeams {
-        arguments.beams.check()?;
+    arguments.covariance.check()?;
+    if arguments.covariance.is_named() && !arguments.needs_grid() {
+        return Err(
+            "--grid-in and --grid-out need something that uses covariances: --kernel or --step covariance".into()
+        );
     }
     if !arguments.exposure.is_finite() {
         return Err("--exposure must be a finite number".into());

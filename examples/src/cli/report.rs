@@ -124,6 +124,7 @@ impl Report<'_> {
                 Method::Path => "path",
                 Method::RadianceCache => "radiance-cache",
                 Method::PhotonBeams => "photon-beams",
+                Method::March => "march",
             },
             self.size.0,
             self.size.1,

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, HashMap};
 use std::path::Path;
 
-use fogbow::cache::bytes::Crc;
+use fogbow::bytes::Crc;
 
 use super::element::{Context, Element};
 use super::{collect, document, file_error};

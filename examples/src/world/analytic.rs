@@ -1,7 +1,7 @@
 //! Flat pieces, spheres and boxes, four at a time.
 
 use fogbow::glam::Vec4;
-use fogbow::math::{Bounds, Ray, Vec3};
+use fogbow::math::{Bounds, Ray, Symmetric3, Vec3};
 
 /// How many primitives are tested at once: baseline x86-64 has registers of four.
 const LANES: usize = 4;
@@ -60,6 +60,19 @@ impl Primitive {
                 outward.normalize()
             }
         }
+    }
+
+    /// The shape operator (m⁻¹) of a sphere, if `point` lies on it and `normal` is its normal there on either side.
+    pub(super) fn curvature(&self, point: Vec3, normal: Vec3) -> Option<Symmetric3> {
+        let Self::Sphere { centre, radius } = self else { return None };
+        let outward = (point - centre) / *radius;
+        let is_there = (outward.length_squared() - 1.0).abs() < 1e-3 && outward.dot(normal).abs() > 0.999;
+        is_there.then(|| {
+            let n = normal;
+            let k = outward.dot(normal).signum() / radius;
+            let flat = [1.0 - n.x * n.x, -n.x * n.y, -n.x * n.z, 1.0 - n.y * n.y, -n.y * n.z, 1.0 - n.z * n.z];
+            Symmetric3::from_upper(flat).times(k)
+        })
     }
 
     /// Distance to the nearest hit within `(0, length)`, or infinity.

@@ -21,7 +21,7 @@ mod triangles;
 
 use fogbow::host::{Hit, Scene};
 use fogbow::light::Light;
-use fogbow::math::{Bounds, Ray, Vec3};
+use fogbow::math::{Bounds, Ray, Symmetric3, Vec3};
 
 pub use build::bounds_of;
 pub use lights::Storage;
@@ -202,5 +202,11 @@ impl Scene for World<'_> {
             None => self.few.is_hit(ray, ray.length),
         };
         is_hit || self.triangles.as_ref().is_some_and(|t| t.is_hit(ray, ray.length))
+    }
+
+    fn curvature(&self, ray: &Ray, hit: &Hit) -> Symmetric3 {
+        let point = ray.at(hit.distance);
+        let curvature = self.primitives.iter().find_map(|primitive| primitive.curvature(point, hit.normal));
+        curvature.unwrap_or_default()
     }
 }

@@ -16,12 +16,14 @@
 //! | 40 + 32 p + 8 v | … | the parts, one after the other |
 
 use core::fmt;
-use std::ffi::OsString;
 use std::io;
 use std::path::{Path, PathBuf};
 
+use fogbow::bytes::Crc;
 use fogbow::cache::Limits;
-use fogbow::cache::bytes::{self, Attachment, BytesError, Crc};
+use fogbow::cache::bytes::{self, Attachment, BytesError};
+
+use crate::files::replace;
 
 use super::{Cache, Effort, RadianceCaches, Settings};
 
@@ -197,22 +199,6 @@ fn read(path: &Path) -> Result<Vec<u8>, Problem> {
         return Err(Problem::NoFile);
     }
     Ok(std::fs::read(path)?)
-}
-
-/// Beside the old file first, so that neither a full disk nor an interruption costs both.
-fn replace(path: &Path, bytes: &[u8]) -> io::Result<()> {
-    let is_plain = std::fs::symlink_metadata(path).map_or(true, |meta| meta.is_file());
-    if let (true, Some(name)) = (is_plain, path.file_name()) {
-        let mut beside = OsString::from(name);
-        beside.push(format!(".{}.new", std::process::id()));
-        let beside = path.with_file_name(beside);
-        match std::fs::write(&beside, bytes).and_then(|()| std::fs::rename(&beside, path)) {
-            Ok(()) => return Ok(()),
-            // No room for two, or a folder where nothing may be made: what remains is the file itself.
-            Err(_) => drop(std::fs::remove_file(&beside)),
-        }
-    }
-    std::fs::write(path, bytes)
 }
 
 /// The efforts of all parts, in the order of [`PARTS`].

@@ -12,7 +12,7 @@
 
 use core::fmt;
 
-use fogbow::cache::bytes::Crc;
+use fogbow::bytes::Crc;
 use fogbow::cache::{
     Cache, Estimator, EyeSettings, Facing, Guide, Guided, Looks, Place, Reading, Record, SurfaceCache, VolumeCache,
     clamp_gradient, places,

@@ -1,0 +1,178 @@
+//! What passing close to surfaces does to light: a lattice of where surfaces lie and how they face.
+//!
+//! B § 4.1 takes occluders from a voxel grid and leaves open how. Here a cell knows the mean and the spread of the
+//! surface points in it and of their normals. A ray that passes through the cell without ending there has its
+//! light cut off beside it, at the distance `d` to the surface:
+//!
+//! ```text
+//! O = ê êᵀ / (4π² d²)
+//! ```
+//!
+//! towards the surface points (their edge) where they face the ray, along their normals where they face
+//! sideways. Closer than [`NEAREST`] of a cell, distances are not known. So shadow borders are as sharp as the
+//! lattice is fine, and no sharper: the limitation B shows in Fig. 17.
+
+use bytemuck::{Pod, Zeroable};
+use glam::Vec3;
+
+use super::lattice::{Lattice, LatticeError};
+use super::operators::PER_HESSIAN;
+use crate::host::Scene;
+use crate::math::{Ray, Symmetric3, float};
+use crate::surface::Surface;
+
+/// Least distance to an occluder, in cells. Smaller: rays that graze a surface decide everything. Larger:
+/// shadow borders are taken for softer than the lattice could tell.
+pub const NEAREST: f32 = 0.25;
+
+/// Surfaces that one column of a lattice may cross.
+const MAX_HITS: u32 = 4096;
+
+/// What a cell knows of the surfaces in it; sums over surface points.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Pod, Zeroable)]
+#[repr(C)]
+pub struct OccluderCell {
+    /// `Σ x`, from the cell's centre (m).
+    position: Vec3,
+    /// `Σ x xᵀ` (m²).
+    spread: Symmetric3,
+    /// `Σ n nᵀ`.
+    normals: Symmetric3,
+    /// Number of points.
+    count: f32,
+}
+
+/// Nearby surfaces, in cells the host lends.
+#[derive(Debug)]
+pub struct Occluders<'a> {
+    lattice: Lattice,
+    cells: &'a mut [OccluderCell],
+}
+
+impl<'a> Occluders<'a> {
+    /// Without surfaces; `cells` holds one element per cell of the lattice.
+    ///
+    /// # Errors
+    /// Storage of another length.
+    pub fn new(lattice: Lattice, cells: &'a mut [OccluderCell]) -> Result<Self, LatticeError> {
+        if cells.len() != lattice.cell_count() {
+            return Err(LatticeError::Storage);
+        }
+        cells.fill(OccluderCell::default());
+        Ok(Self { lattice, cells })
+    }
+
+    /// Adds a point (m) of a surface with this normal (unit).
+    pub fn add(&mut self, point: Vec3, normal: Vec3) {
+        let Some(index) = self.lattice.index(point) else { return };
+        let offset = point - self.lattice.centre(index);
+        let square =
+            |v: Vec3| Symmetric3::from_upper([v.x * v.x, v.x * v.y, v.x * v.z, v.y * v.y, v.y * v.z, v.z * v.z]);
+        let cell = &mut self.cells[index];
+        cell.position += offset;
+        cell.spread = cell.spread.plus(&square(offset));
+        cell.normals = cell.normals.plus(&square(normal));
+        cell.count += 1.0;
+    }
+
+    /// Adds the surfaces of `scene`, found by `rays`² rays through every column of cells along each axis.
+    ///
+    /// Lights, glass and null interfaces stop no light and are left out.
+    pub fn add_scene(&mut self, scene: &(impl Scene + ?Sized), rays: u32) {
+        let bounds = self.lattice.bounds();
+        let extent = bounds.size();
+        let size = self.lattice.size();
+        for axis in 0..3 {
+            let (a, b) = ((axis + 1) % 3, (axis + 2) % 3);
+            let (count_a, count_b) = (size[a] * rays, size[b] * rays);
+            let margin = 1e-3 * extent.max_element();
+            let mut direction = Vec3::ZERO;
+            direction[axis] = 1.0;
+            for i in 0..count_a {
+                for j in 0..count_b {
+                    let mut origin = bounds.min;
+                    origin[axis] -= margin;
+                    origin[a] += (i as f32 + 0.5) / count_a as f32 * extent[a];
+                    origin[b] += (j as f32 + 0.5) / count_b as f32 * extent[b];
+                    let mut rest = Ray { origin, direction, length: extent[axis] + 2.0 * margin };
+                    for _ in 0..MAX_HITS {
+                        let Some(hit) = scene.closest_hit(&rest) else { break };
+                        let stops_light = !matches!(hit.surface, Surface::Null | Surface::Dielectric { .. });
+                        if stops_light && hit.light.is_none() {
+                            self.add(rest.at(hit.distance), hit.normal);
+                        }
+                        let passed = hit.distance + 1e-5 * extent.max_element();
+                        rest = Ray { origin: rest.at(passed), direction, length: rest.length - passed };
+                        if !(rest.length > 0.0) {
+                            break;
+                        }
+                    }
+                }
+            }
+        }
+    }
+
+    /// The lattice.
+    #[must_use]
+    pub fn lattice(&self) -> &Lattice {
+        &self.lattice
+    }
+
+    /// Number of cells that hold a surface.
+    #[must_use]
+    pub fn occupied(&self) -> usize {
+        self.cells.iter().filter(|cell| cell.count > 0.0).count()
+    }
+
+    /// Covariance `O` (cycles²/m², in space) of what occludes a ray that passes `point` (m) along `direction`
+    /// (unit); `None` where no surface is near.
+    #[inline]
+    #[must_use]
+    pub fn covariance(&self, point: Vec3, direction: Vec3) -> Option<Symmetric3> {
+        let index = self.lattice.index(point)?;
+        let cell = &self.cells[index];
+        if !(cell.count > 0.0) {
+            return None;
+        }
+        let inverse = 1.0 / cell.count;
+        let mean = cell.position * inverse;
+        let nearest = NEAREST * self.lattice.cell().min_element();
+        let to_surface = self.lattice.centre(index) + mean - point;
+        let across = to_surface - direction * to_surface.dot(direction);
+        // How much the surface faces sideways: the normals' part across the ray.
+        let normals = cell.normals.times(inverse);
+        let facing = normals.along(direction).clamp(0.0, 1.0);
+        let sideways = 1.0 - facing;
+        let mut out = Symmetric3::ZERO;
+        if sideways > 1e-3 {
+            let w = direction;
+            // N − N w wᵀ − w wᵀN + w (wᵀNw) wᵀ
+            let nw = normals.applied(w);
+            let p = nw - w * (0.5 * facing);
+            let across_normals = Symmetric3::from_upper([
+                normals.xx - 2.0 * p.x * w.x,
+                normals.xy - p.x * w.y - p.y * w.x,
+                normals.xz - p.x * w.z - p.z * w.x,
+                normals.yy - 2.0 * p.y * w.y,
+                normals.yz - p.y * w.z - p.z * w.y,
+                normals.zz - 2.0 * p.z * w.z,
+            ]);
+            let distance2 = (across_normals.along(to_surface) / sideways).max(nearest * nearest);
+            out = across_normals.times(PER_HESSIAN / distance2);
+        }
+        let length = across.length();
+        if facing > 1e-3 && length > 1e-3 * nearest {
+            let e = across / length;
+            let centre = mean.dot(e);
+            let variance = (cell.spread.along(e) * inverse - centre * centre).max(0.0);
+            // Points spread evenly reach √3 standard deviations from their mean.
+            let distance = (length - float::sqrt(3.0 * variance)).max(nearest);
+            let weight = facing * PER_HESSIAN / (distance * distance);
+            out = out.plus(
+                &Symmetric3::from_upper([e.x * e.x, e.x * e.y, e.x * e.z, e.y * e.y, e.y * e.z, e.z * e.z])
+                    .times(weight),
+            );
+        }
+        Some(out)
+    }
+}

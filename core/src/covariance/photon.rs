@@ -1,0 +1,130 @@
+//! The frequency photon: a walk from the lights that carries the light field along.
+//!
+//! Belcour et al. 2014, Algorithm 2, with the scattering step that its print leaves out (sheet § 2.10):
+//!
+//! ```text
+//! per cell crossed: travel · occlusion · attenuation · deposit
+//! at a collision:   turn · scatter             at a surface: turn · project · curve · lobe · curve · unproject
+//! ```
+
+use core::ops::ControlFlow;
+
+use glam::Vec3;
+
+use super::emission::emitted;
+use super::lattice::Lattice;
+use super::light_field::{LightField, Patch};
+use super::metrics::Voxel;
+use super::occluders::Occluders;
+use crate::host::{Hit, Medium, Scene};
+use crate::math::{Ray, Symmetric3};
+use crate::path::World;
+use crate::photon::Event;
+use crate::surface::Surface;
+
+/// What frequency photons fly through and where they leave what they carry.
+#[derive(Debug)]
+pub struct FrequencyPhotons<'a, M: ?Sized, S: ?Sized> {
+    world: World<'a, M, S>,
+    occluders: Option<&'a Occluders<'a>>,
+    lattice: Lattice,
+    point_radius: f32,
+    light: Option<LightField>,
+}
+
+impl<'a, M: Medium + ?Sized, S: Scene + ?Sized> FrequencyPhotons<'a, M, S> {
+    /// For photons of `world`, deposited in the cells of `lattice`.
+    ///
+    /// Lights without extent count as discs of a thousandth of the lattice's diagonal.
+    #[must_use]
+    pub fn new(world: World<'a, M, S>, occluders: Option<&'a Occluders<'a>>, lattice: Lattice) -> Self {
+        let point_radius = 1e-3 * lattice.bounds().size().length();
+        Self { world, occluders, lattice, point_radius, light: None }
+    }
+
+    /// The light field that the photon carries now; `None` before it is emitted and after it has gone.
+    #[must_use]
+    pub fn light_field(&self) -> Option<&LightField> {
+        self.light.as_ref()
+    }
+
+    /// Takes in what happens to the photon, as [`photon::trace`](crate::photon::trace()) tells it, and adds to
+    /// `voxels`, one per cell of the lattice.
+    ///
+    /// The weight of a crossing is flux times length. Cells beyond the end of `voxels` take nothing.
+    #[inline]
+    pub fn visit(&mut self, event: &Event<'_>, voxels: &mut [Voxel]) {
+        match *event {
+            Event::Emitted { light, ray, normal, .. } => {
+                self.light = self.world.lights.get(light).map(|light| emitted(light, ray, normal, self.point_radius));
+            }
+            Event::Flew { reach, distance, power } => self.fly(reach, distance, power.mean(), voxels),
+            Event::Collided { properties, outgoing, .. } => {
+                self.light = match (self.light, outgoing) {
+                    (Some(light), Some(outgoing)) => Some(light.scattered(outgoing, &properties.phase)),
+                    _ => None,
+                };
+            }
+            Event::Met { point, incoming, hit, outgoing, .. } => {
+                self.light = match (self.light, outgoing) {
+                    (Some(light), Some(outgoing)) => Some(self.met(&light, point, incoming, hit, outgoing)),
+                    _ => None,
+                };
+            }
+        }
+    }
+
+    fn fly(&mut self, reach: &Ray, distance: f32, power: f32, voxels: &mut [Voxel]) {
+        let Some(mut light) = self.light else { return };
+        let ray = reach.with_length(distance);
+        let (medium, occluders) = (self.world.medium, self.occluders);
+        // Where a flight leaves a surface or ends at one, that surface is what is lit, and no occluder.
+        let spared = self.lattice.cell().max_element();
+        let (occluded_from, occluded_to) = (spared, reach.length - spared);
+        // Bounds hold along stretches; only where they are not equal is there a Hessian to ask for.
+        let (mut even_until, mut even) = (0.0, true);
+        let mut at = 0.0;
+        self.lattice.traverse(&ray, |cell, enter, leave| {
+            let middle = 0.5 * (enter + leave);
+            let length = leave - enter;
+            light = light.travelled(middle - at);
+            at = middle;
+            let point = ray.at(middle);
+            if let Some(occluders) = occluders
+                && middle > occluded_from
+                && middle < occluded_to
+                && let Some(occlusion) = occluders.covariance(point, ray.direction)
+            {
+                light = light.occluded(&occlusion);
+            }
+            if !(middle < even_until) {
+                let stretch = medium.stretch(&ray, middle);
+                even_until = stretch.until;
+                even = stretch.is_constant();
+            }
+            if !even {
+                light = light.attenuated(&medium.extinction_hessian(point).mean(), length);
+            }
+            if let Some(voxel) = voxels.get_mut(cell) {
+                voxel.add(&light, power * length);
+            }
+            ControlFlow::Continue(())
+        });
+        self.light = Some(light.travelled((distance - at).max(0.0)));
+    }
+
+    fn met(&self, light: &LightField, point: Vec3, incoming: Vec3, hit: &Hit, outgoing: Vec3) -> LightField {
+        let ray = Ray { origin: point - incoming * hit.distance, direction: incoming, length: f32::INFINITY };
+        let curvature = self.world.scene.curvature(&ray, hit);
+        let patch = Patch { normal: hit.normal, curvature, texture: Symmetric3::ZERO };
+        let passes = incoming.dot(hit.normal) * outgoing.dot(hit.normal) > 0.0;
+        match hit.surface {
+            Surface::Null => *light,
+            Surface::Dielectric { eta, .. } if passes => {
+                let indices = if incoming.dot(hit.normal) < 0.0 { (1.0, eta) } else { (eta, 1.0) };
+                light.refracted(outgoing, &patch, indices)
+            }
+            ref surface => light.reflected(outgoing, &patch, surface),
+        }
+    }
+}

@@ -1,0 +1,404 @@
+//! Symmetric matrices, packed, with eigenvalues, absolute value and pseudo-inverse.
+//!
+//! Every function has a defined result for every finite input: singular, zero and huge ones included.
+
+use bytemuck::{Pod, Zeroable};
+use glam::Vec3;
+
+use super::float;
+
+/// Inverses of tiny numbers stop here.
+const HUGE: f32 = 1e30;
+
+/// `[[xx, xy], [xy, yy]]`.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Pod, Zeroable)]
+#[repr(C)]
+pub struct Symmetric2 {
+    /// First row, first column.
+    pub xx: f32,
+    /// Off the diagonal.
+    pub xy: f32,
+    /// Second row, second column.
+    pub yy: f32,
+}
+
+/// A symmetric 3×3 matrix, upper triangle row by row.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Pod, Zeroable)]
+#[repr(C)]
+pub struct Symmetric3 {
+    /// First row, first column.
+    pub xx: f32,
+    /// First row, second column.
+    pub xy: f32,
+    /// First row, third column.
+    pub xz: f32,
+    /// Second row, second column.
+    pub yy: f32,
+    /// Second row, third column.
+    pub yz: f32,
+    /// Third row, third column.
+    pub zz: f32,
+}
+
+/// Eigenvalues in descending order and, row by row, their eigenvectors (unit, orthogonal).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Eigen<const N: usize> {
+    /// Eigenvalues, the largest first.
+    pub values: [f32; N],
+    /// `vectors[i]` belongs to `values[i]`.
+    pub vectors: [[f32; N]; N],
+}
+
+/// Cyclic Jacobi rotations: exact symmetry, small relative errors, no failure.
+#[expect(clippy::needless_range_loop, reason = "rows and columns of one matrix change together")]
+pub(crate) fn jacobi<const N: usize>(mut a: [[f32; N]; N]) -> Eigen<N> {
+    let largest = a.iter().flatten().fold(0.0_f32, |m, x| m.max(x.abs()));
+    let mut vectors = [[0.0; N]; N];
+    for (i, row) in vectors.iter_mut().enumerate() {
+        row[i] = 1.0;
+    }
+    if !(largest > 0.0 && largest.is_finite()) {
+        return Eigen { values: [0.0; N], vectors };
+    }
+    for x in a.iter_mut().flatten() {
+        *x /= largest;
+    }
+    // Converges quadratically: four by four needs five sweeps at most.
+    for _ in 0..8 {
+        let mut off = 0.0;
+        for p in 0..N {
+            for q in p + 1..N {
+                off += a[p][q] * a[p][q];
+            }
+        }
+        if off < 1e-20 {
+            break;
+        }
+        for p in 0..N {
+            for q in p + 1..N {
+                if a[p][q].abs() < 1e-18 {
+                    continue;
+                }
+                let slope = 0.5 * (a[q][q] - a[p][p]) / a[p][q];
+                let t = 1.0_f32.copysign(slope) / (slope.abs() + float::sqrt(slope * slope + 1.0));
+                let c = 1.0 / float::sqrt(t * t + 1.0);
+                let s = t * c;
+                for k in 0..N {
+                    let (x, y) = (a[k][p], a[k][q]);
+                    a[k][p] = c * x - s * y;
+                    a[k][q] = s * x + c * y;
+                }
+                for k in 0..N {
+                    let (x, y) = (a[p][k], a[q][k]);
+                    a[p][k] = c * x - s * y;
+                    a[q][k] = s * x + c * y;
+                    let (x, y) = (vectors[p][k], vectors[q][k]);
+                    vectors[p][k] = c * x - s * y;
+                    vectors[q][k] = s * x + c * y;
+                }
+            }
+        }
+    }
+    let mut order = [0; N];
+    for (i, o) in order.iter_mut().enumerate() {
+        *o = i;
+    }
+    order.sort_unstable_by(|&i, &j| a[j][j].total_cmp(&a[i][i]));
+    Eigen { values: order.map(|i| a[i][i] * largest), vectors: order.map(|i| vectors[i]) }
+}
+
+/// `Σ f(λ) v vᵀ`.
+pub(crate) fn rebuilt<const N: usize>(eigen: &Eigen<N>, f: impl Fn(f32) -> f32) -> [[f32; N]; N] {
+    let mut out = [[0.0; N]; N];
+    for (value, v) in eigen.values.iter().zip(&eigen.vectors) {
+        let value = f(*value);
+        for i in 0..N {
+            for j in 0..N {
+                out[i][j] += value * v[i] * v[j];
+            }
+        }
+    }
+    out
+}
+
+/// One over an eigenvalue; 0 where it is a rounding of 0 beside the largest.
+pub(crate) fn inverse_of(value: f32, largest: f32) -> f32 {
+    if value.abs() > 1e-6 * largest { (1.0 / value).clamp(-HUGE, HUGE) } else { 0.0 }
+}
+
+impl Symmetric2 {
+    /// All entries zero.
+    pub const ZERO: Self = Self { xx: 0.0, xy: 0.0, yy: 0.0 };
+
+    /// From the upper triangle row by row.
+    #[inline]
+    #[must_use]
+    pub const fn new(xx: f32, xy: f32, yy: f32) -> Self {
+        Self { xx, xy, yy }
+    }
+
+    /// `diag(x, y)`.
+    #[inline]
+    #[must_use]
+    pub const fn diagonal(x: f32, y: f32) -> Self {
+        Self { xx: x, xy: 0.0, yy: y }
+    }
+
+    /// Sum of the diagonal.
+    #[inline]
+    #[must_use]
+    pub fn trace(&self) -> f32 {
+        self.xx + self.yy
+    }
+
+    /// Determinant; products are rounded once, so that what cancels is right.
+    #[inline]
+    #[must_use]
+    pub fn determinant(&self) -> f32 {
+        float::difference_of_products(self.xx, self.yy, self.xy, self.xy)
+    }
+
+    /// `xᵀ A x` for a column `(x, y)`.
+    #[inline]
+    #[must_use]
+    pub fn along(&self, x: f32, y: f32) -> f32 {
+        self.xx * x * x + 2.0 * self.xy * x * y + self.yy * y * y
+    }
+
+    /// Sum of both.
+    #[inline]
+    #[must_use]
+    pub fn plus(&self, other: &Self) -> Self {
+        Self { xx: self.xx + other.xx, xy: self.xy + other.xy, yy: self.yy + other.yy }
+    }
+
+    /// Every entry times `factor`.
+    #[inline]
+    #[must_use]
+    pub fn times(&self, factor: f32) -> Self {
+        Self { xx: self.xx * factor, xy: self.xy * factor, yy: self.yy * factor }
+    }
+
+    /// `diag(x, y) A diag(x, y)`.
+    #[inline]
+    #[must_use]
+    pub fn scaled(&self, x: f32, y: f32) -> Self {
+        Self { xx: self.xx * x * x, xy: self.xy * x * y, yy: self.yy * y * y }
+    }
+
+    /// Eigenvalues and eigenvectors.
+    #[must_use]
+    pub fn eigen(&self) -> Eigen<2> {
+        jacobi([[self.xx, self.xy], [self.xy, self.yy]])
+    }
+
+    /// The matrix with the absolute values of the eigenvalues.
+    ///
+    /// ```text
+    /// |A| = (A² + |det A| I)/(|λ₁| + |λ₂|)   where the signs of λ differ,   ±A elsewhere
+    /// ```
+    ///
+    /// No trigonometry; sheet § 2.3.
+    ///
+    /// ```
+    /// # use fogbow::math::Symmetric2;
+    /// assert_eq!(Symmetric2::diagonal(-2.0, 3.0).absolute(), Symmetric2::diagonal(2.0, 3.0));
+    /// ```
+    #[inline]
+    #[must_use]
+    pub fn absolute(&self) -> Self {
+        let mean = 0.5 * (self.xx + self.yy);
+        let half = 0.5 * (self.xx - self.yy);
+        let radius = float::hypot(half, self.xy);
+        if mean >= radius {
+            return *self;
+        }
+        if mean <= -radius {
+            return self.times(-1.0);
+        }
+        if !(radius > 0.0 && radius < f32::MAX) {
+            return Self::ZERO;
+        }
+        // In units of the radius, so that squares neither overflow nor vanish.
+        let a = self.times(1.0 / radius);
+        let det = (a.xx * a.yy - a.xy * a.xy).abs();
+        let out =
+            Self { xx: a.xx * a.xx + a.xy * a.xy + det, xy: a.xy * (a.xx + a.yy), yy: a.yy * a.yy + a.xy * a.xy + det };
+        out.times(0.5 * radius)
+    }
+
+    /// Moore–Penrose inverse of a positive semi-definite matrix: the inverse, that of rank one where the
+    /// determinant drowns in rounding, or zero.
+    ///
+    /// ```
+    /// # use fogbow::math::Symmetric2;
+    /// assert_eq!(Symmetric2::diagonal(4.0, 0.0).pseudo_inverse(), Symmetric2::diagonal(0.25, 0.0));
+    /// ```
+    #[inline]
+    #[must_use]
+    pub fn pseudo_inverse(&self) -> Self {
+        self.inverse_and_rank().0
+    }
+
+    /// [`Symmetric2::pseudo_inverse`], and whether it is a true inverse.
+    #[inline]
+    pub(crate) fn inverse_and_rank(&self) -> (Self, bool) {
+        let trace = self.trace();
+        if !(trace > 0.0) {
+            return (Self::ZERO, false);
+        }
+        // By the trace first: squares of huge or tiny entries would leave what f32 holds.
+        let scale = 1.0 / trace;
+        let a = self.times(scale);
+        let det = float::difference_of_products(a.xx, a.yy, a.xy, a.xy);
+        if det > 1e-6 {
+            let f = scale / det;
+            return (Self { xx: a.yy * f, xy: -a.xy * f, yy: a.xx * f }, true);
+        }
+        let norm2 = a.xx * a.xx + 2.0 * a.xy * a.xy + a.yy * a.yy;
+        (a.times(scale / norm2), false)
+    }
+
+    /// Nothing negative on the diagonal, nothing off it that the diagonal cannot carry.
+    #[inline]
+    #[must_use]
+    pub(crate) fn tidy(mut self) -> Self {
+        self.xx = float::max(self.xx, 0.0);
+        self.yy = float::max(self.yy, 0.0);
+        let most = self.xx * self.yy;
+        if !(self.xy * self.xy <= most) {
+            self.xy = float::sqrt(most).copysign(self.xy);
+        }
+        self
+    }
+}
+
+impl Symmetric3 {
+    /// All entries zero.
+    pub const ZERO: Self = Self { xx: 0.0, xy: 0.0, xz: 0.0, yy: 0.0, yz: 0.0, zz: 0.0 };
+
+    /// From the upper triangle row by row.
+    #[inline]
+    #[must_use]
+    pub const fn from_upper([xx, xy, xz, yy, yz, zz]: [f32; 6]) -> Self {
+        Self { xx, xy, xz, yy, yz, zz }
+    }
+
+    /// The upper triangle row by row.
+    #[inline]
+    #[must_use]
+    pub const fn to_upper(self) -> [f32; 6] {
+        [self.xx, self.xy, self.xz, self.yy, self.yz, self.zz]
+    }
+
+    /// `R A Rᵀ` with the columns `u`, `v` of `R`: a matrix in a plane, in space.
+    #[inline]
+    #[must_use]
+    pub fn embedded(a: &Symmetric2, u: Vec3, v: Vec3) -> Self {
+        let (p, q) = (u * a.xx + v * a.xy, u * a.xy + v * a.yy);
+        Self {
+            xx: p.x * u.x + q.x * v.x,
+            xy: p.x * u.y + q.x * v.y,
+            xz: p.x * u.z + q.x * v.z,
+            yy: p.y * u.y + q.y * v.y,
+            yz: p.y * u.z + q.y * v.z,
+            zz: p.z * u.z + q.z * v.z,
+        }
+    }
+
+    /// `Rᵀ A R` with the columns `u`, `v` of `R`: what the matrix says within a plane.
+    #[inline]
+    #[must_use]
+    pub fn within(&self, u: Vec3, v: Vec3) -> Symmetric2 {
+        let (p, q) = (self.applied(u), self.applied(v));
+        Symmetric2 { xx: p.dot(u), xy: p.dot(v), yy: q.dot(v) }
+    }
+
+    /// `A x`.
+    #[inline]
+    #[must_use]
+    pub fn applied(&self, x: Vec3) -> Vec3 {
+        Vec3::new(
+            self.xx * x.x + self.xy * x.y + self.xz * x.z,
+            self.xy * x.x + self.yy * x.y + self.yz * x.z,
+            self.xz * x.x + self.yz * x.y + self.zz * x.z,
+        )
+    }
+
+    /// `xᵀ A x`.
+    #[inline]
+    #[must_use]
+    pub fn along(&self, x: Vec3) -> f32 {
+        self.applied(x).dot(x)
+    }
+
+    /// Sum of the diagonal.
+    #[inline]
+    #[must_use]
+    pub fn trace(&self) -> f32 {
+        self.xx + self.yy + self.zz
+    }
+
+    /// Sum of both.
+    #[inline]
+    #[must_use]
+    pub fn plus(&self, other: &Self) -> Self {
+        Self {
+            xx: self.xx + other.xx,
+            xy: self.xy + other.xy,
+            xz: self.xz + other.xz,
+            yy: self.yy + other.yy,
+            yz: self.yz + other.yz,
+            zz: self.zz + other.zz,
+        }
+    }
+
+    /// Every entry times `factor`.
+    #[inline]
+    #[must_use]
+    pub fn times(&self, factor: f32) -> Self {
+        Self {
+            xx: self.xx * factor,
+            xy: self.xy * factor,
+            xz: self.xz * factor,
+            yy: self.yy * factor,
+            yz: self.yz * factor,
+            zz: self.zz * factor,
+        }
+    }
+
+    fn rows(&self) -> [[f32; 3]; 3] {
+        [[self.xx, self.xy, self.xz], [self.xy, self.yy, self.yz], [self.xz, self.yz, self.zz]]
+    }
+
+    fn from_rows(a: [[f32; 3]; 3]) -> Self {
+        Self { xx: a[0][0], xy: a[0][1], xz: a[0][2], yy: a[1][1], yz: a[1][2], zz: a[2][2] }
+    }
+
+    /// Eigenvalues and eigenvectors.
+    ///
+    /// ```
+    /// # use fogbow::math::Symmetric3;
+    /// let a = Symmetric3::from_upper([2.0, 1.0, 0.0, 2.0, 0.0, 5.0]);
+    /// let values = a.eigen().values;
+    /// assert!((values[0] - 5.0).abs() < 1e-6 && (values[1] - 3.0).abs() < 1e-6 && (values[2] - 1.0).abs() < 1e-6);
+    /// ```
+    #[must_use]
+    pub fn eigen(&self) -> Eigen<3> {
+        jacobi(self.rows())
+    }
+
+    /// The matrix with the absolute values of the eigenvalues.
+    #[must_use]
+    pub fn absolute(&self) -> Self {
+        Self::from_rows(rebuilt(&self.eigen(), f32::abs))
+    }
+
+    /// Moore–Penrose inverse; eigenvalues below a millionth of the largest count as 0.
+    #[must_use]
+    pub fn pseudo_inverse(&self) -> Self {
+        let eigen = self.eigen();
+        let largest = eigen.values[0].abs().max(eigen.values[2].abs());
+        Self::from_rows(rebuilt(&eigen, |value| inverse_of(value, largest)))
+    }
+}

@@ -1,0 +1,161 @@
+//! What covariances are used for in `fogbow render`, and the grid they come from.
+
+use std::path::{Path, PathBuf};
+
+use clap::{Args, ValueEnum};
+use fogbow::bytes::Crc;
+use fogbow::covariance::Grid;
+use fogbow::covariance::bytes::BytesError;
+use fogbow::host::Medium;
+use fogbow::light::Light;
+use fogbow::math::Ray;
+use fogbow::path;
+use fogbow_std::covariance::{CovarianceGrid, Problem, Settings, fill, load, save};
+use fogbow_std::progress::Control;
+use fogbow_std::stats::Statistics;
+
+use super::{Failure, output};
+use crate::scene_file::fingerprint;
+use crate::world::{WithMedium, World};
+
+/// Options of covariance grids.
+#[derive(Debug, Clone, Args)]
+#[command(next_help_heading = "Covariance grid")]
+pub struct CovarianceArguments {
+    /// Photons that fill the covariance grid.
+    #[arg(long, value_name = "N", default_value_t = 100_000, value_parser = clap::value_parser!(u64).range(1..=1 << 32))]
+    pub grid_paths: u64,
+    /// Cells of the covariance grid along its longest side.
+    #[arg(long, value_name = "N", default_value_t = 64, value_parser = clap::value_parser!(u32).range(1..=512))]
+    pub grid_cells: u32,
+    /// Takes the covariance grid from a file instead of filling it.
+    #[arg(long, value_name = "FILE")]
+    pub grid_in: Option<PathBuf>,
+    /// Writes the covariance grid to a file.
+    #[arg(long, value_name = "FILE")]
+    pub grid_out: Option<PathBuf>,
+}
+
+/// Options of ray marching.
+#[derive(Debug, Clone, Args)]
+#[command(next_help_heading = "Ray marching")]
+pub struct MarchArguments {
+    /// How the steps along eye rays are chosen.
+    #[arg(long, value_enum, default_value_t = Step::Uniform)]
+    pub step: Step,
+    /// Length of uniform steps; with covariances the longest one [default: 1/32 of the scene's diagonal, with covariances
+    /// 1/8].
+    #[arg(long, value_name = "LENGTH", value_parser = output::positive)]
+    pub step_length: Option<f64>,
+    /// Shortest step with covariances [default: half a cell of the grid].
+    #[arg(long, value_name = "LENGTH", value_parser = output::positive)]
+    pub step_least: Option<f64>,
+}
+
+/// How steps along eye rays are chosen.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Step {
+    /// All of one length.
+    Uniform,
+    /// Short where light varies along the ray, by its covariance.
+    Covariance,
+}
+
+/// Fills or reads a grid, with a medium of any type.
+pub(super) struct GridJob<'a> {
+    pub(super) arguments: &'a CovarianceArguments,
+    pub(super) scene: &'a Path,
+    pub(super) world: &'a World<'a>,
+    pub(super) lights: &'a [Light<'a>],
+    pub(super) paths: path::Settings,
+    pub(super) threads: usize,
+    pub(super) seed: u64,
+    pub(super) control: &'a Control<'a>,
+    pub(super) statistics: &'a mut Statistics,
+}
+
+impl WithMedium for GridJob<'_> {
+    type Output = Result<CovarianceGrid, Failure>;
+
+    fn with<M: Medium + Sync>(self, medium: &M) -> Self::Output {
+        let (arguments, statistics) = (self.arguments, self.statistics);
+        let tag = arguments.tag(self.scene, &self.paths)?;
+        let grid = if let Some(file) = &arguments.grid_in {
+            statistics.time("read grid", || load(file, tag)).map_err(|error| match error.problem {
+                Problem::Content(BytesError::Tag { .. }) => {
+                    format!("{}: was made for another scene, or with another --max-depth", file.display())
+                }
+                _ => error.to_string(),
+            })?
+        } else {
+            let world = path::World { medium, scene: self.world, lights: self.lights };
+            let settings = Settings {
+                paths: arguments.grid_paths,
+                edge: arguments.grid_cells,
+                threads: self.threads,
+                seed: self.seed,
+                ..Settings::default()
+            };
+            statistics.time("fill grid", || fill(&world, &self.world.bounds(), &self.paths, &settings, self.control))?
+        };
+        if let Some(file) = &arguments.grid_out {
+            statistics.time("write grid", || save(file, &grid, tag))?;
+        }
+        statistics.bytes.push(("covariance grid".to_owned(), grid.bytes() as u64));
+        Ok(grid)
+    }
+}
+
+impl CovarianceArguments {
+    /// What a grid is for: the scene, and how long paths may grow.
+    fn tag(&self, scene: &Path, paths: &path::Settings) -> Result<u64, Failure> {
+        if !self.is_named() {
+            return Ok(0);
+        }
+        let mut crc = Crc::new();
+        crc.add(&fingerprint(scene)?.to_le_bytes());
+        for number in [paths.max_scatterings, paths.roulette_after] {
+            crc.add(&number.to_le_bytes());
+        }
+        Ok(crc.value())
+    }
+
+    /// # Errors
+    /// Places that cannot be written to.
+    pub(super) fn check(&self) -> Result<(), String> {
+        self.grid_out.iter().try_for_each(|file| output::check_place(file))
+    }
+
+    /// Whether a grid is named.
+    pub(super) fn is_named(&self) -> bool {
+        self.grid_in.is_some() || self.grid_out.is_some()
+    }
+}
+
+impl MarchArguments {
+    /// Lengths of steps in a scene: with the grid's, the shortest and the longest.
+    pub(super) fn steps<'a>(&self, size: f32, grid: Option<&'a Grid<'a>>) -> Steps<'a> {
+        let given = |length: Option<f64>| length.map(|l| l as f32);
+        let longest = given(self.step_length).unwrap_or(if grid.is_some() { size / 8.0 } else { size / 32.0 });
+        let least = grid.map_or(longest, |grid| 0.5 * grid.lattice().cell().min_element());
+        let least = given(self.step_least).unwrap_or(least).min(longest);
+        Steps { grid, least, longest }
+    }
+}
+
+/// Lengths of steps along eye rays.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Steps<'a> {
+    grid: Option<&'a Grid<'a>>,
+    least: f32,
+    longest: f32,
+}
+
+impl Steps<'_> {
+    /// The step (m) that starts at `distance` on `ray`.
+    #[inline]
+    pub(super) fn at(&self, ray: &Ray, distance: f32) -> f32 {
+        let Some(grid) = self.grid else { return self.longest };
+        grid.step(ray, distance, self.least, self.longest)
+    }
+}
