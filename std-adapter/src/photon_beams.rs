@@ -168,6 +168,41 @@ where
     Ok(beams)
 }
 
+/// How many paths leave about `pieces` pieces of beams: by the count that a first few leave. At least 256, at
+/// most 2²².
+///
+/// Where most light ends on walls outside the medium many paths are needed, in dense fog few; the cost of
+/// gathering goes with the pieces.
+///
+/// # Errors
+/// [`BeamsError::TooMany`].
+///
+/// ```
+/// use fogbow::{host::Empty, light::{Light, PointLight}, math::*, medium::Homogeneous, path::World, phase::Phase, spectrum::Spectrum};
+/// use fogbow_std::photon_beams::{Settings, View, paths_for, shoot};
+/// let fog = Homogeneous::new(Spectrum::ONE, Spectrum::ONE, Phase::ISOTROPIC)?;
+/// let lamps = [Light::Point(PointLight::from_flux(Vec3::ZERO, Spectrum::ONE)?)];
+/// let bounds = Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE };
+/// let world = World { medium: &fog, scene: &Empty, lights: &lamps };
+/// let view = View { world, bounds, paths: fogbow::path::Settings::default() };
+/// let settings = Settings::new(&bounds);
+/// let paths = paths_for(&view, &settings, 20_000, 7)?;
+/// let beams = shoot(&view, &Settings { paths, ..settings }, 0, 7)?;
+/// assert!((18_000..22_000).contains(&beams.pieces().len()));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn paths_for<M, S>(view: &View<'_, M, S>, settings: &Settings, pieces: u32, seed: u64) -> Result<u32, BeamsError>
+where
+    M: Medium + Sync + ?Sized,
+    S: Scene + Sync + ?Sized,
+{
+    const FIRST: u32 = 2048;
+    // A pass that is never rendered.
+    let found = shoot(view, &Settings { paths: FIRST, ..*settings }, u32::MAX, seed)?.pieces().len();
+    let paths = f64::from(FIRST) * f64::from(pieces) / (found.max(1) as f64);
+    Ok((paths as u32).clamp(256, 1 << 22))
+}
+
 /// Adds samples to `film` as [`tiles::render`] does, in passes of [`Settings::samples`] with photons of their own.
 ///
 /// [`tiles::Settings::samples`] is rounded up to whole passes, so that light of the medium and of surfaces count alike.

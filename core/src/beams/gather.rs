@@ -64,10 +64,11 @@ impl<'s> Beams<'s> {
     /// None so far. For `n` pieces lend `n` of `pieces` and `n + 1` of `nodes`, which always suffices.
     ///
     /// ```
-    /// # use fogbow::beams::{Beams, Node, Piece};
+    /// # use fogbow::{beams::{Beams, Node, Piece}, spectrum::Spectrum};
     /// let (mut pieces, mut nodes) = ([Piece::default(); 1], [Node::default(); 2]);
     /// let mut beams = Beams::new(&mut pieces[..], &mut nodes[..]);
-    /// assert!(beams.push(Piece::default()).is_ok() && beams.push(Piece::default()).is_err());
+    /// let piece = Piece { length: 1.0, power: Spectrum::ONE, ..Piece::default() };
+    /// assert!(beams.push(piece).is_ok() && beams.push(piece).is_err());
     /// ```
     pub fn new(pieces: impl Into<List<'s, Piece>>, nodes: impl Into<List<'s, Node>>) -> Self {
         Self { pieces: pieces.into(), nodes: nodes.into(), scale: 0.0 }

@@ -13,7 +13,7 @@ pub const SECOND_MOMENT: f32 = 1.0 / 8.0;
 /// ```
 ///
 /// Integrates to 1 over the disc. Smoother than Epanechnikov's at the border, where beams would
-/// show as rings. Reference: Silverman 1986, *Density Estimation*, Eq. 4.5.
+/// show as rings. Reference: Silverman 1986, *Density Estimation*, § 4.2.
 ///
 /// ```
 /// # use fogbow::beams::kernel::value;
@@ -52,7 +52,7 @@ pub(super) fn chord(w2: f32, from: f32, to: f32) -> f32 {
 /// Since the blur is integrated along the eye ray, a pass has a variance like `1/r` (not `1/r²`, as
 /// with photon points): noise and blur of an average shrink alike at α = 0.6, the one's variance and the
 /// other's square like `i^−0.8`. Reference: Knaus and Zwicker 2011, *Progressive Photon Mapping: A Probabilistic
-/// Approach*, Eq. 15; in closed form by gamma functions.
+/// Approach*, for kernels in two dimensions; here in closed form by gamma functions.
 ///
 /// ```
 /// # use fogbow::beams::kernel::radius;

@@ -98,7 +98,7 @@ pub struct Header {
     pub paths: u64,
 }
 
-/// Number of bytes that [`write`] gives.
+/// Number of bytes that [`write()`] gives.
 #[must_use]
 pub fn byte_count(lattice: &Lattice) -> usize {
     HEADER_BYTES + lattice.cell_count() * size_of::<Voxel>()
@@ -159,7 +159,7 @@ fn word<const N: usize>(bytes: &[u8], at: usize) -> [u8; N] {
     out
 }
 
-/// The header of a grid that [`write`] gave, after all checks but those of its voxels' values.
+/// The header of a grid that [`write()`] gave, after all checks but those of its voxels' values.
 ///
 /// # Errors
 /// The first check that fails.

@@ -34,7 +34,7 @@ const MAX_SURVIVAL: f32 = 0.99;
 /// * Light that is scattered to an eye at the end of a flight was scattered at most
 ///   [`Settings::max_scatterings`] times: a walk has fewer scatterings by one, and with 0 there is none.
 /// * Refraction changes radiance by `η²`, but no power; surfaces have geometric normals only, so no other
-///   correction is due (Veach 1997, §§ 5.2–5.3).
+///   correction is due (Veach 1997, chapter 5).
 /// * Null interfaces are passed within one flight. Every vertex draws as many numbers from `rng`.
 /// * Glowing media send no photons.
 ///

@@ -27,7 +27,7 @@ pub struct BeamArguments {
     /// How wide beams are blurred.
     #[arg(long, value_enum, default_value_t = Kernel::Progressive)]
     pub kernel: Kernel,
-    /// Paths sent from the lights in each pass [default: one for eight pixels, 1024 at least].
+    /// Paths sent from the lights in each pass [default: as many as leave four pieces of beams for every pixel].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1 << 24))]
     pub beams: Option<u32>,
     /// Samples per pixel in each pass; beams are gathered by the first of them [default: 8].
@@ -64,11 +64,11 @@ fn alpha(text: &str) -> Result<f32, String> {
 }
 
 impl BeamArguments {
-    fn settings(&self, world: &World<'_>, pixels: u64) -> Settings {
+    fn settings(&self, world: &World<'_>) -> Settings {
         let usual = Settings::new(&world.bounds());
         let most = self.radius_most.map_or(10.0 * usual.radius, |r| r as f32);
         Settings {
-            paths: self.beams.unwrap_or_else(|| (pixels / 8).clamp(1024, 1 << 20) as u32),
+            paths: self.beams.unwrap_or(usual.paths),
             samples: self.pass_samples.unwrap_or(usual.samples),
             radius: self.radius.map_or(usual.radius, |r| r as f32),
             alpha: self.alpha,
@@ -96,12 +96,16 @@ impl WithMedium for BeamJob<'_> {
 
     fn with<M: Medium + Sync>(self, medium: &M) -> Self::Output {
         let (width, height) = (self.film.width(), self.film.height());
-        let settings = self.arguments.settings(self.world, u64::from(width) * u64::from(height));
         let view = View {
             world: path::World { medium, scene: self.world, lights: self.lights },
             bounds: self.world.bounds(),
             paths: self.paths,
         };
+        let mut settings = self.arguments.settings(self.world);
+        if self.arguments.beams.is_none() {
+            let pieces = (u64::from(width) * u64::from(height) * 4).clamp(1 << 14, 1 << 22) as u32;
+            settings.paths = photon_beams::paths_for(&view, &settings, pieces, self.settings.seed)?;
+        }
         let mut storage = vec![0.0; self.grid.map_or(0, |grid| grid.lattice().cell_count())];
         let (most, bias) = (settings.largest, self.arguments.bias as f32);
         let radii = match self.grid {
