@@ -34,10 +34,6 @@ pub struct Settings {
     pub radius: f32,
     /// By which it narrows: see [`kernel::radius`].
     pub alpha: f32,
-    /// Radius (m) that no kernel exceeds but the pass's own, whatever a radius function says: beams are
-    /// looked for within it, so it costs where it is larger than needed. 0 where all kernels have the
-    /// pass's radius.
-    pub largest: f32,
     /// Length (m) above which pieces of beams are cut. Shorter: more pieces, tighter boxes. Changes nothing
     /// in the mean.
     pub longest: f32,
@@ -54,7 +50,6 @@ impl Settings {
             samples: NonZero::<u32>::MIN.saturating_add(7),
             radius: 0.005 * size,
             alpha: 0.6,
-            largest: 0.0,
             longest: 0.1 * size,
         }
     }
@@ -113,7 +108,7 @@ impl From<Full> for BeamsError {
 /// Paths of one job: part of the result. More: threads wait for each other. Fewer: more lists to put together.
 const JOB: u32 = 64;
 
-/// The beams of pass number `pass`. Uses the threads of the rayon pool it is called in.
+/// The beams of pass number `pass`, blurred as `radius` says: see [`render`]. Uses the threads of the rayon pool it is called in.
 ///
 /// # Errors
 /// [`BeamsError::TooMany`].
@@ -127,14 +122,15 @@ const JOB: u32 = 64;
 /// let world = World { medium: &fog, scene: &Empty, lights: &lamps };
 /// let view = View { world, bounds, paths: fogbow::path::Settings::default() };
 /// let settings = Settings { paths: 100, ..Settings::new(&bounds) };
-/// let beams = shoot(&view, &settings, 0, 7)?;
-/// assert_eq!(beams.pieces(), shoot(&view, &settings, 0, 7)?.pieces());
-/// assert_ne!(beams.pieces(), shoot(&view, &settings, 1, 7)?.pieces());
+/// let beams = shoot(&view, &settings, |_, pass| pass, 0, 7)?;
+/// assert_eq!(beams.pieces(), shoot(&view, &settings, |_, pass| pass, 0, 7)?.pieces());
+/// assert_ne!(beams.pieces(), shoot(&view, &settings, |_, pass| pass, 1, 7)?.pieces());
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub fn shoot<M, S>(
     view: &View<'_, M, S>,
     settings: &Settings,
+    radius: impl Fn(Vec3, f32) -> f32 + Sync,
     pass: u32,
     seed: u64,
 ) -> Result<Beams<'static>, BeamsError>
@@ -144,6 +140,8 @@ where
 {
     // Photons must have nothing to do with the pixels' numbers.
     let seed = mix(seed ^ 0x9e3d_11b6_0f7c_52a4) ^ u64::from(pass);
+    let of_pass = kernel::radius(settings.radius, settings.alpha, pass);
+    let width = |point: Vec3| radius(point, of_pass);
     let jobs = settings.paths.div_ceil(JOB);
     let shot: Vec<Vec<Piece>> = (0..jobs)
         .into_par_iter()
@@ -153,7 +151,7 @@ where
             for path in job * JOB..(job * JOB).saturating_add(JOB).min(settings.paths) {
                 let mut rng = independent(seed, u64::from(pass) << 32 | u64::from(job), path);
                 beams::shoot(&view.world, &view.bounds, &view.paths, settings.longest, &mut rng, &mut |piece| {
-                    pieces.push(piece);
+                    piece.widened(&width, &mut |part| pieces.push(part));
                 });
             }
             pieces
@@ -187,7 +185,7 @@ where
 /// let view = View { world, bounds, paths: fogbow::path::Settings::default() };
 /// let settings = Settings::new(&bounds);
 /// let paths = paths_for(&view, &settings, 20_000, 7)?;
-/// let beams = shoot(&view, &Settings { paths, ..settings }, 0, 7)?;
+/// let beams = shoot(&view, &Settings { paths, ..settings }, |_, pass| pass, 0, 7)?;
 /// assert!((18_000..22_000).contains(&beams.pieces().len()));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
@@ -198,7 +196,7 @@ where
 {
     const FIRST: u32 = 2048;
     // A pass that is never rendered.
-    let found = shoot(view, &Settings { paths: FIRST, ..*settings }, u32::MAX, seed)?.pieces().len();
+    let found = shoot(view, &Settings { paths: FIRST, ..*settings }, |_, pass| pass, u32::MAX, seed)?.pieces().len();
     let paths = f64::from(FIRST) * f64::from(pieces) / (found.max(1) as f64);
     Ok((paths as u32).clamp(256, 1 << 22))
 }
@@ -230,36 +228,29 @@ where
 {
     let positive = |x: f32| x > 0.0 && x.is_finite();
     let lengths = [settings.radius, settings.longest, settings.alpha];
-    let is_bound = settings.largest >= 0.0 && settings.largest.is_finite();
-    if settings.paths == 0 || !lengths.into_iter().all(positive) || !is_bound || settings.alpha > 1.0 {
+    if settings.paths == 0 || !lengths.into_iter().all(positive) || settings.alpha > 1.0 {
         return Err(BeamsError::Settings);
     }
     if view.world.medium.is_emissive() {
         return Err(BeamsError::Glowing);
     }
-    let prepare = |pass: u32| {
-        let beams = shoot(view, settings, pass, tiles.seed)?;
-        let radius = kernel::radius(settings.radius, settings.alpha, pass);
-        Ok::<_, BeamsError>((beams, radius))
-    };
+    let prepare = |pass: u32| shoot(view, settings, &radius, pass, tiles.seed);
     let length = settings.samples;
     // A multiple of the length, `u32::MAX` included.
     let samples = tiles.samples.checked_next_multiple_of(length.get()).unwrap_or(u32::MAX / length * length.get());
     let tiles = &tiles::Settings { samples, ..*tiles };
-    render_prepared(film, tiles, control, length, prepare, |(beams, of_pass), sample, rng, layers| {
+    render_prepared(film, tiles, control, length, prepare, |beams, sample, rng, layers| {
         let world = World {
             medium: &CountingMedium { medium: view.world.medium, tally: sample.tally },
             scene: &CountingScene { scene: view.world.scene, tally: sample.tally },
             lights: view.world.lights,
         };
         let ray = ray(sample, rng);
-        let width = |point: Vec3| radius(point, *of_pass);
-        let largest = settings.largest.max(*of_pass);
         let seen = path::radiance_beyond(&ray, &world, &view.paths, rng, |segment, most, rng| {
             if sample.index % length != 0 {
                 return InScattered::default();
             }
-            let light = beams.gather(segment, world.medium, largest, width, most, rng).light;
+            let light = beams.gather(segment, world.medium, most, rng).light;
             let share = length.get() as f32;
             InScattered { single: light.single * share, multiple: light.multiple * share }
         });

@@ -1,7 +1,5 @@
 //! What beams scatter to an eye.
 
-use glam::Vec3;
-
 use super::kernel;
 use super::thickness::Thickness;
 use super::tree;
@@ -34,11 +32,11 @@ const MAX_PARTS: f32 = 32.0;
 /// let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::splat(1e-3), Lobe::Isotropic)?;
 /// let (mut pieces, mut nodes) = ([Piece::default(); 1], [Node::default(); 2]);
 /// let mut beams = Beams::new(&mut pieces[..], &mut nodes[..]);
-/// let power = Spectrum::ONE;
-/// beams.push(Piece { origin: Vec3::NEG_Z, length: 2.0, direction: Vec3::Z, power, ..Piece::default() })?;
+/// let (power, radius) = (Spectrum::ONE, 0.1);
+/// beams.push(Piece { origin: Vec3::NEG_Z, length: 2.0, direction: Vec3::Z, power, radius, ..Piece::default() })?;
 /// beams.build(1)?;
 /// let eye = Ray::between(Vec3::new(-1.0, 0.0, 0.0), Vec3::X);
-/// let seen = beams.gather(&eye, &fog, 0.1, |_| 0.1, u32::MAX, &mut Generator::new(1));
+/// let seen = beams.gather(&eye, &fog, u32::MAX, &mut Generator::new(1));
 /// // Across the middle of a disc, the kernel integrates to 16/(5 π r).
 /// let expected = 1e-3 / (4.0 * core::f32::consts::PI) * 3.2 / (core::f32::consts::PI * 0.1);
 /// assert!((seen.light.single[0] / expected - 1.0).abs() < 2e-3);
@@ -67,14 +65,14 @@ impl<'s> Beams<'s> {
     /// # use fogbow::{beams::{Beams, Node, Piece}, spectrum::Spectrum};
     /// let (mut pieces, mut nodes) = ([Piece::default(); 1], [Node::default(); 2]);
     /// let mut beams = Beams::new(&mut pieces[..], &mut nodes[..]);
-    /// let piece = Piece { length: 1.0, power: Spectrum::ONE, ..Piece::default() };
+    /// let piece = Piece { length: 1.0, radius: 0.1, power: Spectrum::ONE, ..Piece::default() };
     /// assert!(beams.push(piece).is_ok() && beams.push(piece).is_err());
     /// ```
     pub fn new(pieces: impl Into<List<'s, Piece>>, nodes: impl Into<List<'s, Node>>) -> Self {
         Self { pieces: pieces.into(), nodes: nodes.into(), scale: 0.0 }
     }
 
-    /// Keeps a piece. Pieces without length or power, or that are not finite, are left out. It is seen
+    /// Keeps a piece. Pieces without length, radius or power, or that are not finite, are left out. It is seen
     /// after the next [`Beams::build`].
     ///
     /// # Errors
@@ -83,7 +81,8 @@ impl<'s> Beams<'s> {
         let is_finite = piece.origin.is_finite() && piece.end().is_finite() && piece.direction.is_finite();
         let shines = piece.power.is_finite() && !piece.power.is_black();
         // Also false for NaN.
-        if is_finite && shines && piece.length > 0.0 { self.pieces.push(piece) } else { Ok(()) }
+        let has_size = piece.length > 0.0 && piece.radius > 0.0 && piece.radius.is_finite();
+        if is_finite && shines && has_size { self.pieces.push(piece) } else { Ok(()) }
     }
 
     /// Makes the tree over all pieces, which are all the light of `paths` paths. Sorts the pieces; takes
@@ -120,8 +119,7 @@ impl<'s> Beams<'s> {
 
     /// Light that beams scatter into `ray`, which is traced from the eye, along its length.
     ///
-    /// `radius` (m, > 0) is asked where the eye ray passes a beam's axis; what exceeds `largest` (m) is cut to
-    /// it. Light that was scattered more than `most` times, this one included, is left out.
+    /// Light that was scattered more than `most` times, this one included, is left out.
     ///
     /// The blur is integrated in closed form along the chord, in parts of a few radii; transmittances,
     /// coefficients and phase function are taken at the middle of each part. The eye ray's own
@@ -131,22 +129,19 @@ impl<'s> Beams<'s> {
         &self,
         ray: &Ray,
         medium: &M,
-        largest: f32,
-        radius: impl Fn(Vec3) -> f32,
         most: u32,
         rng: &mut (impl Rng + ?Sized),
     ) -> Gathered {
         let (nodes, pieces) = (self.nodes.as_slice(), self.pieces.as_slice());
         let mut found = Gathered::default();
         let mut thickness = None;
-        tree::visit(nodes, pieces, ray, largest, |piece| {
+        tree::visit(nodes, pieces, ray, |piece| {
             if piece.scatterings >= most {
                 return;
             }
-            let Some(passing) = Passing::new(piece, ray, largest) else { return };
-            let radius = float::min(radius(ray.at(passing.closest)), largest);
+            let Some(passing) = Passing::new(piece, ray) else { return };
             let thickness = thickness.get_or_insert_with(|| Thickness::new(medium, ray, rng));
-            let Some(light) = passing.light(piece, ray, medium, radius, thickness) else { return };
+            let Some(light) = passing.light(piece, ray, medium, thickness) else { return };
             found.pieces += 1;
             if piece.scatterings == 0 {
                 found.light.single += light;
@@ -168,11 +163,9 @@ impl<'s> Beams<'s> {
 
 /// How an eye ray passes a piece.
 struct Passing {
-    /// Distance (m) along the eye ray where it is closest to the beam's axis, within what follows.
-    closest: f32,
     /// Distances (m) along the eye ray between which it is beside the piece.
     interval: (f32, f32),
-    /// The same as `closest` on the eye ray's whole line.
+    /// Distance (m) along the eye ray's line where it is closest to the beam's axis.
     centre: f32,
     /// Squared distance (m²) there.
     distance2: f32,
@@ -182,9 +175,9 @@ struct Passing {
 }
 
 impl Passing {
-    /// `None` where the eye ray stays farther away than `largest`.
+    /// `None` where the eye ray stays farther away than the piece's radius.
     #[inline]
-    fn new(piece: &Piece, ray: &Ray, largest: f32) -> Option<Self> {
+    fn new(piece: &Piece, ray: &Ray) -> Option<Self> {
         let (d, b) = (ray.direction, piece.direction);
         let from = ray.origin - piece.origin;
         let (cosine, along) = (d.dot(b), from.dot(b));
@@ -194,8 +187,8 @@ impl Passing {
         let is_parallel = sine2 < PARALLEL;
         let centre = if is_parallel { 0.0 } else { -start.dot(slope) / sine2 };
         let distance2 = (start + slope * centre).length_squared();
-        let largest2 = largest * largest;
-        if !(is_parallel || distance2 < largest2) {
+        let radius2 = piece.radius * piece.radius;
+        if !(is_parallel || distance2 < radius2) {
             return None;
         }
         // Beside the piece: 0 ≤ along + t cosine ≤ length.
@@ -212,37 +205,29 @@ impl Passing {
             let middle = 0.5 * (near + far);
             let distance2 = (start + slope * middle).length_squared();
             // Also false for NaN, which an endless eye ray across a beam would make.
-            let passes = far > near && far.is_finite() && distance2 < largest2;
-            return passes.then_some(Self {
-                closest: middle,
-                interval: (near, far),
-                centre: middle,
-                distance2,
-                sine2: 0.0,
-                cosine,
-            });
+            let passes = far > near && far.is_finite() && distance2 < radius2;
+            return passes.then_some(Self { interval: (near, far), centre: middle, distance2, sine2: 0.0, cosine });
         }
-        let half = float::sqrt((largest2 - distance2) / sine2);
+        let half = float::sqrt((radius2 - distance2) / sine2);
         near = near.max(centre - half);
         far = far.min(centre + half);
         // Also false for NaN; `clamp` takes no empty interval.
         if !(far > near) {
             return None;
         }
-        let closest = centre.clamp(near, far);
-        Some(Self { closest, interval: (near, far), centre, distance2, sine2, cosine })
+        Some(Self { interval: (near, far), centre, distance2, sine2, cosine })
     }
 
-    /// Radiance (W·m⁻²·sr⁻¹) from the piece; `None` where it is farther away than `radius`.
+    /// Radiance (W·m⁻²·sr⁻¹) from the piece; `None` where it is too far away.
     #[inline]
     fn light<M: Medium + ?Sized>(
         &self,
         piece: &Piece,
         ray: &Ray,
         medium: &M,
-        radius: f32,
         thickness: &Thickness,
     ) -> Option<Spectrum> {
+        let radius = piece.radius;
         let w2 = 1.0 - self.distance2 / (radius * radius);
         // Also false for NaN.
         if !(w2 > 0.0) {

@@ -32,8 +32,10 @@ pub struct Piece {
     pub power: Spectrum,
     /// Extinction (m⁻¹) by which power falls along it: `power · e^{−rate·l}`.
     pub rate: Spectrum,
+    /// Radius (m) of its blur, which carries its light.
+    pub radius: f32,
     /// Nothing; it fills 64 bytes.
-    pub padding: [u32; 2],
+    pub padding: u32,
 }
 
 impl Piece {
@@ -42,6 +44,39 @@ impl Piece {
     #[must_use]
     pub fn end(&self) -> Vec3 {
         self.origin + self.direction * self.length
+    }
+
+    /// Gives it the radius (m) that `radius` tells for the points along it, cut into parts where that changes
+    /// by more than half, but not shorter than they are wide.
+    ///
+    /// Kernels belong to beams, not to eye rays: so all light of a beam stays in the picture, however radii change.
+    ///
+    /// ```
+    /// # use fogbow::{beams::Piece, math::Vec3, spectrum::Spectrum};
+    /// let beam = Piece { length: 1.0, direction: Vec3::X, power: Spectrum::ONE, ..Piece::default() };
+    /// let mut parts = Vec::new();
+    /// beam.widened(&|point: Vec3| if point.x < 0.5 { 0.01 } else { 0.1 }, &mut |part| parts.push(part));
+    /// assert!(parts.len() > 1 && parts.first().unwrap().radius == 0.01 && parts.last().unwrap().radius == 0.1);
+    /// assert!((parts.iter().map(|part| part.length).sum::<f32>() - 1.0).abs() < 1e-6);
+    /// ```
+    pub fn widened(self, radius: &impl Fn(Vec3) -> f32, keep: &mut impl FnMut(Self)) {
+        let ends = (radius(self.origin), radius(self.end()));
+        self.widened_between(ends, radius, keep);
+    }
+
+    fn widened_between(self, ends: (f32, f32), radius: &impl Fn(Vec3) -> f32, keep: &mut impl FnMut(Self)) {
+        let half = 0.5 * self.length;
+        let middle = radius(self.origin + self.direction * half);
+        let (low, high) = (middle.min(ends.0).min(ends.1), middle.max(ends.0).max(ends.1));
+        if high > 1.5 * low && half > low {
+            let first = Self { length: half, ..self };
+            let power = self.power * (self.rate * half).transmitted();
+            let second = Self { origin: first.end(), length: self.length - half, power, ..self };
+            first.widened_between((ends.0, middle), radius, keep);
+            second.widened_between((middle, ends.1), radius, keep);
+        } else {
+            keep(Self { radius: middle, ..self });
+        }
     }
 }
 
@@ -93,7 +128,7 @@ pub fn pieces(
                 let length = until - t;
                 if length > 0.0 {
                     let (origin, direction) = (reach.at(t), reach.direction);
-                    keep(Piece { origin, length, direction, scatterings, power, rate: low, padding: [0; 2] });
+                    keep(Piece { origin, length, direction, scatterings, power, rate: low, ..Piece::default() });
                     power *= (low * length).transmitted();
                 }
                 left = left.saturating_sub(1);

@@ -13,7 +13,7 @@ const LEAF: usize = 4;
 /// Levels at most: pieces are halved by number, so 2³² of them have 32.
 pub(super) const DEPTH: usize = 33;
 
-/// A box around pieces.
+/// A box around pieces and their blur.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Pod, Zeroable)]
 #[repr(C)]
 pub struct Node {
@@ -44,8 +44,8 @@ fn divide(pieces: &mut [Piece], first: usize, nodes: &mut List<'_, Node>) -> Res
     let (mut low, mut high) = (min, max);
     for piece in pieces.iter() {
         let (a, b) = (piece.origin, piece.end());
-        min = min.min(a).min(b);
-        max = max.max(a).max(b);
+        min = min.min(a.min(b) - piece.radius);
+        max = max.max(a.max(b) + piece.radius);
         low = low.min(a + b);
         high = high.max(a + b);
     }
@@ -73,9 +73,9 @@ fn divide(pieces: &mut [Piece], first: usize, nodes: &mut List<'_, Node>) -> Res
     divide(right, first + middle, nodes)
 }
 
-/// Calls `visit` for every piece whose leaf comes nearer than `radius` (m) to `ray`, always in the same order.
+/// Calls `visit` for every piece whose leaf `ray` meets, always in the same order.
 #[inline]
-pub(super) fn visit<'p>(nodes: &[Node], pieces: &'p [Piece], ray: &Ray, radius: f32, mut visit: impl FnMut(&'p Piece)) {
+pub(super) fn visit<'p>(nodes: &[Node], pieces: &'p [Piece], ray: &Ray, mut visit: impl FnMut(&'p Piece)) {
     if nodes.is_empty() {
         return;
     }
@@ -87,7 +87,7 @@ pub(super) fn visit<'p>(nodes: &[Node], pieces: &'p [Piece], ray: &Ray, radius: 
         let mut index = stack[top] as usize;
         loop {
             let node = &nodes[index];
-            if !meets(node, ray, inverse, radius) {
+            if !meets(node, ray, inverse) {
                 break;
             }
             if node.count > 0 {
@@ -103,11 +103,11 @@ pub(super) fn visit<'p>(nodes: &[Node], pieces: &'p [Piece], ray: &Ray, radius: 
     }
 }
 
-/// Whether the ray comes into the box grown by `radius`.
+/// Whether the ray comes into the box.
 #[inline]
-fn meets(node: &Node, ray: &Ray, inverse: Vec3, radius: f32) -> bool {
-    let a = (node.min - radius - ray.origin) * inverse;
-    let b = (node.max + radius - ray.origin) * inverse;
+fn meets(node: &Node, ray: &Ray, inverse: Vec3) -> bool {
+    let a = (node.min - ray.origin) * inverse;
+    let b = (node.max - ray.origin) * inverse;
     // A ray within a face makes 0·∞ = NaN and may miss the box; but then it is just as far from all
     // pieces as the blur reaches.
     let (mut near, mut far) = (0.0_f32, ray.length);

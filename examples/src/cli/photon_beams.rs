@@ -66,13 +66,11 @@ fn alpha(text: &str) -> Result<f32, String> {
 impl BeamArguments {
     fn settings(&self, world: &World<'_>) -> Settings {
         let usual = Settings::new(&world.bounds());
-        let most = self.radius_most.map_or(10.0 * usual.radius, |r| r as f32);
         Settings {
             paths: self.beams.unwrap_or(usual.paths),
             samples: self.pass_samples.unwrap_or(usual.samples),
             radius: self.radius.map_or(usual.radius, |r| r as f32),
             alpha: self.alpha,
-            largest: if self.kernel == Kernel::Covariance { most } else { 0.0 },
             ..usual
         }
     }
@@ -107,7 +105,8 @@ impl WithMedium for BeamJob<'_> {
             settings.paths = photon_beams::paths_for(&view, &settings, pieces, self.settings.seed)?;
         }
         let mut storage = vec![0.0; self.grid.map_or(0, |grid| grid.lattice().cell_count())];
-        let (most, bias) = (settings.largest, self.arguments.bias as f32);
+        let most = self.arguments.radius_most.map_or(0.05 * self.world.bounds().size().length(), |r| r as f32);
+        let bias = self.arguments.bias as f32;
         let radii = match self.grid {
             Some(grid) => Some(Radii::new(grid, bias, kernel::SECOND_MOMENT, most, &mut storage)?),
             None => None,
