@@ -10,6 +10,7 @@
 //! | [`photon_beams`] | shooting and gathering photon beams in parallel, pass by pass |
 //! | [`radiance_cache`] | filling radiance caches in parallel; their files |
 //! | [`image`] | PNG, PFM and (feature `exr`, on by default) OpenEXR files |
+//! | [`image_sampling`] | which pixels are computed, and filling in the others |
 //! | [`stats`] | seconds per phase, queries of the world |
 //!
 //! A glowing fog in front of a black wall, 2 m away at the left and 6 m at the right:
@@ -41,6 +42,7 @@ pub mod covariance;
 mod files;
 pub mod film;
 pub mod image;
+pub mod image_sampling;
 pub mod photon_beams;
 pub mod progress;
 pub mod radiance_cache;

@@ -21,6 +21,7 @@
 //! | `grid` | [`Grid`]: Γ anywhere in the volume |
 //! | `steps` | [`Steps`] along an eye ray (Alg. 1) |
 //! | `radii` | [`Radii`] of kernels anywhere in the volume (Eq. 19) |
+//! | `image` | [`image_covariance`] along an eye ray |
 //! | [`bytes`] | grids saved and sent |
 //!
 //! Where the model is blind: it knows nothing of an unoccluded point light's `1/r²`, for the spectrum of such
@@ -29,6 +30,7 @@
 pub mod bytes;
 mod emission;
 mod grid;
+mod image;
 mod lattice;
 mod light_field;
 mod lobe;
@@ -42,6 +44,7 @@ mod steps;
 
 pub use emission::emitted;
 pub use grid::{Grid, merge};
+pub use image::image_covariance;
 pub use lattice::{Cells, Crossing, Lattice, LatticeError, MAX_EDGE};
 pub use light_field::{LightField, Patch};
 pub use lobe::{phase_covariance, phase_hessian};

@@ -1,0 +1,169 @@
+//! Adaptive sampling of images: where light is smooth few pixels are computed, and the others filled in from them.
+//!
+//! Belcour et al. 2014, § 6.3: the density of computed pixels follows `√det P` of the image's covariance, and
+//! a Gaussian of the shape that it gives spreads them.
+
+use fogbow::covariance::{filter_precision, sample_density};
+use fogbow::math::Symmetric2;
+use fogbow::spectrum::Spectrum;
+use rayon::prelude::*;
+
+use crate::film::Image;
+
+/// By how much filters are narrower than the light itself varies. 1, as in B, blurs light by as much as it
+/// varies; much more leaves noise.
+const SHARPER: f32 = 2.5;
+
+/// Standard deviation (pixels) of the widest filter: where light does not vary at all.
+const WIDEST: f32 = 4.0;
+
+/// Pixels a filter reaches on either side.
+const REACH: i64 = 12;
+
+/// Relative difference of depth beyond which pixels see different things.
+const SAME_DEPTH: f32 = 0.1;
+
+/// Least share of computed pixels, where light does not vary.
+const LEAST_SHARE: f32 = 1.0 / 12.0;
+
+/// What is known of a pixel beforehand.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Outlook {
+    /// Covariance of the image (cycles² per pixel²); `None` where nothing is known.
+    pub covariance: Option<Symmetric2>,
+    /// Distance (m) to the surface behind the medium; infinite where there is none.
+    pub depth: f32,
+}
+
+/// Which pixels are computed, and how the others are filled in.
+#[derive(Debug, Clone)]
+pub struct Plan {
+    width: u32,
+    height: u32,
+    outlooks: Vec<Outlook>,
+    /// Pixel by pixel, row by row, whether it is computed.
+    pub computed: Vec<bool>,
+    /// The share of neighbours that should be computed.
+    pub density: Vec<f32>,
+}
+
+impl Plan {
+    /// Computes at most `share` of all pixels (0 to 1), densest where the image varies.
+    ///
+    /// ```
+    /// use fogbow::math::Symmetric2;
+    /// use fogbow_std::image_sampling::{Outlook, Plan};
+    /// let smooth = Outlook { covariance: Some(Symmetric2::diagonal(1e-4, 1e-4)), depth: 1.0 };
+    /// let sharp = Outlook { covariance: Some(Symmetric2::diagonal(0.1, 0.1)), depth: 1.0 };
+    /// let plan = Plan::new(32, 32, 0.4, (0..1024).map(|i| if i % 32 < 16 { smooth } else { sharp }).collect());
+    /// let count = |left: bool| (0..1024).filter(|i| plan.computed[*i] && (i % 32 < 16) == left).count();
+    /// assert!(count(true) + count(false) <= 410 && count(false) > 2 * count(true));
+    /// ```
+    ///
+    /// # Panics
+    /// If there is not one outlook per pixel.
+    #[must_use]
+    pub fn new(width: u32, height: u32, share: f32, outlooks: Vec<Outlook>) -> Self {
+        assert_eq!(outlooks.len(), width as usize * height as usize, "one outlook per pixel");
+        let share = share.clamp(0.0, 1.0);
+        let wanted: Vec<f32> = outlooks
+            .iter()
+            .map(|o| o.covariance.map_or(0.0, |p| sample_density(&floored(&p))))
+            .map(|d| if d.is_finite() { d } else { 0.0 })
+            .collect();
+        // The factor at which the mean of the clamped densities is the share: by halving.
+        let least = LEAST_SHARE.min(share);
+        let density_at = |factor: f32| wanted.iter().map(move |d| (d * factor).clamp(least, 1.0));
+        let count = wanted.len().max(1) as f32;
+        let (mut low, mut high) = (0.0_f32, 1e9_f32);
+        for _ in 0..96 {
+            let middle = 0.5 * (low + high);
+            if density_at(middle).sum::<f32>() / count > share { high = middle } else { low = middle }
+        }
+        let density: Vec<f32> = density_at(low).collect();
+        let computed = dithered(width as usize, height as usize, &density, share);
+        Self { width, height, outlooks, computed, density }
+    }
+
+    /// The share of computed pixels.
+    #[must_use]
+    pub fn share(&self) -> f32 {
+        self.computed.iter().filter(|&&c| c).count() as f32 / self.computed.len().max(1) as f32
+    }
+
+    /// The image that the computed pixels of `image` give; the others' values are not read.
+    #[must_use]
+    pub fn filled(&self, image: &Image) -> Image {
+        let (width, height) = (i64::from(self.width), i64::from(self.height));
+        let pixels = (0..self.computed.len())
+            .into_par_iter()
+            .map(|index| {
+                let (x, y) = (index as i64 % width, index as i64 / width);
+                let outlook = &self.outlooks[index];
+                let precision = filter_precision(&floored(&outlook.covariance.unwrap_or_default())).times(SHARPER);
+                let (mut sum, mut total) = (Spectrum::ZERO, 0.0_f32);
+                let mut nearest: Option<(i64, Spectrum)> = None;
+                for dy in -REACH..=REACH {
+                    for dx in -REACH..=REACH {
+                        let (at, up) = (x + dx, y + dy);
+                        if at < 0 || up < 0 || at >= width || up >= height {
+                            continue;
+                        }
+                        let other = (up * width + at) as usize;
+                        if !self.computed[other] {
+                            continue;
+                        }
+                        let colour = image.pixels[other];
+                        let distance2 = dx * dx + dy * dy;
+                        if nearest.is_none_or(|(d, _)| distance2 < d) {
+                            nearest = Some((distance2, colour));
+                        }
+                        let exponent = 0.5 * precision.along(dx as f32, dy as f32);
+                        let (near, far) = (outlook.depth, self.outlooks[other].depth);
+                        let is_same = near == far || (near - far).abs() < SAME_DEPTH * near.min(far);
+                        if exponent < 8.0 && is_same {
+                            let weight = (-exponent).exp();
+                            sum += colour * weight;
+                            total += weight;
+                        }
+                    }
+                }
+                if total > 1e-3 { sum / total } else { nearest.map_or(Spectrum::ZERO, |(_, colour)| colour) }
+            })
+            .collect();
+        Image { width: self.width, height: self.height, pixels }
+    }
+}
+
+/// With a least variation in every direction, so that filters end.
+fn floored(p: &Symmetric2) -> Symmetric2 {
+    let least = 1.0 / (2.0 * core::f32::consts::PI * WIDEST);
+    let least = least * least / SHARPER;
+    p.plus(&Symmetric2::diagonal(least, least))
+}
+
+/// Error diffusion (Floyd and Steinberg 1976) in snake lines: chosen pixels keep their distance from each other.
+fn dithered(width: usize, height: usize, density: &[f32], share: f32) -> Vec<bool> {
+    let mut chosen = vec![false; density.len()];
+    let mut left = (share * density.len() as f32) as usize;
+    let (mut line, mut next) = (vec![0.0_f32; width + 2], vec![0.0_f32; width + 2]);
+    for y in 0..height {
+        let forward = y % 2 == 0;
+        for i in 0..width {
+            let x = if forward { i } else { width - 1 - i };
+            let want = density[y * width + x] + line[x + 1];
+            let take = want > 0.5 && left > 0;
+            chosen[y * width + x] = take;
+            left -= usize::from(take);
+            let error = want - f32::from(u8::from(take));
+            let (ahead, behind) = if forward { (x + 2, x) } else { (x, x + 2) };
+            line[ahead] += error * (7.0 / 16.0);
+            next[behind] += error * (3.0 / 16.0);
+            next[x + 1] += error * (5.0 / 16.0);
+            next[ahead] += error * (1.0 / 16.0);
+        }
+        core::mem::swap(&mut line, &mut next);
+        next.fill(0.0);
+    }
+    chosen
+}
