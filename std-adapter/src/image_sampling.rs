@@ -91,6 +91,12 @@ impl Plan {
         self.computed.iter().filter(|&&c| c).count() as f32 / self.computed.len().max(1) as f32
     }
 
+    /// Covariance (cycles² per pixel²) whose Gaussian fills in a pixel.
+    #[must_use]
+    pub fn shape(&self, index: usize) -> Symmetric2 {
+        floored(&self.outlooks[index].covariance.unwrap_or_default()).times(SHARPER)
+    }
+
     /// The image that the computed pixels of `image` give; the others' values are not read.
     #[must_use]
     pub fn filled(&self, image: &Image) -> Image {
@@ -100,7 +106,7 @@ impl Plan {
             .map(|index| {
                 let (x, y) = (index as i64 % width, index as i64 / width);
                 let outlook = &self.outlooks[index];
-                let precision = filter_precision(&floored(&outlook.covariance.unwrap_or_default())).times(SHARPER);
+                let precision = filter_precision(&self.shape(index));
                 let (mut sum, mut total) = (Spectrum::ZERO, 0.0_f32);
                 let mut nearest: Option<(i64, Spectrum)> = None;
                 for dy in -REACH..=REACH {

@@ -1,35 +1,25 @@
 //! `fogbow render --method march`.
 
-use fogbow::covariance::Grid;
 use fogbow::host::Medium;
-use fogbow::light::Light;
 use fogbow::march;
 use fogbow::math::Vec2;
 use fogbow::path::{self, InScattered, World as PathWorld};
 use fogbow::sampling::{uniform, uniform2};
 use fogbow::spectrum::Spectrum;
 use fogbow_std::film::Film;
-use fogbow_std::progress::Control;
 use fogbow_std::stats::{CountingMedium, CountingScene};
 use fogbow_std::tiles::{self, Outcome};
 
 use super::Failure;
 use super::covariance::MarchArguments;
-use super::render::write_layers;
-use crate::camera::Camera;
-use crate::world::{WithMedium, World};
+use super::render::{LAYERS, Shot, write_layers};
+use crate::world::WithMedium;
 
 /// A render by ray marching, to be done with a medium of any type.
 pub(super) struct MarchJob<'a> {
-    pub(super) world: &'a World<'a>,
-    pub(super) lights: &'a [Light<'a>],
-    pub(super) camera: Camera,
-    pub(super) paths: path::Settings,
+    pub(super) shot: Shot<'a>,
     pub(super) film: &'a mut Film,
-    pub(super) settings: &'a tiles::Settings,
-    pub(super) control: &'a Control<'a>,
     pub(super) arguments: &'a MarchArguments,
-    pub(super) grid: Option<&'a Grid<'a>>,
 }
 
 impl WithMedium for MarchJob<'_> {
@@ -39,23 +29,27 @@ impl WithMedium for MarchJob<'_> {
         if medium.is_emissive() {
             return Err("ray marching does not know light of glowing media: take another method".into());
         }
-        let (width, height) = (self.film.width() as f32, self.film.height() as f32);
-        let stride = self.arguments.stride(self.world.bounds().size().length(), self.grid);
-        let outcome = tiles::render(self.film, self.settings, self.control, |sample, rng, layers| {
+        let shot = self.shot;
+        let (width, height) = (self.film.width(), self.film.height());
+        let stride = self.arguments.stride(shot.world.bounds().size().length(), shot.grid);
+        let outcome = tiles::render(self.film, shot.settings, shot.control, |sample, rng, layers| {
             let world = PathWorld {
                 medium: &CountingMedium { medium, tally: sample.tally },
-                scene: &CountingScene { scene: self.world, tally: sample.tally },
-                lights: self.lights,
+                scene: &CountingScene { scene: shot.world, tally: sample.tally },
+                lights: shot.lights,
             };
-            let jitter = uniform2(rng);
-            let film = Vec2::new((sample.x as f32 + jitter.x) / width, (sample.y as f32 + jitter.y) / height);
-            let ray = self.camera.ray(film);
-            let seen = path::radiance_beyond(&ray, &world, &self.paths, rng, |segment, most, rng| {
-                let settings = path::Settings { max_scatterings: most, ..self.paths };
+            let at = Vec2::new(sample.x as f32, sample.y as f32) + uniform2(rng);
+            let ray = shot.camera.ray(at / Vec2::new(width as f32, height as f32));
+            let mut count = 0_u32;
+            let seen = path::radiance_beyond(&ray, &world, &shot.paths, rng, |segment, most, rng| {
+                if !shot.is_computed(sample, width) {
+                    return InScattered::default();
+                }
+                let settings = path::Settings { max_scatterings: most, ..shot.paths };
                 let mut light = InScattered::default();
                 let offset = uniform(rng);
                 march::steps(segment, world.medium, stride.steps(segment), offset, |at, properties, weight| {
-                    sample.tally.collide(1);
+                    count += 1;
                     let (point, to_eye) = (segment.at(at), -segment.direction);
                     let here = path::in_scattered(&world, point, to_eye, &properties.phase, &settings, rng);
                     let factor: Spectrum = weight * properties.scattering;
@@ -64,8 +58,11 @@ impl WithMedium for MarchJob<'_> {
                 });
                 light
             });
-            sample.tally.collide(seen.collisions);
+            sample.tally.collide(seen.collisions + count);
             write_layers(&seen, layers);
+            if let Some(steps) = layers.get_mut(LAYERS.len()) {
+                *steps = Spectrum::splat(count as f32);
+            }
         })?;
         Ok(outcome)
     }

@@ -5,6 +5,7 @@
 mod compare;
 mod covariance;
 mod figures;
+mod image_sampling;
 mod march;
 mod output;
 mod photon_beams;
@@ -21,6 +22,7 @@ use clap::{Parser, Subcommand};
 pub use compare::CompareArguments;
 pub use covariance::{CovarianceArguments, MarchArguments, Step};
 pub use figures::{FiguresArguments, Paper};
+pub use image_sampling::{ImageSampling, SamplingArguments};
 pub use photon_beams::{BeamArguments, Kernel};
 pub use plume::PlumeArguments;
 pub use radiance_cache::{CacheArguments, Kind, Single};

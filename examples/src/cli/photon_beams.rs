@@ -4,20 +4,17 @@ use core::num::NonZero;
 
 use clap::{Args, ValueEnum};
 use fogbow::beams::kernel;
-use fogbow::covariance::{Grid, Radii};
+use fogbow::covariance::Radii;
 use fogbow::host::Medium;
-use fogbow::light::Light;
 use fogbow::math::{Vec2, Vec3};
 use fogbow::path;
 use fogbow::sampling::uniform2;
 use fogbow_std::film::Film;
 use fogbow_std::photon_beams::{self, Settings, View};
-use fogbow_std::progress::Control;
-use fogbow_std::tiles::{self, Outcome};
+use fogbow_std::tiles::Outcome;
 
-use super::render::write_layers;
+use super::render::{Shot, write_layers};
 use super::{Failure, output};
-use crate::camera::Camera;
 use crate::world::{WithMedium, World};
 
 /// Options of `--method photon-beams`.
@@ -78,49 +75,45 @@ impl BeamArguments {
 
 /// A render by photon beams, to be done with a medium of any type.
 pub(super) struct BeamJob<'a> {
-    pub(super) world: &'a World<'a>,
-    pub(super) lights: &'a [Light<'a>],
-    pub(super) camera: Camera,
-    pub(super) paths: path::Settings,
+    pub(super) shot: Shot<'a>,
     pub(super) film: &'a mut Film,
-    pub(super) settings: &'a tiles::Settings,
-    pub(super) control: &'a Control<'a>,
     pub(super) arguments: &'a BeamArguments,
-    pub(super) grid: Option<&'a Grid<'a>>,
 }
 
 impl WithMedium for BeamJob<'_> {
     type Output = Result<Outcome, Failure>;
 
     fn with<M: Medium + Sync>(self, medium: &M) -> Self::Output {
+        let shot = self.shot;
         let (width, height) = (self.film.width(), self.film.height());
         let view = View {
-            world: path::World { medium, scene: self.world, lights: self.lights },
-            bounds: self.world.bounds(),
-            paths: self.paths,
+            world: path::World { medium, scene: shot.world, lights: shot.lights },
+            bounds: shot.world.bounds(),
+            paths: shot.paths,
         };
-        let mut settings = self.arguments.settings(self.world);
+        let mut settings = self.arguments.settings(shot.world);
         if self.arguments.beams.is_none() {
             let pieces = (u64::from(width) * u64::from(height) * 4).clamp(1 << 14, 1 << 22) as u32;
-            settings.paths = photon_beams::paths_for(&view, &settings, pieces, self.settings.seed)?;
+            settings.paths = photon_beams::paths_for(&view, &settings, pieces, shot.settings.seed)?;
         }
-        let mut storage = vec![0.0; self.grid.map_or(0, |grid| grid.lattice().cell_count())];
-        let most = self.arguments.radius_most.map_or(0.05 * self.world.bounds().size().length(), |r| r as f32);
+        let grid = shot.grid.filter(|_| self.arguments.kernel == Kernel::Covariance);
+        let mut storage = vec![0.0; grid.map_or(0, |grid| grid.lattice().cell_count())];
+        let most = self.arguments.radius_most.map_or(0.05 * shot.world.bounds().size().length(), |r| r as f32);
         let bias = self.arguments.bias as f32;
-        let radii = match self.grid {
+        let radii = match grid {
             Some(grid) => Some(Radii::new(grid, bias, kernel::SECOND_MOMENT, most, &mut storage)?),
             None => None,
         };
         let radius = |point: Vec3, pass: f32| radii.map_or(pass, |radii| radii.at(point).max(pass));
         let outcome = photon_beams::render(
             self.film,
-            self.settings,
+            shot.settings,
             &settings,
-            self.control,
+            shot.control,
             &view,
             |sample, rng| {
                 let at = Vec2::new(sample.x as f32, sample.y as f32) + uniform2(rng);
-                self.camera.ray(at / Vec2::new(width as f32, height as f32))
+                shot.camera.ray(at / Vec2::new(width as f32, height as f32))
             },
             radius,
             write_layers,

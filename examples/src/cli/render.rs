@@ -5,21 +5,24 @@ use core::time::Duration;
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
+use fogbow::covariance::Grid;
 use fogbow::host::Medium;
 use fogbow::light::Light;
 use fogbow::math::Vec2;
-use fogbow::path::{self, Radiance, World as PathWorld};
+use fogbow::path::{self, InScattered, Radiance, World as PathWorld};
 use fogbow::sampling::uniform2;
 use fogbow::spectrum::Spectrum;
 use fogbow_std::covariance::CovarianceGrid;
 use fogbow_std::film::Film;
 use fogbow_std::image::write_film;
+use fogbow_std::image_sampling::Plan;
 use fogbow_std::progress::{Control, Progress};
 use fogbow_std::radiance_cache::{NAMES, RadianceCaches};
 use fogbow_std::stats::{CountingMedium, CountingScene, Statistics};
-use fogbow_std::tiles::{self, Outcome, Reason, RenderError};
+use fogbow_std::tiles::{self, Outcome, Reason, RenderError, Sample};
 
 use super::covariance::{CovarianceArguments, GridJob, MarchArguments, Step};
+use super::image_sampling::{self, SamplingArguments};
 use super::march::MarchJob;
 use super::photon_beams::{BeamArguments, BeamJob, Kernel};
 use super::radiance_cache::{CacheArguments, CacheJob, check_depth};
@@ -83,6 +86,9 @@ pub struct RenderArguments {
     /// Of ray marching.
     #[command(flatten)]
     pub march: MarchArguments,
+    /// Of adaptive sampling.
+    #[command(flatten)]
+    pub sampling: SamplingArguments,
     /// Of covariance grids.
     #[command(flatten)]
     pub covariance: CovarianceArguments,
@@ -104,8 +110,12 @@ pub enum Method {
 }
 
 /// Names of the layers; the first is the image.
-const LAYERS: [&str; 6] =
+pub(super) const LAYERS: [&str; 6] =
     ["total", "emitted", "surface_direct", "surface_indirect", "medium_single", "medium_multiple"];
+
+/// The same for ray marching, with the number of steps.
+const MARCH_LAYERS: [&str; 7] =
+    ["total", "emitted", "surface_direct", "surface_indirect", "medium_single", "medium_multiple", "steps"];
 
 /// The same for radiance caching, which knows light from surfaces apart.
 const CACHE_LAYERS: [&str; 7] =
@@ -162,8 +172,10 @@ pub(crate) fn render(arguments: &RenderArguments) -> Result<Rendered, Failure> {
     let world = statistics.time("build", || World::new(&scene, &mut storage))?;
     let (width, height) = arguments.size.unwrap_or((scene.sensor.width, scene.sensor.height));
     let layers: &[&str] = match (arguments.aov, arguments.method) {
-        (false, _) => &["total"],
-        (true, Method::Path | Method::PhotonBeams | Method::March) => &LAYERS,
+        (false, _) if arguments.sampling.is_uniform() => &["total"],
+        (false, _) => &LAYERS,
+        (true, Method::Path | Method::PhotonBeams) => &LAYERS,
+        (true, Method::March) => &MARCH_LAYERS,
         (true, Method::RadianceCache) => &CACHE_LAYERS,
     };
     let mut film = Film::new(width, height, layers)?;
@@ -214,49 +226,31 @@ pub(crate) fn render(arguments: &RenderArguments) -> Result<Rendered, Failure> {
         None
     };
     let grid = covariances.as_ref().map(CovarianceGrid::view);
-    let (film_of, settings_of, control_of) = (&mut film, &settings, &control);
+    let plan = arguments.sampling.plan(&world, camera, grid.as_ref(), (width, height), &mut statistics);
+    let shot = Shot {
+        world: &world,
+        lights: &lights,
+        camera,
+        paths,
+        settings: &settings,
+        control: &control,
+        grid: grid.as_ref(),
+        plan: plan.as_ref(),
+    };
     let mut cached = None;
     let outcome = match arguments.method {
-        Method::Path => world.media().with(Job {
-            world: &world,
-            lights: &lights,
-            camera,
-            paths,
-            film: film_of,
-            settings: settings_of,
-            control: control_of,
-        })?,
-        Method::PhotonBeams => world.media().with(BeamJob {
-            world: &world,
-            lights: &lights,
-            camera,
-            paths,
-            film: film_of,
-            settings: settings_of,
-            control: control_of,
-            arguments: &arguments.beams,
-            grid: grid.as_ref(),
-        })?,
-        Method::March => world.media().with(MarchJob {
-            world: &world,
-            lights: &lights,
-            camera,
-            paths,
-            film: film_of,
-            settings: settings_of,
-            control: control_of,
-            arguments: &arguments.march,
-            grid: grid.as_ref(),
-        })?,
+        Method::Path => world.media().with(Job { shot, film: &mut film })?,
+        Method::PhotonBeams => world.media().with(BeamJob { shot, film: &mut film, arguments: &arguments.beams })?,
+        Method::March => world.media().with(MarchJob { shot, film: &mut film, arguments: &arguments.march })?,
         Method::RadianceCache => {
             let done = world.media().with(CacheJob {
                 world: &world,
                 lights: &lights,
                 camera,
                 paths,
-                film: film_of,
-                settings: settings_of,
-                control: control_of,
+                film: &mut film,
+                settings: &settings,
+                control: &control,
                 arguments: &arguments.cache,
                 tag: arguments.cache.tag(&arguments.scene, &paths)?,
             })?;
@@ -266,6 +260,9 @@ pub(crate) fn render(arguments: &RenderArguments) -> Result<Rendered, Failure> {
         }
     };
     bar.finish();
+    if let Some(plan) = &plan {
+        film = statistics.time("fill in", || image_sampling::finished(&film, plan, arguments.aov))?;
+    }
     if let Some(cached) = &cached {
         for (i, name) in NAMES.iter().enumerate() {
             statistics.add(&format!("fill {name}"), cached.filled.seconds[i]);
@@ -292,6 +289,9 @@ pub(crate) fn render(arguments: &RenderArguments) -> Result<Rendered, Failure> {
 impl RenderArguments {
     /// Whether anything asked for takes a covariance grid.
     fn needs_grid(&self) -> bool {
+        if !self.sampling.is_uniform() {
+            return true;
+        }
         match self.method {
             Method::March => self.march.step != Step::Uniform,
             Method::PhotonBeams => self.beams.kernel == Kernel::Covariance,
@@ -326,10 +326,13 @@ fn outputs(arguments: &RenderArguments) -> Result<Vec<PathBuf>, Failure> {
         return Err("--cache-in and --cache-out need --method radiance-cache".into());
     }
     caches.check()?;
+    if !matches!(arguments.method, Method::Path | Method::March) && !arguments.sampling.is_uniform() {
+        return Err("--image-sampling covariance goes with --method path and march".into());
+    }
     arguments.covariance.check()?;
     if arguments.covariance.is_named() && !arguments.needs_grid() {
         return Err(
-            "--grid-in and --grid-out need something that uses covariances: --kernel or --step covariance".into()
+            "--grid-in and --grid-out need something that uses covariances: --kernel, --step or --image-sampling covariance".into()
         );
     }
     if !arguments.exposure.is_finite() {
@@ -348,31 +351,52 @@ pub(super) fn path_settings(scene: &SceneFile, max_depth: Option<u32>) -> path::
     }
 }
 
-/// A render, to be done with a medium of any type.
+/// What is rendered, from where and how: the same for most methods.
+#[derive(Clone, Copy)]
+pub(super) struct Shot<'a> {
+    pub(super) world: &'a World<'a>,
+    pub(super) lights: &'a [Light<'a>],
+    pub(super) camera: Camera,
+    pub(super) paths: path::Settings,
+    pub(super) settings: &'a tiles::Settings,
+    pub(super) control: &'a Control<'a>,
+    pub(super) grid: Option<&'a Grid<'a>>,
+    pub(super) plan: Option<&'a Plan>,
+}
+
+impl Shot<'_> {
+    /// Whether the medium's light is wanted at a pixel, or filled in from others.
+    #[inline]
+    pub(super) fn is_computed(&self, sample: &Sample<'_>, width: u32) -> bool {
+        self.plan.is_none_or(|plan| plan.computed[(sample.y * width + sample.x) as usize])
+    }
+}
+
+/// A render by path tracing, to be done with a medium of any type.
 struct Job<'a> {
-    world: &'a World<'a>,
-    lights: &'a [Light<'a>],
-    camera: Camera,
-    paths: path::Settings,
+    shot: Shot<'a>,
     film: &'a mut Film,
-    settings: &'a tiles::Settings,
-    control: &'a Control<'a>,
 }
 
 impl WithMedium for Job<'_> {
     type Output = Result<Outcome, RenderError>;
 
     fn with<M: Medium + Sync>(self, medium: &M) -> Self::Output {
-        let (width, height) = (self.film.width() as f32, self.film.height() as f32);
-        tiles::render(self.film, self.settings, self.control, |sample, rng, layers| {
+        let shot = self.shot;
+        let (width, height) = (self.film.width(), self.film.height());
+        tiles::render(self.film, shot.settings, shot.control, |sample, rng, layers| {
             let world = PathWorld {
                 medium: &CountingMedium { medium, tally: sample.tally },
-                scene: &CountingScene { scene: self.world, tally: sample.tally },
-                lights: self.lights,
+                scene: &CountingScene { scene: shot.world, tally: sample.tally },
+                lights: shot.lights,
             };
-            let jitter = uniform2(rng);
-            let film = Vec2::new((sample.x as f32 + jitter.x) / width, (sample.y as f32 + jitter.y) / height);
-            let seen = path::radiance(&self.camera.ray(film), &world, &self.paths, rng);
+            let at = Vec2::new(sample.x as f32, sample.y as f32) + uniform2(rng);
+            let ray = shot.camera.ray(at / Vec2::new(width as f32, height as f32));
+            let seen = if shot.is_computed(sample, width) {
+                path::radiance(&ray, &world, &shot.paths, rng)
+            } else {
+                path::radiance_beyond(&ray, &world, &shot.paths, rng, |_, _, _| InScattered::default())
+            };
             sample.tally.collide(seen.collisions);
             write_layers(&seen, layers);
         })
