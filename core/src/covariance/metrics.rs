@@ -31,8 +31,14 @@ impl Voxel {
     /// Adds a light field with energy `energy`; more than 10²⁰ counts as that.
     #[inline]
     pub fn add(&mut self, light: &LightField, energy: f32) {
+        self.add_covariance(&light.volumetric(), energy);
+    }
+
+    /// Adds a covariance (cycles²/m²) with energy `energy`; more than 10²⁰ counts as that.
+    #[inline]
+    pub fn add_covariance(&mut self, covariance: &Symmetric3, energy: f32) {
         let energy = float::min(energy, MOST_ENERGY);
-        self.sum = self.sum.plus(&light.volumetric().times(energy));
+        self.sum = self.sum.plus(&covariance.times(energy));
         self.weight += energy;
     }
 
@@ -63,6 +69,27 @@ impl Voxel {
 #[must_use]
 pub fn hessian_bound(fluence: f32, covariance: &Symmetric3) -> Symmetric3 {
     covariance.times(float::min(4.0 * PI * PI * fluence, f32::MAX))
+}
+
+/// Covariance (cycles²/m²) of a fluence that falls as `1/r²` with the distance `distance` (m) from a light along
+/// `direction` (unit): its relative Hessian, `6/r²` along the ray and `−2/r²` across, as B Eq. 2 turns it into one.
+///
+/// Covariance tracing itself is blind to it (sheet § 2.5): a diverging beam of one brightness has no content across.
+/// `size` (m) is the radius of the light, within which there is no such fall-off.
+#[inline]
+#[must_use]
+pub fn divergence(direction: Vec3, distance: f32, size: f32) -> Symmetric3 {
+    let across = float::min(2.0 * PER_HESSIAN / (distance * distance + size * size).max(1e-30), LIMIT);
+    let w = direction;
+    let along = 2.0 * across;
+    Symmetric3::from_upper([
+        across + along * w.x * w.x,
+        along * w.x * w.y,
+        along * w.x * w.z,
+        across + along * w.y * w.y,
+        along * w.y * w.z,
+        across + along * w.z * w.z,
+    ])
 }
 
 /// Length (m) of an integration step along the unit vector `direction`: `1/(2√v)` with `v = ωᵀΓω`, within

@@ -24,8 +24,8 @@
 //! | `image` | [`image_covariance`] along an eye ray |
 //! | [`bytes`] | grids saved and sent |
 //!
-//! Where the model is blind: it knows nothing of an unoccluded point light's `1/r²`, for the spectrum of such
-//! a light field has no content of its own across the ray.
+//! Where the model is blind: an unoccluded point light's `1/r²` has no content of its own across the ray. Photons that
+//! come straight from a light therefore add it as [`divergence`]; behind glass and mirrors it is missing.
 
 pub mod bytes;
 mod emission;
@@ -49,7 +49,9 @@ pub use lattice::{Cells, Crossing, Lattice, LatticeError, MAX_EDGE};
 pub use light_field::{LightField, Patch};
 pub use lobe::{phase_covariance, phase_hessian};
 pub use matrix::{LIMIT, Symmetric4};
-pub use metrics::{ImageCovariance, Voxel, filter_precision, hessian_bound, kernel_radius, sample_density, step};
+pub use metrics::{
+    ImageCovariance, Voxel, divergence, filter_precision, hessian_bound, kernel_radius, sample_density, step,
+};
 pub use occluders::{NEAREST, OccluderCell, Occluders};
 pub use photon::FrequencyPhotons;
 pub use radii::Radii;

@@ -12,10 +12,10 @@ use glam::Vec3;
 use super::emission::emitted;
 use super::lattice::{Crossing, Lattice};
 use super::light_field::{LightField, Patch};
-use super::metrics::Voxel;
+use super::metrics::{Voxel, divergence};
 use super::occluders::Occluders;
 use crate::host::{Hit, Medium, Scene};
-use crate::math::{Ray, Symmetric3};
+use crate::math::{Ray, Symmetric3, float};
 use crate::path::World;
 use crate::photon::Event;
 use crate::surface::Surface;
@@ -28,6 +28,8 @@ pub struct FrequencyPhotons<'a, M: ?Sized, S: ?Sized> {
     lattice: Lattice,
     point_radius: f32,
     light: Option<LightField>,
+    /// Radius (m) of the light it comes from straight; `None` after the first event.
+    straight: Option<f32>,
 }
 
 impl<'a, M: Medium + ?Sized, S: Scene + ?Sized> FrequencyPhotons<'a, M, S> {
@@ -37,7 +39,7 @@ impl<'a, M: Medium + ?Sized, S: Scene + ?Sized> FrequencyPhotons<'a, M, S> {
     #[must_use]
     pub fn new(world: World<'a, M, S>, occluders: Option<&'a Occluders<'a>>, lattice: Lattice) -> Self {
         let point_radius = 1e-3 * lattice.bounds().size().length();
-        Self { world, occluders, lattice, point_radius, light: None }
+        Self { world, occluders, lattice, point_radius, light: None, straight: None }
     }
 
     /// The light field that the photon carries now; `None` before it is emitted and after it has gone.
@@ -55,15 +57,20 @@ impl<'a, M: Medium + ?Sized, S: Scene + ?Sized> FrequencyPhotons<'a, M, S> {
         match *event {
             Event::Emitted { light, ray, normal, .. } => {
                 self.light = self.world.lights.get(light).map(|light| emitted(light, ray, normal, self.point_radius));
+                // By what it varies in space a light is as large as this; lights at infinity do not vary.
+                let variation = self.light.map_or(0.0, |light| 0.5 * light.covariance.spatial.trace());
+                self.straight = (variation > 0.0).then(|| 1.0 / (float::PI * float::sqrt(variation)));
             }
             Event::Flew { reach, distance, power } => self.fly(reach, distance, power.mean(), voxels),
             Event::Collided { properties, outgoing, .. } => {
+                self.straight = None;
                 self.light = match (self.light, outgoing) {
                     (Some(light), Some(outgoing)) => Some(light.scattered(outgoing, &properties.phase)),
                     _ => None,
                 };
             }
             Event::Met { point, incoming, hit, outgoing, .. } => {
+                self.straight = None;
                 self.light = match (self.light, outgoing) {
                     (Some(light), Some(outgoing)) => Some(self.met(&light, point, incoming, hit, outgoing)),
                     _ => None,
@@ -104,7 +111,11 @@ impl<'a, M: Medium + ?Sized, S: Scene + ?Sized> FrequencyPhotons<'a, M, S> {
                 light = light.attenuated(&medium.extinction_hessian(point).mean(), length);
             }
             if let Some(voxel) = voxels.get_mut(cell) {
-                voxel.add(&light, power * length);
+                let mut covariance = light.volumetric();
+                if let Some(size) = self.straight {
+                    covariance = covariance.plus(&divergence(ray.direction, middle, size));
+                }
+                voxel.add_covariance(&covariance, power * length);
             }
         }
         self.light = Some(light.travelled((distance - at).max(0.0)));

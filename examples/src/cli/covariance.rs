@@ -148,6 +148,7 @@ impl MarchArguments {
     /// Steps in a world of this diagonal, along rays through `grid` if there is one.
     pub(super) fn stride<'a>(&self, size: f32, grid: Option<&'a Grid<'a>>) -> Stride<'a> {
         let given = |length: Option<f64>| length.map(|l| l as f32);
+        let grid = grid.filter(|_| self.step != Step::Uniform);
         let longest = given(self.step_length).unwrap_or(if grid.is_some() { size / 8.0 } else { size / 32.0 });
         let least = grid.map_or(longest, |grid| 0.05 * grid.lattice().cell().min_element());
         let least = given(self.step_least).unwrap_or(least).min(longest);
