@@ -213,12 +213,12 @@ pub fn blindness(paths: u64) -> f64 {
 
 /// The section of the page.
 pub(super) fn section(plan: &Plan) -> Result<String, Failure> {
-    let (seeds, most) = if plan.quick { (6, 50_000) } else { (24, 1_000_000) };
+    let (seeds, most) = if plan.quick { (6, 50_000) } else { (16, 1_000_000) };
     let measured = measure(seeds, most, plan.threads);
     plan.write("fig-10-hessian.svg", &plot(&measured).svg_over_decades())?;
     let mut page = format!(
         "## Fig. 10: second derivatives of the fluence\n\n\
-         A spot with a lobe cosⁿ, n = {n}, about a Gaussian of {LOBE} rad, shines through even fog (σₐ = σₛ = {FOG} m⁻¹, isotropic, \
+         A spot with a lobe cosⁿ, n = {n:.0}, about a Gaussian of {LOBE} rad, shines through even fog (σₐ = σₛ = {FOG} m⁻¹, isotropic, \
          light scattered at most once); {EDGE}³ cells in a cube of {SIZE} m. On the axis, 1 m from the spot: the relative error of \
          the second derivative across the beam, over {seeds} seeds and both directions, against the true value (closed form for \
          light not scattered, a quadrature for light scattered once), by the number of paths. All estimates come from the \
@@ -243,7 +243,7 @@ pub(super) fn section(plan: &Plan) -> Result<String, Failure> {
         page.push('\n');
     }
     if let (Some((paths, biases)), Some(best)) = (measured.biases.last(), best_from(&measured)) {
-        let [ours, _, far] = biases[1].map(|b| percent(b.abs()));
+        let [ours, _, far] = biases[1].map(percent);
         let _ = write!(
             page,
             "\n1 m from the spot ours is the most accurate from {best} paths on; what is left of it with {paths} is a bias of {ours}, of \
@@ -251,7 +251,7 @@ pub(super) fn section(plan: &Plan) -> Result<String, Failure> {
              2/(n + 2) of it is the spot's 1/r².\n\n"
         );
     }
-    let blind = blindness(if plan.quick { 20_000 } else { 500_000 });
+    let blind = blindness(if plan.quick { 200_000 } else { 500_000 });
     let _ = write!(
         page,
         "**Where the model is blind:** an unoccluded isotropic point light varies by 6F/r² along its rays, from 1/r² alone, and the \
