@@ -242,13 +242,20 @@ pub(super) fn section(plan: &Plan) -> Result<String, Failure> {
         }
         page.push('\n');
     }
-    if let (Some((paths, biases)), Some(best)) = (measured.biases.last(), best_from(&measured)) {
+    if let Some((paths, biases)) = measured.biases.last() {
+        page += "\nOurs is the most accurate ";
+        for (i, z) in measured.places.iter().enumerate() {
+            let (comma, from) = (if i == 0 { "" } else { ", " }, best_from(&measured, i));
+            let from = from.map_or("nowhere here".to_owned(), |from| format!("from {from} paths on"));
+            let _ = write!(page, "{comma}at {z:.2} m {from}");
+        }
         let [ours, _, far] = biases[1].map(percent);
         let _ = write!(
             page,
-            "\n1 m from the spot ours is the most accurate from {best} paths on; what is left of it with {paths} is a bias of {ours}, of \
-             the filter one of {far}. Ours is F's noise in one cell; its bias is the part of F″ that no lobe makes: \
-             2/(n + 2) of it is the spot's 1/r².\n\n"
+            ". Its noise is that of F, of the photons in one cell; Γ is the same for all of them. What remains with {paths} paths is \
+             bias: at 1 m {ours} for ours, of which 2/(n + 2) is the spot's 1/r² and the rest the fog and the width of the cell; \
+             {far} for the filter, because it is half as wide as the beam. One made for this beam would do better; it would have to \
+             be told how wide the beam is, which is what Γ says.\n\n"
         );
     }
     let blind = blindness(if plan.quick { 200_000 } else { 500_000 });
@@ -262,11 +269,11 @@ pub(super) fn section(plan: &Plan) -> Result<String, Failure> {
     Ok(page)
 }
 
-/// The number of paths from which on the first estimate is the best, 1 m from the spot.
+/// The number of paths from which on the first estimate is the best at the place with this index.
 #[must_use]
-pub fn best_from(measured: &Measured) -> Option<u64> {
+pub fn best_from(measured: &Measured, place: usize) -> Option<u64> {
     let is_best = |errors: &[f64; 3]| errors[0] < errors[1] && errors[0] < errors[2];
-    let best = measured.errors.iter().rev().take_while(|(_, errors)| is_best(&errors[1]));
+    let best = measured.errors.iter().rev().take_while(|(_, errors)| errors.get(place).is_some_and(is_best));
     best.last().map(|(paths, _)| *paths)
 }
 
