@@ -8,6 +8,7 @@
 //! | [`camera`] | the pinhole camera |
 //! | [`plume`] | an animation of smoke |
 //! | [`figures`] | figures of papers, rebuilt |
+//! | [`derivatives`] | second derivatives of the fluence by differences |
 //! | [`compare`] | how far two images are apart |
 //! | [`cli`] | the command line |
 
@@ -16,6 +17,7 @@ extern crate alloc;
 pub mod camera;
 pub mod cli;
 pub mod compare;
+pub mod derivatives;
 pub mod error;
 pub mod figures;
 pub mod mesh;

@@ -243,3 +243,50 @@ fn ctrl_c_keeps_the_image_so_far() {
     assert!(said(&output).contains("stopped early"), "{}", said(&output));
     assert_eq!(folder.names(), ["a.pfm"]);
 }
+
+#[test]
+fn a_probe_writes_a_row_per_point_and_refuses_what_it_cannot_answer() {
+    let folder = Folder::new("probe");
+    let quick = ["--grid-paths", "2000", "--grid-cells", "24"];
+    let run = |more: &[&str]| folder.run(&[&["probe", "hessian", SCENE], &quick[..], more].concat());
+    let output = run(&["--line", "0,-0.5,0 0,0.5,0", "--samples", "5", "-o", "line.csv", "--grid-out", "grid"]);
+    assert_eq!(output.status.code(), Some(0), "{}", said(&output));
+    assert!(said(&output).contains("5 points, in a grid of 24 x 24 x 24 cells filled by 2000 photons"));
+    let text = std::fs::read_to_string(folder.0.join("line.csv")).unwrap();
+    let rows: Vec<Vec<&str>> = text.lines().map(|line| line.split(',').collect()).collect();
+    assert_eq!(rows.len(), 6);
+    assert!(rows.iter().all(|row| row.len() == 25), "{text}");
+    assert_eq!(
+        (rows[0][4], rows[0][10], rows[0][13], rows[0][24]),
+        ("bound_xx", "bound_1", "difference_xx", "filtered_zz")
+    );
+    assert_eq!(rows[5][..3], ["0", "0.5", "0"]);
+    assert!(rows[1..].iter().flatten().all(|entry| entry.parse::<f64>().is_ok_and(f64::is_finite)), "{text}");
+
+    // From the file, and on standard output: the same. What has no neighbours stays empty.
+    let output = run(&["--at", "0,0.5,0", "--at", "-1,-1,-1", "-q", "--grid-in", "grid"]);
+    assert!(output.status.success() && output.stderr.is_empty(), "{}", said(&output));
+    let again = String::from_utf8(output.stdout).unwrap();
+    assert_eq!(again.lines().nth(1), text.lines().nth(5));
+    assert!(again.lines().nth(2).unwrap().contains(",,,,,,"), "{again}");
+    let output = run(&["--grid", "2x3x4", "-q", "--threads", "2"]);
+    assert_eq!(String::from_utf8(output.stdout).unwrap().lines().count(), 1 + 24);
+
+    for (arguments, reason) in [
+        (&["--at", "0,0,7"][..], "0,0,7 lies outside of the grid, which reaches from"),
+        (&["--line", "0,0,0 0,0,7"][..], "lies outside of the grid"),
+        (&["--at", "0,0"][..], "must look like \"0,1.8,4\""),
+        (&["--line", "0,0,0"][..], "a point, a space, another point"),
+        (&["--grid", "0x1x1"][..], "must look like 16x16x16"),
+        (&["--grid", "1000x1000x1000"][..], "at most 4000000 points"),
+        (&["--at", "0,0,0", "--grid", "2x2x2"][..], "cannot be used with"),
+        (&[][..], "--at <X,Y,Z>|--line <FROM TO>|--grid <NxNxN>"),
+        (&["--at", "0,0,0", "--grid-in", "grid", "--max-depth", "3"][..], "another scene, or with another --max-depth"),
+        (&["--at", "0,0,0", "--grid-in", "line.csv"][..], "this is no covariance grid"),
+        (&["--at", "0,0,0", "-o", "nowhere/a.csv"][..], "cannot be written"),
+    ] {
+        let output = run(arguments);
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}");
+        assert!(said(&output).contains(reason), "{arguments:?}: {}", said(&output));
+    }
+}

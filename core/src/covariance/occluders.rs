@@ -11,6 +11,9 @@
 //! towards the surface points (their edge) where they face the ray, along their normals where they face
 //! sideways. Closer than [`NEAREST`] of a cell, distances are not known. So shadow borders are as sharp as the
 //! lattice is fine, and no sharper: the limitation B shows in Fig. 17.
+//!
+//! Light that passes in the cell *beside* an occluder's is not cut off: a shadow border on a face between cells, or
+//! whose occluder fills so little of its last cell that no probing ray meets it there, leaves no trace.
 
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 
 use super::{Ending, Failure};
-use crate::figures::{self, Plan};
+use crate::figures::{self, Plan, belcour};
 
 /// Rebuilds the figures of a paper, with a page that explains them. Runs in the repository's top folder.
 #[derive(Debug, Args)]
@@ -17,7 +17,7 @@ pub struct FiguresArguments {
     #[arg(long)]
     pub quick: bool,
     /// Only this figure; may be repeated. The page then has these alone.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(4..=10))]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub only: Vec<u32>,
     /// Folder of the scenes.
     #[arg(long, value_name = "FOLDER", default_value = "examples/scenes")]
@@ -25,9 +25,9 @@ pub struct FiguresArguments {
     /// Threads; 0 is one per processor.
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub threads: usize,
-    /// Folder to write to; made if it is not there.
-    #[arg(short, long, value_name = "FOLDER", default_value = "examples/figures/jarosz")]
-    pub output: PathBuf,
+    /// Folder to write to; made if it is not there [default: that of the paper in examples/figures].
+    #[arg(short, long, value_name = "FOLDER")]
+    pub output: Option<PathBuf>,
     /// No list of what is being made.
     #[arg(short, long)]
     pub quiet: bool,
@@ -38,17 +38,30 @@ pub struct FiguresArguments {
 pub enum Paper {
     /// Jarosz et al. 2008, Radiance Caching for Participating Media: figures 4 to 10.
     Jarosz,
+    /// Belcour et al. 2014, A Local Frequency Analysis of Light Scattering and Absorption: figure 10.
+    Belcour,
 }
 
 pub(super) fn run(arguments: &FiguresArguments) -> Result<Ending, Failure> {
-    let Paper::Jarosz = arguments.paper;
-    figures::rebuild(&Plan {
+    let (name, numbers): (_, &[u32]) = match arguments.paper {
+        Paper::Jarosz => ("jarosz", &figures::NUMBERS),
+        Paper::Belcour => ("belcour", &belcour::NUMBERS),
+    };
+    if let Some(number) = arguments.only.iter().find(|number| !numbers.contains(number)) {
+        let all: Vec<String> = numbers.iter().map(u32::to_string).collect();
+        return Err(format!("--only {number}: the figures of {name} here are {}", all.join(", ")).into());
+    }
+    let plan = Plan {
         quick: arguments.quick,
         only: arguments.only.clone(),
         scenes: arguments.scenes.clone(),
-        output: arguments.output.clone(),
+        output: arguments.output.clone().unwrap_or_else(|| PathBuf::from("examples/figures").join(name)),
         threads: arguments.threads,
         quiet: arguments.quiet,
-    })?;
+    };
+    match arguments.paper {
+        Paper::Jarosz => figures::rebuild(&plan)?,
+        Paper::Belcour => belcour::rebuild(&plan)?,
+    }
     Ok(Ending::Done)
 }

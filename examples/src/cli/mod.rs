@@ -10,6 +10,7 @@ mod march;
 mod output;
 mod photon_beams;
 mod plume;
+mod probe;
 mod radiance_cache;
 mod records;
 pub(crate) mod render;
@@ -25,6 +26,7 @@ pub use figures::{FiguresArguments, Paper};
 pub use image_sampling::{ImageSampling, SamplingArguments};
 pub use photon_beams::{BeamArguments, Kernel};
 pub use plume::PlumeArguments;
+pub use probe::{HessianArguments, Probe, ProbeArguments};
 pub use radiance_cache::{CacheArguments, Kind, Single};
 pub use records::RecordsArguments;
 pub use render::{Method, RenderArguments};
@@ -47,6 +49,8 @@ pub enum Command {
     Records(RecordsArguments),
     /// Says how far an image is from a reference.
     Compare(CompareArguments),
+    /// Says in numbers what is in a scene.
+    Probe(ProbeArguments),
     /// Writes an animation: a plume of smoke, a volume and a scene per frame.
     Plume(PlumeArguments),
     /// Rebuilds the figures of a paper, with a page that explains them.
@@ -68,6 +72,7 @@ pub fn run(arguments: Arguments) -> ExitCode {
         Command::Render(arguments) => render::run(&arguments),
         Command::Records(arguments) => records::run(&arguments),
         Command::Compare(arguments) => compare::run(&arguments),
+        Command::Probe(arguments) => probe::run(&arguments),
         Command::Plume(arguments) => plume::run(&arguments),
         Command::Figures(arguments) => figures::run(&arguments),
     };

@@ -1,5 +1,5 @@
-//! Figures of Jarosz et al. 2008, *Radiance Caching for Participating Media* (J), rebuilt with the scenes here, and a page
-//! that explains them. Every number on the page is measured as it is made.
+//! Figures of papers, rebuilt with the scenes here, and pages that explain them: of Jarosz et al. 2008, *Radiance Caching
+//! for Participating Media* (J), and of Belcour et al. 2014 (B). Every number on a page is measured as it is made.
 //!
 //! | file | holds |
 //! |---|---|
@@ -7,9 +7,13 @@
 //! | [`extrapolation`] | Fig. 5: records carried in four ways |
 //! | `rendered` | Fig. 6 to 10: pictures beside path tracing |
 //! | `records` | where records lie |
+//! | [`belcour`] | the figures of B |
+//! | [`hessian`] | B's Fig. 10: second derivatives of the fluence |
 //! | `montage`, `plot` | pictures made of pictures; line plots |
 
+pub mod belcour;
 pub mod extrapolation;
+pub mod hessian;
 mod montage;
 mod plot;
 pub mod radius;
@@ -25,6 +29,9 @@ use crate::cli::Failure;
 use extrapolation::{Slice, WAYS};
 use plot::{BLACK, BLUE, GREEN, GREY, Line, ORANGE, PURPLE, Plot};
 use radius::{Claims, Radii, TOLERANCE};
+
+/// Numbers of J's figures.
+pub const NUMBERS: [u32; 7] = [4, 5, 6, 7, 8, 9, 10];
 
 /// What to make, and where.
 #[derive(Debug, Clone)]
@@ -60,13 +67,36 @@ impl Plan {
     }
 }
 
-/// Makes the figures and `README.md`, the page.
+/// Makes a page of figures by `body`, with `head` above it, which is told how many seconds all took.
+fn together(
+    plan: &Plan,
+    head: fn(&Plan, f64) -> String,
+    body: impl FnOnce(&Plan) -> Result<String, Failure>,
+) -> Result<(), Failure> {
+    let clock = Instant::now();
+    std::fs::create_dir_all(&plan.output).map_err(|e| format!("{}: {e}", plan.output.display()))?;
+    let page = body(plan)?;
+    let head = head(plan, clock.elapsed().as_secs_f64());
+    plan.write("README.md", format!("{head}{page}").trim_end())?;
+    plan.say(&format!("wrote {}", plan.output.join("README.md").display()));
+    Ok(())
+}
+
+/// A share as text.
+fn percent(share: f64) -> String {
+    let decimals = if share.abs() < 0.1 { 1 } else { 0 };
+    format!("{:.decimals$} %", 100.0 * share)
+}
+
+/// Makes J's figures and `README.md`, the page.
 ///
 /// # Errors
 /// Scenes that are missing, files that cannot be written, a render that was stopped.
 pub fn rebuild(plan: &Plan) -> Result<(), Failure> {
-    let clock = Instant::now();
-    std::fs::create_dir_all(&plan.output).map_err(|e| format!("{}: {e}", plan.output.display()))?;
+    together(plan, head, body)
+}
+
+fn body(plan: &Plan) -> Result<String, Failure> {
     let mut page = String::new();
     if plan.wants(4) {
         plan.say("figure 4");
@@ -88,10 +118,7 @@ pub fn rebuild(plan: &Plan) -> Result<(), Failure> {
     if plan.wants(10) {
         page += &rendered::road(plan)?;
     }
-    let head = head(plan, clock.elapsed().as_secs_f64());
-    plan.write("README.md", format!("{head}{page}").trim_end())?;
-    plan.say(&format!("wrote {}", plan.output.join("README.md").display()));
-    Ok(())
+    Ok(page)
 }
 
 fn head(plan: &Plan, seconds: f64) -> String {

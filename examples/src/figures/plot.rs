@@ -9,6 +9,9 @@ const RIGHT: f64 = 12.0;
 const TOP: f64 = 26.0;
 const BOTTOM: f64 = 40.0;
 
+/// Digits of powers.
+const SUPERSCRIPTS: [char; 10] = ['⁰', '¹', '²', '³', '⁴', '⁵', '⁶', '⁷', '⁸', '⁹'];
+
 /// Colours of lines that also those tell apart who see few (Okabe and Ito 2008).
 pub(super) const GREY: &str = "#bbbbbb";
 pub(super) const BLACK: &str = "#000000";
@@ -45,12 +48,31 @@ impl Plot<'_> {
 
     /// The plot as a file's text.
     pub(super) fn svg(&self) -> String {
+        let ticks = (0..=10).map(|k| self.x[0] + (self.x[1] - self.x[0]) * f64::from(k) / 10.0);
+        self.drawn(ticks.map(|x| (x, ((x * 1e3).round() / 1e3).to_string())).collect())
+    }
+
+    /// The plot with a logarithmic axis across, too.
+    pub(super) fn svg_over_decades(&self) -> String {
+        let logarithms = |points: &[[f64; 2]]| points.iter().map(|[x, y]| [x.log10(), *y]).collect();
+        let lines = self.lines.iter().map(|line| Line { points: logarithms(&line.points), ..*line }).collect();
+        let x = self.x.map(f64::log10);
+        let decades = (x[0].ceil() as i32)..=(x[1].floor() as i32);
+        let ticks = decades.map(|power| {
+            let digits = power.to_string().replace('-', "⁻");
+            let raised = digits.chars().map(|c| c.to_digit(10).map_or(c, |d| SUPERSCRIPTS[d as usize]));
+            (f64::from(power), format!("10{}", raised.collect::<String>()))
+        });
+        Plot { x, lines, ..*self }.drawn(ticks.collect())
+    }
+
+    fn drawn(&self, ticks: Vec<(f64, String)>) -> String {
         let mut svg = format!(
             "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {WIDTH} {HEIGHT}\" width=\"{WIDTH}\" \
              height=\"{HEIGHT}\" font-family=\"sans-serif\" font-size=\"12\">\n\
              <rect width=\"{WIDTH}\" height=\"{HEIGHT}\" fill=\"white\"/>\n"
         );
-        self.grid(&mut svg);
+        self.grid(&mut svg, &ticks);
         let (bottom, right) = (HEIGHT - BOTTOM, WIDTH - RIGHT);
         let (w, h) = (right - LEFT, bottom - TOP);
         // Writing to a string cannot fail.
@@ -95,17 +117,15 @@ impl Plot<'_> {
         svg
     }
 
-    fn grid(&self, svg: &mut String) {
+    fn grid(&self, svg: &mut String, ticks: &[(f64, String)]) {
         let bottom = HEIGHT - BOTTOM;
-        for k in 0..=10 {
-            let x = self.x[0] + (self.x[1] - self.x[0]) * f64::from(k) / 10.0;
-            let [at, _] = self.place([x, self.y[0]]);
+        for (x, label) in ticks {
+            let [at, _] = self.place([*x, self.y[0]]);
             let _ = writeln!(
                 svg,
                 "<path d=\"M{at:.1} {TOP}V{bottom}\" stroke=\"#ddd\"/>\
-                 <text x=\"{at:.1}\" y=\"{}\" text-anchor=\"middle\">{}</text>",
-                bottom + 15.0,
-                (x * 1e3).round() / 1e3
+                 <text x=\"{at:.1}\" y=\"{}\" text-anchor=\"middle\">{label}</text>",
+                bottom + 15.0
             );
         }
         let (first, last) = (self.y[0].log10().floor() as i32, self.y[1].log10().ceil() as i32);
