@@ -21,7 +21,7 @@ const WIDEST: f32 = 4.0;
 const REACH: i64 = 12;
 
 /// Relative difference of depth beyond which pixels see different things.
-const SAME_DEPTH: f32 = 0.1;
+const SAME_DEPTH: f32 = 0.02;
 
 /// Least share of computed pixels, where light does not vary.
 const LEAST_SHARE: f32 = 1.0 / 12.0;
