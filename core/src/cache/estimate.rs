@@ -26,6 +26,9 @@ use crate::transmittance::thickness::{Marching, transmittance};
 /// variance without bound.
 const MIN_COSINE: f32 = 0.05;
 
+/// Surfaces seen under less than this cosine say nothing of how near others are: they may be the same one, bent.
+const GRAZING: f32 = 0.15;
+
 /// A number whose multiples, wrapped, are even beside a golden-ratio lattice: the third coordinate.
 const THIRD: f32 = 0.414_213_56;
 
@@ -241,7 +244,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
     ) -> (Sums, Facing) {
         let Looks { count, guide, mut learnt } = paths.into();
         let (mut sums, mut scattered, mut turn) = (Sums::default(), Cones::default(), Gradient::ZERO);
-        let mut halves = Halves::default();
+        let (mut halves, mut nearest) = (Halves::default(), f32::INFINITY);
         let mut child = Generator::child(rng);
         let (frame, walk, shift, third) = (Frame::around(normal), self.walker(), uniform2(rng), uniform(rng));
         let share = 1.0 / count.max(1) as f32;
@@ -264,6 +267,9 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
             // How the cosine changes as what is seen stays.
             let tilt = (to_light * cosine - normal) / cosine.max(MIN_COSINE);
             if let Some(hit) = &end {
+                if cosine > GRAZING {
+                    nearest = nearest.min(hit.distance);
+                }
                 let radiance = self.outgoing(&ray, hit, &mut child);
                 let arrival = Arrival::from_surface(&ray, hit, radiance, 1.0, self.world.medium, marching);
                 if let Some(arrival) = arrival {
@@ -285,6 +291,8 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
         }
         sums.merge(&scattered.sums());
         sums.gradient = sums.gradient * halves.trust();
+        // What a near surface hides and shows changes light within its distance, and no gradient knows of it.
+        sums.gradient_norms = sums.gradient_norms.max(sums.value / nearest);
         (sums, Facing { normal, turn })
     }
 
