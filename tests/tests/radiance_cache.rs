@@ -16,7 +16,7 @@ use fogbow::transmittance::thickness::Steps;
 use fogbow::{multiple_scatter, single_scatter::Sums};
 use fogbow_std::film::Film;
 use fogbow_std::progress::Control;
-use fogbow_std::radiance_cache::{Effort, Outcome, RadianceCaches, Settings, fill};
+use fogbow_std::radiance_cache::{Effort, Outcome, RadianceCaches, Settings, decode, encode, fill};
 use fogbow_std::tiles;
 use fogbow_tests::hosts::{Ball, Body, Filled};
 
@@ -253,8 +253,13 @@ fn a_fill_cancelled_on_its_way_leaves_caches_that_serve_and_can_be_filled() {
         // The last questions only improve records that are there.
         assert!(misses > 0 || tenths == 8, "{questions}: nothing was missing");
 
+        // A file remembers that records are still to be estimated anew.
+        let mut loaded = decode(&encode(&caches, 7), settings(), 7).unwrap();
+        assert_eq!(loaded.settled, [0; 5]);
+        let again = fill_in(&mut loaded, &fog(), &Control::default());
         let outcome = fill_in(&mut caches, &fog(), &Control::default());
         assert!(!outcome.cancelled);
+        assert_eq!((again.computed, picture(&loaded, 2)), (outcome.computed, picture(&caches, 2)));
         let (film, _, misses) = picture(&caches, 2);
         assert!((mean(&film) / expected - 1.0).abs() < 0.05 && misses == 0, "{questions}: {misses} misses");
     }

@@ -1,4 +1,4 @@
-//! An animation: a plume of smoke that rises in a room.
+//! An animation: a plume of smoke that rises in a hazy room.
 //!
 //! | file | holds |
 //! |---|---|
@@ -26,6 +26,9 @@ const SOURCE_RADIUS: f32 = 0.1;
 /// Its height above the floor, and its thickness to either side.
 const SOURCE_HEIGHT: f32 = 0.06;
 const SOURCE_THICKNESS: f32 = 0.03;
+
+/// Least density: the room is full of haze.
+const HAZE: f32 = 0.02;
 
 /// The source flickers, which makes the plume turbulent.
 const FLICKER: FractalNoise = FractalNoise {
@@ -79,7 +82,8 @@ impl Plume {
         while self.steps < until {
             self.step();
         }
-        Volume { size: [self.cells; 3], values: Values::F32(self.fluid.density.clone()) }
+        let in_haze = |density: &f32| HAZE + (1.0 - HAZE) * density;
+        Volume { size: [self.cells; 3], values: Values::F32(self.fluid.density.iter().map(in_haze).collect()) }
     }
 
     fn step(&mut self) {
@@ -138,7 +142,7 @@ mod tests {
         let changes: Vec<f32> = frames
             .windows(2)
             .map(|pair| {
-                let smoke: f32 = pair[0].iter().sum();
+                let smoke: f32 = pair[0].iter().map(|density| density - HAZE).sum();
                 pair[0].iter().zip(&pair[1]).map(|(a, b)| (a - b).abs()).sum::<f32>() / smoke
             })
             .collect();

@@ -8,7 +8,7 @@
 //! | 8 | 4 | [`VERSION`] |
 //! | 12 | 4 | number of parts `p` |
 //! | 16 | 4 | number of views `v` |
-//! | 20 | 4 | 0 |
+//! | 20 | 4 | 1 if a fill was cancelled and its records are still to be estimated anew, else 0 |
 //! | 24 | 8 | tag: what the caches were made for |
 //! | 32 | 8 | CRC-64 of bytes 0 to 32 and of both tables below |
 //! | 40 | 32 p | a part each: number of the cache, degree, tolerance (`f32`), samples per record, least and greatest radius (`f32`), length in bytes (8) |
@@ -31,7 +31,7 @@ use super::{Cache, Effort, RadianceCaches, Settings};
 const MAGIC: [u8; 8] = *b"\x89FOGSET\n";
 
 /// Of the layout above.
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 
 /// Length of the header, of a part's row and of a view's (bytes).
 const HEADER: usize = 40;
@@ -240,7 +240,10 @@ pub fn encode(caches: &RadianceCaches, tag: u64) -> Vec<u8> {
     }
     caches.views.iter().for_each(|view| tables.extend(view.to_le_bytes()));
     let mut file = MAGIC.to_vec();
-    [VERSION, count, caches.views.len() as u32, 0].iter().for_each(|word| file.extend(word.to_le_bytes()));
+    let is_open = caches.settled != caches.all_counts();
+    [VERSION, count, caches.views.len() as u32, u32::from(is_open)]
+        .iter()
+        .for_each(|word| file.extend(word.to_le_bytes()));
     file.extend(tag.to_le_bytes());
     file.extend(checksum(&file, &tables).to_le_bytes());
     file.extend(tables);
@@ -304,7 +307,9 @@ pub fn decode(file: &[u8], settings: Settings, tag: u64) -> Result<RadianceCache
     fill(&mut caches.coarse_multiple, &rows, 4, tag)?;
     fill(&mut caches.coarse_irradiance, &rows, 5, tag)?;
     caches.views = views;
-    caches.settled = caches.all_counts();
+    if word(file, 20) == 0 {
+        caches.settled = caches.all_counts();
+    }
     Ok(caches)
 }
 
