@@ -254,7 +254,7 @@ pub(super) fn section(plan: &Plan) -> Result<String, Failure> {
             page,
             ". Its noise is that of F, of the photons in one cell; Γ is the same for all of them. What remains with {paths} paths is \
              bias: at 1 m {ours} for ours, of which 2/(n + 2) is the spot's 1/r² and the rest the fog and the width of the cell; \
-             {far} for the filter, because it is half as wide as the beam. One made for this beam would do better; it would have to \
+             {far} for the filter, because it is about half as wide as the beam. One made for this beam would do better; it would have to \
              be told how wide the beam is, which is what Γ says.\n\n"
         );
     }
