@@ -1,0 +1,164 @@
+#!/usr/bin/env python3
+"""Holds the uses of covariance grids against uniform sampling: long runs, not part of CI.
+
+    python3 tests/acceptance/covariance.py steps [--spp N] [--paths N]
+    python3 tests/acceptance/covariance.py image [--spp N] [--paths N]
+    python3 tests/acceptance/covariance.py beams [SCENE...] [--passes N]
+    python3 tests/acceptance/covariance.py determinism
+
+Needs target/release/fogbow, numpy and OpenEXR; scenes are those of examples/scenes at 128x128. Errors are measured against
+two independent converged renders A and B: the squared error of an image I is the mean of (I - A)(I - B), over squared
+light plus a twentieth of the picture's mean, so that the converged renders' own noise drops out.
+
+steps        nave, light scattered once by the medium: samples and CPU seconds of uniform steps and of --step covariance at
+             equal error (at least 5 times fewer, 3 times less; the grid's filling is told apart).
+image        lantern, light scattered by the medium, --method march: 43 % of the pixels at most, no larger error, less CPU time.
+beams        lantern, caustic, nave: relMSE of --kernel covariance over that of progressive beams after equal passes, in the half of
+             the picture where the predicted density of samples is below its median (at most 0.5) and in the other (at most 1.1),
+             and at equal CPU time (below 1), where progressive beams' error is taken to fall with time as measured from half as many passes.
+determinism  the same bytes with 1, 2 and 7 threads of every way that uses covariances.
+
+Exit status 1 when a line fails.
+"""
+import argparse, hashlib, json, os, pathlib, subprocess, sys, tempfile
+import numpy as np
+import OpenEXR
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+PROGRAM = pathlib.Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target")) / "release/fogbow"
+FOLDER = pathlib.Path(tempfile.mkdtemp(prefix="fogbow-covariance-"))
+MEDIUM = ("medium_single", "medium_multiple")
+
+
+def render(scene, name, *arguments):
+    image, statistics = FOLDER / f"{name}.exr", FOLDER / f"{name}.json"
+    subprocess.run([PROGRAM, "render", ROOT / f"examples/scenes/{scene}.xml", "--size", "128x128", "--aov", "-q", "-o", image,
+                    "--stats", statistics, *map(str, arguments)], check=True)
+    channels = OpenEXR.File(str(image)).channels()
+
+    def layer(name):
+        if name in channels:
+            return channels[name].pixels[..., :3].astype(float)
+        return np.stack([channels[f"{name}.{c}"].pixels for c in "RGB"], -1).astype(float)
+
+    numbers = json.loads(statistics.read_text())
+    seconds = {phase: numbers["seconds"][phase]["cpu"] for phase in numbers["seconds"]}
+    return layer, seconds, numbers
+
+
+def light(layer, names=MEDIUM):
+    return sum(layer(name) for name in names).mean(-1)
+
+
+def squared(image, halves, where=None):
+    a, b = halves
+    mean = 0.5 * (a + b)
+    error = (image - a) * (image - b) / (mean ** 2 + (0.05 * mean.mean()) ** 2)
+    return float(error[where].mean() if where is not None else error.mean())
+
+
+def report(name, passed, text):
+    print(f"{name:24s} {'ok  ' if passed else 'FAIL'} {text}", flush=True)
+    return 0 if passed else 1
+
+
+def steps(options):
+    march = ("--method", "march", "--max-depth", 2)
+    one = ("medium_single",)
+    halves = [light(render("nave", f"truth-{s}", *march, "--step-length", 0.25, "--spp", 128, "--seed", s)[0], one) for s in (101, 102)]
+
+    def curve(name, ways):
+        points = []
+        for i, way in enumerate(ways):
+            layer, seconds, numbers = render("nave", f"{name}-{i}", *march, "--spp", options.spp, *way)
+            samples = float(layer("steps").mean()) * options.spp
+            error = max(squared(light(layer, one), halves), 1e-9) ** 0.5
+            points.append((error, samples, seconds["render"], seconds.get("fill grid", 0.0)))
+            print(f"  {name:12s} {' '.join(map(str, way)):40s} error {error:.4f}  {samples:.1f} samples  {seconds['render']:.2f} CPU s")
+        return sorted(points)
+
+    uniform = curve("uniform", [("--step-length", length) for length in (1.2, 0.6, 0.3, 0.15, 0.075)])
+    grid = ("--grid-paths", options.paths, "--step-length", 8)
+    ours = curve("covariance", [("--step", "covariance", "--steps", n, *grid) for n in (8, 16, 32)])
+    curve("frequency", [("--step", "frequency", *grid)])
+    curve("64 against", [("--step", "covariance", *grid, "--grid-cells", n) for n in (32, 128)])
+    errors, samples, seconds, _ = map(np.log, np.maximum(np.array(uniform).T, 1e-9))
+    failures = 0
+    for error, count, cpu, fill in ours:
+        if not errors[0] <= np.log(error) <= errors[-1]:
+            print(f"  error {error:.4f} is outside what uniform steps reached")
+            continue
+        fewer = np.exp(np.interp(np.log(error), errors, samples)) / count
+        less = np.exp(np.interp(np.log(error), errors, seconds)) / cpu
+        failures += report("steps", fewer >= 5 and less >= 3, f"error {error:.4f}: {fewer:.2f} times fewer samples, {less:.2f} times less CPU time "
+                           f"(and {fill:.2f} s to fill the grid)")
+    return failures
+
+
+def image(options):
+    march = ("--method", "march", "--spp", options.spp)
+    halves = [light(render("lantern", f"truth-{s}", "--spp", 2048, "--seed", s)[0]) for s in (101, 102)]
+    full, cost, _ = render("lantern", "full", *march)
+    part, less, _ = render("lantern", "part", *march, "--image-sampling", "covariance", "--grid-paths", options.paths)
+    share = float(part("computed").mean())
+    errors = [squared(light(layer), halves) ** 0.5 for layer in (full, part)]
+    totals = [sum(seconds.values()) for seconds in (cost, less)]
+    bias = [float((light(layer) - 0.5 * sum(halves)).mean() / halves[0].mean()) for layer in (full, part)]
+    return report("image", share <= 0.43 and errors[1] <= errors[0] and totals[1] < totals[0],
+                  f"{100 * share:.1f} % of pixels: error {errors[1]:.3f} instead of {errors[0]:.3f}, {totals[1]:.2f} CPU s instead of "
+                  f"{totals[0]:.2f}, bias {100 * bias[1]:+.1f} % instead of {100 * bias[0]:+.1f} %")
+
+
+def beams(options):
+    failures = 0
+    for scene in options.scenes or ("lantern", "caustic", "nave"):
+        method, spp = ("--method", "photon-beams"), 8 * options.passes
+        truth = (*method, "--spp", 1536, "--radius", {"nave": 0.1}.get(scene, 0.008))
+        halves = [light(render(scene, f"{scene}-truth-{s}", *truth, "--seed", s)[0]) for s in (101, 102)]
+        plan = render(scene, f"{scene}-plan", "--spp", 1, "--image-sampling", "covariance")[0]
+        density = plan("density").mean(-1)
+        smooth = density <= np.median(density)
+        early = render(scene, f"{scene}-early", *method, "--spp", spp // 2)
+        old = render(scene, f"{scene}-old", *method, "--spp", spp)
+        new = render(scene, f"{scene}-new", *method, "--spp", spp, "--kernel", "covariance")
+        of = lambda rendered, where: max(squared(light(rendered[0]), halves, where), 1e-9)
+        times = [sum(rendered[1].values()) for rendered in (old, new)]
+        for name, where, bound in (("smooth half", smooth, 0.5), ("other half", ~smooth, 1.1)):
+            ratio = of(new, where) / of(old, where)
+            power = np.log(of(early, where) / of(old, where)) / np.log(2)
+            equal = ratio * (times[1] / times[0]) ** power
+            passed = ratio <= bound and (equal < 1 or where is not smooth)
+            failures += report(f"{scene} {name}", passed, f"relMSE {of(new, where):.4f} instead of {of(old, where):.4f}: ratio {ratio:.2f}, at equal "
+                               f"CPU time {equal:.2f} ({times[1]:.1f} s, {times[0]:.1f} s)")
+    return failures
+
+
+def determinism(_):
+    ways = {
+        "march": ("--method", "march", "--step", "covariance"),
+        "beams": ("--method", "photon-beams", "--kernel", "covariance"),
+        "image": ("--method", "path", "--image-sampling", "covariance"),
+    }
+    failures = 0
+    for name, way in ways.items():
+        found = set()
+        for threads in (1, 2, 7):
+            render("noise-box", name, *way, "--spp", 8, "--grid-paths", 20000, "--threads", threads)
+            found.add(hashlib.sha256((FOLDER / f"{name}.exr").read_bytes()).hexdigest())
+        failures += report(name, len(found) == 1, f"{len(found)} different files with 1, 2 and 7 threads")
+    return failures
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("what", choices=("steps", "image", "beams", "determinism"))
+    parser.add_argument("scenes", nargs="*")
+    parser.add_argument("--spp", type=int, default=4)
+    parser.add_argument("--paths", type=int, default=1_000_000)
+    parser.add_argument("--passes", type=int, default=8)
+    options = parser.parse_args()
+    return 1 if globals()[options.what](options) else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
