@@ -13,12 +13,13 @@ const SCENES: [&str; 3] = ["lantern", "caustic", "nave"];
 const EDGES: [&str; 3] = ["16", "32", "64"];
 
 /// How much is done.
-struct Effort {
+#[derive(Clone, Copy)]
+struct Effort<'a> {
     size: [u32; 2],
-    passes: &'static str,
-    /// Passes of each judge, and by how much their radius is smaller.
-    judging: &'static str,
-    paths: &'static str,
+    passes: &'a str,
+    /// Passes of each judge.
+    judging: &'a str,
+    paths: &'a str,
 }
 
 struct Blurred {
@@ -29,7 +30,13 @@ struct Blurred {
     fill: f64,
 }
 
-fn blurred(plan: &Plan, scene: &str, effort: &Effort, judges: &Judges, options: &[&str]) -> Result<Blurred, Failure> {
+fn blurred(
+    plan: &Plan,
+    scene: &str,
+    effort: &Effort<'_>,
+    judges: &Judges,
+    options: &[&str],
+) -> Result<Blurred, Failure> {
     let words: Vec<&str> = common(effort.passes).into_iter().chain(options.iter().copied()).collect();
     let shot = rendered::shot(plan, &rendered::scene_of(plan, scene), effort.size, &words)?;
     let medium = shot.medium();
@@ -37,7 +44,7 @@ fn blurred(plan: &Plan, scene: &str, effort: &Effort, judges: &Judges, options: 
     Ok(Blurred { medium, overall, smooth, cpu: shot.seconds("render"), fill: shot.seconds("fill grid") })
 }
 
-fn common(passes: &'static str) -> Vec<&'static str> {
+fn common(passes: &str) -> Vec<&str> {
     vec!["--method", "photon-beams", "--pass-samples", "1", "--aov", "--spp", passes]
 }
 
@@ -53,7 +60,7 @@ const HEAD: &str =
 /// The section of the page.
 pub(super) fn section(plan: &Plan) -> Result<String, Failure> {
     let effort = if plan.quick {
-        Effort { size: [64, 64], passes: "8", judging: "24", paths: "20000" }
+        Effort { size: [64, 64], passes: "8", judging: "56", paths: "20000" }
     } else {
         Effort { size: [160, 160], passes: "32", judging: "256", paths: "200000" }
     };
@@ -71,6 +78,11 @@ pub(super) fn section(plan: &Plan) -> Result<String, Failure> {
         };
         let ours = of("32")?;
         line(&mut table, scene, "progressive", &usual);
+        // As much time as with covariances and their grid.
+        let passes = effort.passes.parse::<f64>().unwrap_or(1.0) * (ours.cpu + ours.fill) / usual.cpu.max(1e-9);
+        let passes = (passes.round() as u32).max(1).to_string();
+        let longer = blurred(plan, scene, &Effort { passes: &passes, ..effort }, &judges, &[])?;
+        line(&mut table, scene, &format!("progressive, {passes} passes"), &longer);
         line(&mut table, scene, "covariance", &ours);
         let comma = if gains.is_empty() { "" } else { "; " };
         let [smooth, overall] = [usual.smooth / ours.smooth, usual.overall / ours.overall];
@@ -94,7 +106,8 @@ pub(super) fn section(plan: &Plan) -> Result<String, Failure> {
          pixel, {edge} × {edge} pixels: left `--kernel progressive`, in the middle `--kernel covariance` with 32 cells along \
          the longest side of its grid and {paths} photons to fill it, right the mean of two progressive renders of {judging} passes with radii that \
          start at half, which stand in for the truth. From above: lantern, caustic, nave.\n\n{table}\n\
-         Progressive over covariance, relMSE after equal passes: {gains}. The smooth half are the pixels around which the \
+         Progressive over covariance, relMSE after equal passes: {gains}. The lines with more passes take about as much time as \
+         covariances and their grid. The smooth half are the pixels around which the \
          truth, evened out over 5 × 5, varies less than its median ({} of all). Wider beams cover more pixels, so \
          that passes take longer.\n\nGrids of 16, 32 and 64 cells:\n\n{grids}\n",
         percent(0.5),

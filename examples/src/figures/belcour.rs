@@ -47,8 +47,8 @@ pub fn rebuild(plan: &Plan) -> Result<(), Failure> {
 /// Fig. 6: what scattering does to covariances, as a test measures it.
 fn scattering(_: &Plan) -> Result<String, Failure> {
     Ok("## Fig. 6: scattering\n\n\
-        A Gaussian light field with covariance diagonal (3, 3, 6, 6) in (u, v, θ, φ) and 1.5, 1 as its correlations of u with \
-        θ and v with φ, scattered by the Henyey–Greenstein lobe of g = 0.8 at angle α: the diagonal afterwards, predicted by \
+        A Gaussian light field with covariance diagonal (3, 3, 6, 6) in (u, v, θ, φ) and, off it, 1.5 for u with \
+        θ and 1 for v with φ, scattered by the Henyey–Greenstein lobe of g = 0.8 at angle α: the diagonal afterwards, predicted by \
         the covariance operators and measured as that of the scattered field's spectrum, by FFT in four dimensions. These \
         numbers are not made with this page: they come from the test \
         `scattering_by_henyey_greenstein_is_near` in `tests/tests/light_fields.rs`, which prints them (`cargo test --release --test \
@@ -56,8 +56,8 @@ fn scattering(_: &Plan) -> Result<String, Failure> {
         | α | predicted | measured, B's kernel (a convolution) | measured, with true directions |\n|---|---|---|---|\n\
         | 0 | 2.701, 2.867, 1.213, 1.213 | 2.688, 2.861, 1.003, 1.003 | 2.688, 2.862, 1.003, 1.033 |\n\
         | 0.2 | 2.574, 2.854, 0.878, 0.728 | 2.582, 2.861, 1.007, 1.003 | 2.582, 2.862, 1.007, 1.035 |\n\n\
-        In space the prediction is within 0.5 %, in angle off by 21 % at most at α = 0 and by 30 % at α = 0.2: the lobe \
-        has a peak that no Gaussian has, and the window of angles is finite.\n\n"
+        In space the prediction is within 0.5 %, in angle off by 21 % at most at α = 0 and by 30 % at α = 0.2: \
+        no Gaussian is the lobe.\n\n"
         .to_owned())
 }
 

@@ -13,7 +13,7 @@ const SHARE: &str = "0.4";
 /// The section of the page.
 pub(super) fn section(plan: &Plan) -> Result<String, Failure> {
     // As many samples of the medium: two fifths of the pixels with `all`, all pixels with `fewer`.
-    let (edge, all, fewer, judging) = if plan.quick { (96, "5", "2", "10") } else { (192, "20", "8", "96") };
+    let (edge, all, fewer, judging) = if plan.quick { (128, "5", "2", "10") } else { (192, "20", "8", "96") };
     let size = [edge, edge];
     let scene = rendered::scene_of(plan, "lantern");
     let shot = |options: &[&str]| {
@@ -33,7 +33,7 @@ pub(super) fn section(plan: &Plan) -> Result<String, Failure> {
     let bright = |image: &Image| montage::brightened(image, gain);
     let (filled, whole) = (adaptive.medium(), full.medium());
     let row = |images: [&Image; 3]| {
-        let by = if plan.quick { 2 } else { 1 };
+        let by = 1;
         let images = images.into_iter().map(|image| montage::enlarged(image, by)).collect::<Result<Vec<_>, _>>()?;
         montage::beside(&images)
     };

@@ -23,6 +23,9 @@ const PIXELS: u32 = 384;
 /// Decades that the colours of the fluence span.
 const DECADES: f32 = 3.0;
 
+/// The same of `√tr Γ`.
+const FREQUENCY_DECADES: f32 = 2.0;
+
 /// Dark to bright, and as bright in grey.
 const COLOURS: [[f32; 3]; 6] =
     [[0.0, 0.0, 0.02], [0.12, 0.02, 0.2], [0.45, 0.03, 0.15], [0.85, 0.16, 0.03], [0.98, 0.5, 0.03], [0.98, 0.97, 0.6]];
@@ -74,7 +77,7 @@ fn values(filled: &Filled, index: usize) -> Option<[f32; 2]> {
 }
 
 /// Values on the slice along the nave, through its middle: across, then down, and what is there.
-fn slice(filled: &Filled) -> Result<[Vec<Option<f32>>; 2], Failure> {
+fn slice(filled: &Filled) -> [Vec<Option<f32>>; 2] {
     let view = filled.grid.view();
     let (lattice, [nx, ny, _]) = (view.lattice(), view.lattice().size());
     let (low, cell, size) = (lattice.bounds().min, lattice.cell(), lattice.bounds().size());
@@ -89,7 +92,7 @@ fn slice(filled: &Filled) -> Result<[Vec<Option<f32>>; 2], Failure> {
             both[1].push(found.map(|v| v[1]));
         }
     }
-    Ok(both)
+    both
 }
 
 fn greatest(values: &[Option<f32>]) -> f32 {
@@ -109,7 +112,7 @@ fn picture(filled: &Filled, values: &[Option<f32>], share: impl Fn(f32) -> f32) 
 
 /// What is said about a grid.
 struct Said {
-    /// Volume of cells that more than 1 % of the greatest fluence lights (m³), and the mean of `√tr Γ` there, by flux.
+    /// Volume of cells with more than a tenth of the greatest fluence (m³), and the mean of `√tr Γ` there, by flux.
     volume: f64,
     frequency: f64,
 }
@@ -146,18 +149,23 @@ fn noise(a: &Filled, b: &Filled) -> f64 {
 pub(super) fn section(plan: &Plan) -> Result<String, Failure> {
     let paths = if plan.quick { 200_000 } else { 1_000_000 };
     let (mut rows, mut table) = (Vec::new(), String::new());
-    let mut limits = None;
+    let mut both = Vec::new();
     for edge in EDGES {
-        let filled = fill(plan, edge, paths, 0)?;
-        let other = fill(plan, edge, paths, 1)?;
-        let [fluences, frequencies] = slice(&filled)?;
-        // The same colours for both grids.
-        let [most, highest] = *limits.get_or_insert_with(|| [greatest(&fluences), greatest(&frequencies)]);
+        both.push((fill(plan, edge, paths, 0)?, fill(plan, edge, paths, 1)?));
+    }
+    // The same colours for both grids: those of the finer one.
+    let [fluences, frequencies] = match both.last() {
+        Some((finest, _)) => slice(finest),
+        None => return Err("no grids".into()),
+    };
+    let [most, highest] = [greatest(&fluences), greatest(&frequencies)];
+    for (filled, other) in &both {
+        let [fluences, frequencies] = slice(filled);
         rows.push(montage::beside(&[
-            picture(&filled, &fluences, |f| 1.0 + (f / most).log10() / DECADES)?,
-            picture(&filled, &frequencies, |f| f / highest)?,
+            picture(filled, &fluences, |f| 1.0 + (f / most).log10() / DECADES)?,
+            picture(filled, &frequencies, |f| 1.0 + (f / highest).log10() / FREQUENCY_DECADES)?,
         ])?);
-        let Said { volume, frequency } = said(&filled, most);
+        let Said { volume, frequency } = said(filled, most);
         let [x, y, z] = filled.grid.view().lattice().size();
         let cell = filled.grid.view().lattice().cell();
         // Writing to a string cannot fail.
@@ -165,18 +173,18 @@ pub(super) fn section(plan: &Plan) -> Result<String, Failure> {
             table,
             "| {x} × {y} × {z} | {:.2} m | {volume:.0} m³ | {frequency:.2} m⁻¹ | {} | {:.1} s |",
             cell.x,
-            percent(noise(&filled, &other)),
+            percent(noise(filled, other)),
             filled.cpu,
         );
     }
     montage::save(&plan.output.join("fig-08-slices.png"), &montage::above(&rows)?, 0.0)?;
-    let [most, highest] = limits.unwrap_or([0.0; 2]);
     Ok(format!(
         "## Fig. 8: a covariance grid\n\n![fluence and frequencies](fig-08-slices.png)\n\nThe nave (`nave.xml`, light scattered at \
          most once), cut along its middle: left the fluence, in {DECADES} decades up to {most:.3} W·m⁻²; right √tr Γ, the \
-         bandwidth of that light in space, from 0 to {highest:.2} cycles per metre. Above {} cells along the longest side, \
-         below {}; {paths} photons each. Grey cells have seen none. Frequencies are high along the edges of the shaft that \
-         the round window lets in and low inside of it, where the fluence is as high.\n\n\
+         bandwidth of that light in space, in {FREQUENCY_DECADES} decades up to {highest:.2} cycles per metre. Above {} cells along the longest side, \
+         below {}, with the same colours; {paths} photons each. Grey cells have seen none. The sun falls in from the right; the \
+         squares are beams of sky light that cross the nave, the strip above is the sky's light on the outside of the vault. Frequencies are \
+         high along the edges of beams and low inside of them, where the fluence is as high.\n\n\
          | cells | width | volume brighter than a tenth of that | mean √tr Γ, by flux | noise of √tr Γ | processor time |\n\
          |---|---|---|---|---|---|\n{table}\n\
          **What a grid cannot show** (B's Fig. 17): nothing within a cell. Light that fills part of one is spread over all of \

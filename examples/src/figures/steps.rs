@@ -17,8 +17,8 @@ const SPP: &str = "4";
 const LENGTHS: [&str; 5] = ["2.4", "1.2", "0.6", "0.3", "0.15"];
 /// Numbers of steps by error.
 const COUNTS: [&str; 4] = ["4", "8", "16", "32"];
-/// Shortest steps by frequency, as parts of a cell of 64.
-const LEAST: [&str; 3] = ["0.4", "0.1", "0.025"];
+/// Longest steps by frequency (m).
+const LONGEST: [&str; 4] = ["4.8", "2.4", "1.2", "0.6"];
 /// Cells along the longest side; the middle one is used for all but the table of grids.
 const EDGES: [&str; 3] = ["32", "64", "128"];
 
@@ -84,10 +84,12 @@ fn ratios(name: &str, uniform: &[Point], adaptive: &[Point], fill: f64) -> Strin
         let both = |of| Some([at_error(uniform, error, of)?, at_error(adaptive, error, of)?]);
         Some((error, both(|p| p.samples)?, both(|p| p.cpu)?))
     });
-    found.map_or(format!("| {name} | no error in common | | | |\n"), |(error, [us, s], [uc, c])| {
+    found.map_or(format!("| {name} | no error in common | | | | |\n"), |(error, [us, s], [uc, c])| {
         let (samples, time, filled) = (us / s, uc / c, uc / (c + fill));
+        // How much must be rendered for the grid to pay.
+        let pays = if uc > c { format!("{:.1} times", fill / (uc - c)) } else { "never".to_owned() };
         format!(
-            "| {name} | {} | {us:.0} / {s:.0} = {samples:.2} | {uc:.2} s / {c:.2} s = {time:.2} | {filled:.2} |\n",
+            "| {name} | {} | {us:.0} / {s:.0} = {samples:.2} | {uc:.2} s / {c:.2} s = {time:.2} | {filled:.2} | {pays} |\n",
             percent(error)
         )
     })
@@ -123,7 +125,7 @@ pub(super) fn section(plan: &Plan) -> Result<String, Failure> {
 }
 
 fn measured(plan: &Plan, folder: &Path) -> Result<String, Failure> {
-    let (edge, paths, judging) = if plan.quick { (96, "200000", "24") } else { (192, "1000000", "256") };
+    let (edge, paths, judging) = if plan.quick { (96, "1000000", "24") } else { (192, "1000000", "256") };
     let size = [edge, edge];
     let words: Vec<&str> = common(judging).into_iter().chain(["--step-length", "0.3"]).collect();
     let judges = Judges::rendered(plan, "nave", size, &words, |shot| shot.layer("medium_single"))?;
@@ -141,8 +143,8 @@ fn measured(plan: &Plan, folder: &Path) -> Result<String, Failure> {
         grids.push((cells, fill, points, file));
     }
     let [_, (_, fill, covariance, file), _] = grids.as_slice() else { return Err("no grids".into()) };
-    let by_frequency = |least| vec!["--step", "frequency", "--step-least", least, "--grid-in", file];
-    let frequency = bench.all(&LEAST.map(by_frequency))?;
+    let by_frequency = |longest| vec!["--step", "frequency", "--step-length", longest, "--grid-in", file];
+    let frequency = bench.all(&LONGEST.map(by_frequency))?;
 
     let lines =
         [("uniform", BLUE, uniform.as_slice()), ("covariance", ORANGE, covariance), ("frequency", GREEN, &frequency)];
@@ -168,25 +170,26 @@ fn measured(plan: &Plan, folder: &Path) -> Result<String, Failure> {
         "## Figs 12 to 15: steps along eye rays\n\n![light and steps](fig-12-steps.png)\n\nThe nave, light scattered at most once, \
          {edge} × {edge} pixels: left light scattered by the medium, then how many steps a ray takes, black for none and \
          brightest for {most:.0} or more: in the middle with `--step covariance --steps {}`, right with `--step frequency \
-         --step-least {}` (B's Alg. 1, which does not ask how bright light is).\n\n\
+         --step-length {}` (B's Alg. 1, which does not ask how bright light is).\n\n\
          ![error by samples](fig-12-samples.svg)\n\n![error by time](fig-12-seconds.svg)\n\n\
          relRMSE of that light, with {SPP} samples per pixel for all, so that the noise of where rays start in their pixels is \
-         the same; uniform steps of {} m; steps by covariance with `--steps` {}; by frequency with `--step-least` {} m. The grid \
+         the same; uniform steps of {} m; steps by covariance with `--steps` {}; by frequency with `--step-length` {} m. The grid \
          has 64 cells along its longest side, {paths} photons and took {fill:.2} s. The truth are two renders with \
          {judging} samples per pixel and uniform steps of 0.3 m, without bias as all of them are, used so that their \
          noise cancels.\n\nAt equal error, uniform steps over adaptive ones, halfway (in logarithms) between the errors that both \
-         reach:\n\n| steps | relRMSE | samples in the medium per pixel | processor time | with the grid's fill |\n|---|---|---|---|---|\n",
+         reach:\n\n| steps | relRMSE | samples in the medium per pixel | processor time | with the grid's fill | pays for itself from |\n|---|---|---|---|---|---|\n",
         COUNTS[2],
-        LEAST[1],
+        LONGEST[1],
         LENGTHS.join(", "),
         COUNTS.join(", "),
-        LEAST.join(", "),
+        LONGEST.join(", "),
     );
     for (cells, fill, points, _) in &grids {
         page += &ratios(&format!("covariance, {cells} cells"), &uniform, points, *fill);
     }
     page += &ratios("frequency, 64 cells", &uniform, &frequency, *fill);
-    page += "\nAll that was measured, errors with samples in the medium per pixel and processor time:\n\n";
+    page += "\nThe grid is filled once, whatever is rendered with it: the last column says for how many times the pixels, samples or \
+             frames of this small picture it has paid for itself.\n\nAll that was measured, errors with samples in the medium per pixel and processor time:\n\n";
     let coarse_to_fine = |points: &[Point]| -> String {
         let cell = |p: &Point| format!("{} ({:.0}, {:.2} s)", percent(p.error), p.samples, p.cpu);
         points.iter().map(cell).collect::<Vec<_>>().join(" | ")
@@ -197,6 +200,6 @@ fn measured(plan: &Plan, folder: &Path) -> Result<String, Failure> {
     for (cells, fill, points, _) in &grids {
         let _ = writeln!(page, "| covariance, {cells} cells | {fill:.2} s | {} | |", coarse_to_fine(points));
     }
-    let _ = writeln!(page, "| frequency, 64 cells | {fill:.2} s | {} | | |\n", coarse_to_fine(&frequency));
+    let _ = writeln!(page, "| frequency, 64 cells | {fill:.2} s | {} | |\n", coarse_to_fine(&frequency));
     Ok(page)
 }
