@@ -208,8 +208,8 @@ mod tests {
         let (w, s) = (0.4_f64, [h, 2.0 / 41.0, 2.0 / 41.0].map(|h| WIDTH * h));
         let blurred = s.map(|s| w * w + s * s);
         let due = -(w * w * w) / blurred.map(f64::sqrt).iter().product::<f64>() / blurred[0];
-        // Three standard deviations are not all of a Gaussian.
-        assert!((found[0] / due - 1.0).abs() < 0.03, "{} and {due}", found[0]);
+        // Of a third of it that the filter blurs away, cells beyond three standard deviations would take a tenth.
+        assert!((found[0] / due - 1.0).abs() < 0.05, "{} and {due}", found[0]);
     }
 
     #[test]

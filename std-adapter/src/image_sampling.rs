@@ -17,6 +17,10 @@ const SHARPER: f32 = 2.5;
 /// Standard deviation (pixels) of the widest filter: where light does not vary at all.
 const WIDEST: f32 = 4.0;
 
+/// How much wider (pixels of standard deviation) a filter may be from pixel to pixel: filters end at four deviations, so
+/// that one of these stops short of the pixel that bounds it.
+const WIDENING: f32 = 0.25;
+
 /// Pixels a filter reaches on either side.
 const REACH: i64 = 12;
 
@@ -41,6 +45,8 @@ pub struct Plan {
     width: u32,
     height: u32,
     outlooks: Vec<Outlook>,
+    /// Covariance of each pixel's filter.
+    shapes: Vec<Symmetric2>,
     /// Pixel by pixel, row by row, whether it is computed.
     pub computed: Vec<bool>,
     /// The share of neighbours that should be computed.
@@ -82,7 +88,8 @@ impl Plan {
         }
         let density: Vec<f32> = density_at(low).collect();
         let computed = dithered(width as usize, height as usize, &density, share);
-        Self { width, height, outlooks, computed, density }
+        let shapes = shapes(width as usize, height as usize, &outlooks);
+        Self { width, height, outlooks, shapes, computed, density }
     }
 
     /// The share of computed pixels.
@@ -94,7 +101,7 @@ impl Plan {
     /// Covariance (cycles² per pixel²) whose Gaussian fills in a pixel.
     #[must_use]
     pub fn shape(&self, index: usize) -> Symmetric2 {
-        floored(&self.outlooks[index].covariance.unwrap_or_default()).times(SHARPER)
+        self.shapes[index]
     }
 
     /// The image that the computed pixels of `image` give; the others' values are not read.
@@ -146,6 +153,45 @@ fn floored(p: &Symmetric2) -> Symmetric2 {
     let least = 1.0 / (2.0 * core::f32::consts::PI * WIDEST);
     let least = least * least / SHARPER;
     p.plus(&Symmetric2::diagonal(least, least))
+}
+
+/// Covariances whose Gaussians fill in pixels, no wider than those of pixels around let them be: a filter in darkness
+/// must not reach into the light beside it.
+fn shapes(width: usize, height: usize, outlooks: &[Outlook]) -> Vec<Symmetric2> {
+    let mut shapes: Vec<Symmetric2> =
+        outlooks.iter().map(|o| floored(&o.covariance.unwrap_or_default()).times(SHARPER)).collect();
+    // The longer standard deviation (pixels) of each, bounded by its neighbours' in two sweeps.
+    let longer = |p: &Symmetric2| 1.0 / (2.0 * core::f32::consts::PI * p.eigen().values[1].max(1e-12).sqrt());
+    let own: Vec<f32> = shapes.iter().map(longer).collect();
+    let mut bound = own.clone();
+    let mut relax = |x: usize, y: usize, sign: i64| {
+        let mut best = bound[y * width + x];
+        for (dx, dy, distance) in [(-1, 0, 1.0), (0, -1, 1.0), (-1, -1, 1.414), (1, -1, 1.414_f32)] {
+            let (at, up) = (x as i64 + sign * dx, y as i64 + sign * dy);
+            if at >= 0 && up >= 0 && at < width as i64 && up < height as i64 {
+                best = best.min(bound[up as usize * width + at as usize] + WIDENING * distance);
+            }
+        }
+        bound[y * width + x] = best;
+    };
+    for y in 0..height {
+        for x in 0..width {
+            relax(x, y, 1);
+        }
+    }
+    for y in (0..height).rev() {
+        for x in (0..width).rev() {
+            relax(x, y, -1);
+        }
+    }
+    for ((shape, own), bound) in shapes.iter_mut().zip(own).zip(bound) {
+        if bound < own {
+            let variance = |s: f32| 1.0 / (2.0 * core::f32::consts::PI * s).powi(2);
+            let more = variance(bound) - variance(own);
+            *shape = shape.plus(&Symmetric2::diagonal(more, more));
+        }
+    }
+    shapes
 }
 
 /// Error diffusion (Floyd and Steinberg 1976) in snake lines: chosen pixels keep their distance from each other.

@@ -1,5 +1,9 @@
 //! What figures 4 and 5 of Jarosz et al. 2008 and figure 10 of Belcour et al. 2014 claim.
 
+use fogbow::covariance::emitted;
+use fogbow::light::{Light, PointLight};
+use fogbow::math::{Ray, Symmetric3, Vec3};
+use fogbow::spectrum::Spectrum;
 use fogbow_examples::figures::extrapolation::{heterogeneous, homogeneous};
 use fogbow_examples::figures::hessian;
 use fogbow_examples::figures::radius::{claims, radii, twenty, two};
@@ -54,6 +58,11 @@ fn second_derivatives_across_a_beam_are_those_of_its_lobe() {
 }
 
 #[test]
-fn an_isotropic_point_light_has_no_covariance() {
-    assert!(hessian::blindness(200_000) < 0.02);
+fn an_isotropic_point_light_has_a_fall_off_and_no_covariance() {
+    let lamp = Light::Point(PointLight::new(Vec3::ZERO, Spectrum::ONE).unwrap());
+    let light = emitted(&lamp, &Ray::new(Vec3::ZERO, Vec3::Z), None, 1e-3).travelled(1.0);
+    assert_eq!(light.volumetric(), Symmetric3::ZERO);
+    // 6/r² of 6/r² + 4σ/r + σ², at 1 m with σ = 0.2 m⁻¹.
+    let share = hessian::fall_off(200_000);
+    assert!((share - 6.0 / 6.84).abs() < 0.03, "{share}");
 }

@@ -197,7 +197,7 @@ pub fn measure(seeds: u64, most: u64, threads: usize) -> Measured {
 /// What the bound says 1 m from an unoccluded isotropic point light, over the true largest second derivative, 6 F/z²
 /// and what the fog adds.
 #[must_use]
-pub fn blindness(paths: u64) -> f64 {
+pub fn fall_off(paths: u64) -> f64 {
     let lamp = PointLight::from_flux(Vec3::ZERO, Spectrum::ONE).expect("a valid lamp");
     let mut ratio = f64::NAN;
     fill(&[Light::Point(lamp)], 1, 0, &[paths], |grid| {
@@ -253,17 +253,18 @@ pub(super) fn section(plan: &Plan) -> Result<String, Failure> {
         let _ = write!(
             page,
             ". Its noise is that of F, of the photons in one cell; Γ is the same for all of them. What remains with {paths} paths is \
-             bias: at 1 m {ours} for ours, of which 2/(n + 2) is the spot's 1/r² and the rest the fog and the width of the cell; \
-             {far} for the filter, because it is half as wide as the beam. One made for this beam would do better; it would have to \
+             bias: at 1 m {ours} for ours, from the fog and the width of the cell; \
+             {far} for the filter, because it is about half as wide as the beam. One made for this beam would do better; it would have to \
              be told how wide the beam is, which is what Γ says.\n\n"
         );
     }
-    let blind = blindness(if plan.quick { 200_000 } else { 500_000 });
+    let blind = fall_off(if plan.quick { 200_000 } else { 500_000 });
     let _ = write!(
         page,
         "**Where the model is blind:** an unoccluded isotropic point light varies by 6F/r² along its rays, from 1/r² alone, and the \
-         spectrum of its light field has nothing across them. There 4π²FΓ is {} of the true largest second derivative, \
-         where a bound should be more than all of it.\n\n",
+         spectrum of its light field has nothing across them: a traced covariance says 0 there. Photons that come straight from a \
+         light therefore add its fall-off (`covariance::divergence`); with it 4π²FΓ is {} of the true largest second derivative, and what is \
+         missing is the fog's own exponential. Behind glass and mirrors nothing is added.\n\n",
         percent(blind)
     );
     Ok(page)
