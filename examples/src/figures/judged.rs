@@ -78,6 +78,12 @@ impl Judges {
         self.over(image, |i| self.is_smooth[i])
     }
 
+    /// The sum of all light over the truth's, minus one.
+    pub(super) fn bias(&self, image: &Image) -> f64 {
+        let sum = |image: &Image| image.pixels.iter().map(|p| f64::from(p.mean())).sum::<f64>();
+        sum(image) / sum(&self.mean()).max(f64::MIN_POSITIVE) - 1.0
+    }
+
     fn over(&self, image: &Image, is_counted: impl Fn(usize) -> bool) -> f64 {
         let [a, b] = &self.pictures;
         let (mut sum, mut count) = (0.0, 0);

@@ -50,22 +50,26 @@ pub(super) fn section(plan: &Plan) -> Result<String, Failure> {
     let share = computed.pixels.iter().map(|p| f64::from(p[0])).sum::<f64>() / computed.pixels.len() as f64;
     let line = |name: &str, spp: &str, shot: &rendered::Shot| {
         let image = shot.medium();
+        let bias = percent(judges.bias(&image));
         let [all, smooth] = [judges.rel_mse(&image), judges.rel_mse_smooth(&image)].map(|e| percent(e.sqrt()));
         let grid = shot.seconds("fill grid");
         let filling = shot.seconds("plan") + shot.seconds("fill in");
         let render = shot.seconds("render");
-        format!("| {name} | {spp} | {all} | {smooth} | {render:.2} s | {grid:.2} s | {filling:.2} s |\n")
+        format!("| {name} | {spp} | {all} | {smooth} | {bias} | {render:.2} s | {grid:.2} s | {filling:.2} s |\n")
     };
     Ok(format!(
         "## Fig. 11: fewer pixels\n\n![pixels](fig-11-pixels.png)\n\nThe lantern, `--method march`, {edge} × {edge} pixels, light of the \
          medium computed at {} of them. Above the density wanted (brightest: {most:.2}), the pixels that were computed, and \
          their light; below the layers of light from the medium: filled in from those pixels, computed at all of them with as \
          many samples each, and the mean of the two renders with {judging} samples per pixel that stand in for the truth.\n\n\
-         | pixels | samples per pixel | relRMSE, light of the medium | in the smooth half | render, processor time | grid | plan and fill in |\n\
-         |---|---|---|---|---|---|---|\n{}{}{}\n\
+         | pixels | samples per pixel | relRMSE, light of the medium | in the smooth half | bias | render, processor time | grid | plan and fill in |\n\
+         |---|---|---|---|---|---|---|---|\n{}{}{}\n\
          The last line has as many samples of the medium as the first. Light at surfaces is computed at all pixels and is \
          in the times. The smooth half are the pixels around which the truth, evened out over 5 × 5, varies less than its \
-         median. Filling in also evens out noise, where it is smooth; where light has edges it keeps the computed pixels.\n\n",
+         median. Filling in evens out noise where light is smooth, and spreads bright outliers over their neighbours. Bias is what is \
+         too bright or too dark on the whole, noise included. Pixels at other depths do not fill each other in: along \
+         walls seen at a grazing angle, where depth changes from pixel to pixel, light keeps streaks and more pixels are \
+         needed.\n\n",
         percent(share),
         line("adaptive", all, &adaptive),
         line("all", all, &full),
