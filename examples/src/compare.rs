@@ -130,7 +130,7 @@ fn denominators(image: &Picture, reference: &Picture) -> Result<Vec<[f64; 3]>, C
 }
 
 /// The mean over 5 × 5 pixels, with the border repeated.
-fn smooth(picture: &Picture) -> Vec<[f64; 3]> {
+pub(crate) fn smooth(picture: &Picture) -> Vec<[f64; 3]> {
     let (width, height) = (picture.width as isize, picture.height as isize);
     let mut smoothed = Vec::with_capacity(picture.pixels.len());
     for y in 0..height {

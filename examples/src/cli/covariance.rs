@@ -74,16 +74,16 @@ pub enum Step {
 }
 
 /// Fills or reads a grid, with a medium of any type.
-pub(super) struct GridJob<'a> {
-    pub(super) arguments: &'a CovarianceArguments,
-    pub(super) scene: &'a Path,
-    pub(super) world: &'a World<'a>,
-    pub(super) lights: &'a [Light<'a>],
-    pub(super) paths: path::Settings,
-    pub(super) threads: usize,
-    pub(super) seed: u64,
-    pub(super) control: &'a Control<'a>,
-    pub(super) statistics: &'a mut Statistics,
+pub(crate) struct GridJob<'a> {
+    pub(crate) arguments: &'a CovarianceArguments,
+    pub(crate) scene: &'a Path,
+    pub(crate) world: &'a World<'a>,
+    pub(crate) lights: &'a [Light<'a>],
+    pub(crate) paths: path::Settings,
+    pub(crate) threads: usize,
+    pub(crate) seed: u64,
+    pub(crate) control: &'a Control<'a>,
+    pub(crate) statistics: &'a mut Statistics,
 }
 
 impl WithMedium for GridJob<'_> {

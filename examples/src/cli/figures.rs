@@ -38,7 +38,8 @@ pub struct FiguresArguments {
 pub enum Paper {
     /// Jarosz et al. 2008, Radiance Caching for Participating Media: figures 4 to 10.
     Jarosz,
-    /// Belcour et al. 2014, A Local Frequency Analysis of Light Scattering and Absorption: figure 10.
+    /// Belcour et al. 2014, A Local Frequency Analysis of Light Scattering and Absorption: figures 6, 8, 10, 11, 12 to 15
+    /// (`--only 12`), 18 to 21 (`--only 18`).
     Belcour,
 }
 

@@ -3,7 +3,7 @@
 //! Exit codes: 0 done, 1 stopped early, 2 bad input.
 
 mod compare;
-mod covariance;
+pub(crate) mod covariance;
 mod figures;
 mod image_sampling;
 mod march;

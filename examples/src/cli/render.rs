@@ -342,7 +342,7 @@ fn outputs(arguments: &RenderArguments) -> Result<Vec<PathBuf>, Failure> {
 }
 
 /// Mitsuba counts the segments of a path, the path tracer its scatterings.
-pub(super) fn path_settings(scene: &SceneFile, max_depth: Option<u32>) -> path::Settings {
+pub(crate) fn path_settings(scene: &SceneFile, max_depth: Option<u32>) -> path::Settings {
     let depth = max_depth.or(scene.integrator.max_depth);
     path::Settings {
         max_scatterings: depth.map_or(u32::MAX, |d| d.saturating_sub(1)),

@@ -8,17 +8,27 @@
 //! | `rendered` | Fig. 6 to 10: pictures beside path tracing |
 //! | `records` | where records lie |
 //! | [`belcour`] | the figures of B |
+//! | `slices` | B's Fig. 8: slices of covariance grids |
 //! | [`hessian`] | B's Fig. 10: second derivatives of the fluence |
+//! | `pixels` | B's Fig. 11: adaptive sampling of images |
+//! | `steps` | B's Figs 12 to 15: adaptive steps along eye rays |
+//! | `beams` | B's Figs 18 to 21: photon beams |
+//! | `judged` | errors of pictures, told by two judges |
 //! | `montage`, `plot` | pictures made of pictures; line plots |
 
+mod beams;
 pub mod belcour;
 pub mod extrapolation;
 pub mod hessian;
+mod judged;
 mod montage;
+mod pixels;
 mod plot;
 pub mod radius;
 mod records;
 mod rendered;
+mod slices;
+mod steps;
 
 use std::path::PathBuf;
 use std::time::Instant;

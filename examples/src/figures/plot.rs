@@ -9,6 +9,9 @@ const RIGHT: f64 = 12.0;
 const TOP: f64 = 26.0;
 const BOTTOM: f64 = 40.0;
 
+/// Lines of at most as many points have a dot at each.
+const MOST_DOTS: usize = 16;
+
 /// Digits of powers.
 const SUPERSCRIPTS: [char; 10] = ['⁰', '¹', '²', '³', '⁴', '⁵', '⁶', '⁷', '⁸', '⁹'];
 
@@ -57,13 +60,21 @@ impl Plot<'_> {
         let logarithms = |points: &[[f64; 2]]| points.iter().map(|[x, y]| [x.log10(), *y]).collect();
         let lines = self.lines.iter().map(|line| Line { points: logarithms(&line.points), ..*line }).collect();
         let x = self.x.map(f64::log10);
-        let decades = (x[0].ceil() as i32)..=(x[1].floor() as i32);
-        let ticks = decades.map(|power| {
+        let decades = (x[0].floor() as i32)..=(x[1].ceil() as i32);
+        let is_short = x[1] - x[0] < 2.5;
+        let steps: &[f64] = if is_short { &[1.0, 2.0, 5.0] } else { &[1.0] };
+        let inside = |tick: &f64| (x[0] - 1e-3..=x[1] + 1e-3).contains(tick);
+        let powers = decades.flat_map(|power| steps.iter().map(move |step| (power, step)));
+        let ticks = powers.map(|(power, step)| {
+            if is_short {
+                let value = step * 10_f64.powi(power);
+                return (value.log10(), ((value * 1e6).round() / 1e6).to_string());
+            }
             let digits = power.to_string().replace('-', "⁻");
             let raised = digits.chars().map(|c| c.to_digit(10).map_or(c, |d| SUPERSCRIPTS[d as usize]));
             (f64::from(power), format!("10{}", raised.collect::<String>()))
         });
-        Plot { x, lines, ..*self }.drawn(ticks.collect())
+        Plot { x, lines, ..*self }.drawn(ticks.filter(|(at, _)| inside(at)).collect())
     }
 
     fn drawn(&self, ticks: Vec<(f64, String)>) -> String {
@@ -89,6 +100,14 @@ impl Plot<'_> {
                 line.width,
                 self.path(&line.points)
             );
+            for point in line.points.iter().filter(|_| line.points.len() <= MOST_DOTS) {
+                let [x, y] = self.place(*point);
+                let _ = writeln!(
+                    svg,
+                    "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"3\" stroke=\"none\" fill=\"{}\"/>",
+                    line.colour
+                );
+            }
         }
         let _ = write!(
             svg,

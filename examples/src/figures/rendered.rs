@@ -15,21 +15,42 @@ use crate::cli::{Arguments, Command, Failure};
 use crate::plume::{self, Plume};
 
 /// A picture, and what it took.
-struct Shot {
-    image: Image,
+pub(super) struct Shot {
+    pub(super) image: Image,
     /// Processor time (s).
-    cpu: f64,
+    pub(super) cpu: f64,
     samples: u32,
-    rendered: Rendered,
+    pub(super) rendered: Rendered,
 }
 
 impl Shot {
+    /// Processor time (s) of one phase.
+    pub(super) fn seconds(&self, phase: &str) -> f64 {
+        let phases = &self.rendered.statistics.phases;
+        phases.iter().find(|(name, _)| name == phase).map_or(0.0, |(_, s)| s.cpu.unwrap_or(s.wall))
+    }
+
+    /// A layer, if there is one of that name; else black.
+    pub(super) fn layer(&self, name: &str) -> Image {
+        let film = &self.rendered.film;
+        let index = film.layers().iter().position(|layer| layer == name);
+        index.and_then(|index| film.mean(index)).unwrap_or_else(|| montage::brightened(&self.image, 0.0))
+    }
+
+    /// Light scattered by the medium.
+    pub(super) fn medium(&self) -> Image {
+        let mut sum = self.layer("medium_single");
+        let multiple = self.layer("medium_multiple");
+        sum.pixels.iter_mut().zip(&multiple.pixels).for_each(|(a, b)| *a += *b);
+        sum
+    }
+
     fn records(&self, name: &str) -> u64 {
         self.rendered.statistics.records.iter().find(|(n, _)| n == name).map_or(0, |(_, count)| *count)
     }
 }
 
-fn shot(plan: &Plan, scene: &Path, size: [u32; 2], options: &[&str]) -> Result<Shot, Failure> {
+pub(super) fn shot(plan: &Plan, scene: &Path, size: [u32; 2], options: &[&str]) -> Result<Shot, Failure> {
     let words = [
         vec!["fogbow".to_owned(), "render".to_owned(), scene.display().to_string(), "--quiet".to_owned()],
         vec!["--size".to_owned(), format!("{}x{}", size[0], size[1]), "--threads".to_owned(), plan.threads.to_string()],
@@ -91,7 +112,7 @@ fn error(image: &Image, [a, b]: &[Image; 2]) -> f64 {
 }
 
 /// By how much to brighten: nine tenths of the pixels shall stay below this.
-fn gain(image: &Image) -> f32 {
+pub(super) fn gain(image: &Image) -> f32 {
     let mut means: Vec<f32> = image.pixels.iter().map(|pixel| pixel.mean()).collect();
     means.sort_by(f32::total_cmp);
     0.6 / means.get(means.len() * 9 / 10).copied().unwrap_or(1.0).max(1e-9)
@@ -131,7 +152,7 @@ const HEAD: &str = "| scene | caching, processor time | records: single / surfac
 const BOXES: [&str; 4] =
     ["homogeneous-isotropic", "homogeneous-anisotropic", "heterogeneous-isotropic", "heterogeneous-anisotropic"];
 
-fn scene_of(plan: &Plan, name: &str) -> std::path::PathBuf {
+pub(super) fn scene_of(plan: &Plan, name: &str) -> std::path::PathBuf {
     plan.scenes.join(format!("{name}.xml"))
 }
 
