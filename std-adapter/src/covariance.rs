@@ -12,7 +12,7 @@ use fogbow::path::{self, World};
 use fogbow::photon;
 use rayon::prelude::*;
 
-use crate::files::replace;
+use crate::files;
 use crate::progress::Control;
 use crate::seed::independent;
 
@@ -132,14 +132,13 @@ pub fn fill<M: Medium + Sync + ?Sized, S: Scene + Sync + ?Sized>(
     }
     let lattice = Lattice::cubic(*bounds, settings.edge)?;
     let mut voxels = cells(lattice.cell_count(), Voxel::EMPTY)?;
-    let mut occluder_cells = Vec::new();
-    let occluders = if settings.occluder_rays > 0 {
-        occluder_cells = cells(lattice.cell_count(), OccluderCell::default())?;
-        let mut occluders = Occluders::new(lattice, &mut occluder_cells)?;
-        occluders.add_scene(world.scene, settings.occluder_rays);
+    let rays = settings.occluder_rays;
+    let mut near = cells(if rays > 0 { lattice.cell_count() } else { 0 }, OccluderCell::default())?;
+    let occluders = if rays > 0 {
+        let mut occluders = Occluders::new(lattice, &mut near)?;
+        occluders.add_scene(world.scene, rays);
         Some(occluders)
     } else {
-        drop(occluder_cells);
         None
     };
     let pool = rayon::ThreadPoolBuilder::new()
@@ -238,7 +237,7 @@ pub fn save(file: impl AsRef<Path>, grid: &CovarianceGrid, tag: u64) -> Result<(
         all.extend_from_slice(part);
         Ok::<(), core::convert::Infallible>(())
     });
-    replace(path, &all).map_err(|error| FileError { path: path.to_owned(), problem: Problem::Io(error) })
+    files::replace(path, &all).map_err(|error| FileError { path: path.to_owned(), problem: Problem::Io(error) })
 }
 
 /// Reads a grid that [`save`] wrote for the same `tag`.
@@ -248,19 +247,11 @@ pub fn save(file: impl AsRef<Path>, grid: &CovarianceGrid, tag: u64) -> Result<(
 pub fn load(file: impl AsRef<Path>, tag: u64) -> Result<CovarianceGrid, FileError> {
     let path = file.as_ref();
     let read = || -> Result<CovarianceGrid, Problem> {
-        let all = read_file(path)?;
+        let all = files::read(path).map_err(Problem::Io)?.ok_or(Problem::NoFile)?;
         let header = bytes::header(&all, tag).map_err(Problem::Content)?;
         let mut voxels = cells(header.lattice.cell_count(), Voxel::EMPTY).map_err(|_| Problem::Memory)?;
         bytes::read_into(&all, tag, &mut voxels).map_err(Problem::Content)?;
         Ok(CovarianceGrid { lattice: header.lattice, voxels, paths: header.paths })
     };
     read().map_err(|problem| FileError { path: path.to_owned(), problem })
-}
-
-fn read_file(path: &Path) -> Result<Vec<u8>, Problem> {
-    // Asked before opening: opening a pipe would wait for whoever writes to it.
-    if !std::fs::metadata(path).map_err(Problem::Io)?.is_file() {
-        return Err(Problem::NoFile);
-    }
-    std::fs::read(path).map_err(Problem::Io)
 }

@@ -1,8 +1,17 @@
-//! Writing files so that neither a full disk nor an interruption costs what was there.
+//! Files, read and written with care.
 
 use std::ffi::OsString;
 use std::io;
 use std::path::Path;
+
+/// The bytes of a file; `None` if it is a directory or a device.
+pub(crate) fn read(path: &Path) -> io::Result<Option<Vec<u8>>> {
+    // Asked before opening: opening a pipe would wait for whoever writes to it.
+    if !std::fs::metadata(path)?.is_file() {
+        return Ok(None);
+    }
+    std::fs::read(path).map(Some)
+}
 
 /// Beside the old file first, so that neither a full disk nor an interruption costs both.
 pub(crate) fn replace(path: &Path, bytes: &[u8]) -> io::Result<()> {

@@ -54,7 +54,8 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// Computes at most `share` of all pixels (0 to 1), densest where the image varies.
+    /// Computes at most `share` of all pixels (0.02 to 1: with fewer, filters would find none), densest where the image
+    /// varies.
     ///
     /// ```
     /// use fogbow::math::Symmetric2;
@@ -71,7 +72,7 @@ impl Plan {
     #[must_use]
     pub fn new(width: u32, height: u32, share: f32, outlooks: Vec<Outlook>) -> Self {
         assert_eq!(outlooks.len(), width as usize * height as usize, "one outlook per pixel");
-        let share = share.clamp(0.0, 1.0);
+        let share = share.clamp(0.02, 1.0);
         let wanted: Vec<f32> = outlooks
             .iter()
             .map(|o| o.covariance.map_or(0.0, |p| sample_density(&floored(&p))))
@@ -218,4 +219,48 @@ fn dithered(width: usize, height: usize, density: &[f32], share: f32) -> Vec<boo
         next.fill(0.0);
     }
     chosen
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn plan(share: f32, outlook: impl Fn(u32, u32) -> Outlook) -> Plan {
+        Plan::new(40, 40, share, (0..1600).map(|i| outlook(i % 40, i / 40)).collect())
+    }
+
+    #[test]
+    fn even_light_is_filled_in_exactly_and_unread_pixels_do_not_count() {
+        for share in [0.0, 0.05, 0.4, 1.0] {
+            let plan = plan(share, |_, _| Outlook { covariance: None, depth: f32::INFINITY });
+            assert!(plan.share() <= share.max(0.02) && plan.share() > 0.5 * share, "{}", plan.share());
+            let mut image = Image::new(40, 40, Spectrum::splat(3.0)).unwrap();
+            for (pixel, computed) in image.pixels.iter_mut().zip(&plan.computed) {
+                if !computed {
+                    *pixel = Spectrum::splat(f32::NAN);
+                }
+            }
+            assert!(plan.filled(&image).pixels.iter().all(|p| (p[0] - 3.0).abs() < 1e-5), "share {share}");
+        }
+    }
+
+    #[test]
+    fn light_does_not_leak_over_a_border_of_depth() {
+        let near = |x: u32| if x < 20 { 1.0 } else { 2.0 };
+        let plan = plan(0.3, |x, _| Outlook { covariance: Some(Symmetric2::ZERO), depth: near(x) });
+        let mut image = Image::new(40, 40, Spectrum::ZERO).unwrap();
+        for (i, pixel) in image.pixels.iter_mut().enumerate() {
+            *pixel = Spectrum::splat(near(i as u32 % 40));
+        }
+        let filled = plan.filled(&image);
+        assert!(filled.pixels.iter().zip(&image.pixels).all(|(a, b)| (a[0] - b[0]).abs() < 1e-5));
+    }
+
+    #[test]
+    fn what_is_no_number_beforehand_gives_numbers() {
+        let bad = Symmetric2::new(f32::NAN, f32::INFINITY, -1.0);
+        let plan = plan(0.4, |x, _| Outlook { covariance: (x > 10).then_some(bad), depth: f32::NAN });
+        let image = Image::new(40, 40, Spectrum::ONE).unwrap();
+        assert!(plan.filled(&image).pixels.iter().all(|p| p.is_valid()));
+    }
 }

@@ -2,7 +2,7 @@
 
 use bytemuck::{Pod, Zeroable};
 
-use crate::math::symmetric::{inverse_of, jacobi, rebuilt};
+use crate::math::symmetric::{inverted, jacobi, rebuilt};
 use crate::math::{Eigen, Symmetric2, float};
 
 /// What operators return never exceeds this (cycles²): a million cycles per metre or radian is beyond
@@ -109,9 +109,7 @@ impl Symmetric4 {
     /// Moore–Penrose inverse; eigenvalues below a millionth of the largest count as 0.
     #[must_use]
     pub fn pseudo_inverse(&self) -> Self {
-        let eigen = self.eigen();
-        let largest = eigen.values[0].abs().max(eigen.values[3].abs());
-        Self::from_rows(rebuilt(&eigen, |value| inverse_of(value, largest)))
+        Self::from_rows(inverted(&self.eigen()))
     }
 
     /// What operators are made of: `f` of this matrix, mended where rounding asks for it.

@@ -123,9 +123,10 @@ pub(crate) fn rebuilt<const N: usize>(eigen: &Eigen<N>, f: impl Fn(f32) -> f32) 
     out.map(|row| row.map(|x| x.clamp(-f32::MAX, f32::MAX)))
 }
 
-/// One over an eigenvalue; 0 where it is a rounding of 0 beside the largest.
-pub(crate) fn inverse_of(value: f32, largest: f32) -> f32 {
-    if value.abs() > 1e-6 * largest { (1.0 / value).clamp(-HUGE, HUGE) } else { 0.0 }
+/// The Moore–Penrose inverse; eigenvalues below a millionth of the largest count as 0.
+pub(crate) fn inverted<const N: usize>(eigen: &Eigen<N>) -> [[f32; N]; N] {
+    let largest = eigen.values.iter().fold(0.0_f32, |m, x| m.max(x.abs()));
+    rebuilt(eigen, |value| if value.abs() > 1e-6 * largest { (1.0 / value).clamp(-HUGE, HUGE) } else { 0.0 })
 }
 
 impl Symmetric2 {
@@ -418,8 +419,6 @@ impl Symmetric3 {
     /// Moore–Penrose inverse; eigenvalues below a millionth of the largest count as 0.
     #[must_use]
     pub fn pseudo_inverse(&self) -> Self {
-        let eigen = self.eigen();
-        let largest = eigen.values[0].abs().max(eigen.values[2].abs());
-        Self::from_rows(rebuilt(&eigen, |value| inverse_of(value, largest)))
+        Self::from_rows(inverted(&self.eigen()))
     }
 }

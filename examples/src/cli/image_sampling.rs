@@ -21,7 +21,7 @@ pub struct SamplingArguments {
     /// At which pixels light scattered by the medium is computed; surfaces are at all.
     #[arg(long, value_enum, default_value_t = ImageSampling::Uniform)]
     pub image_sampling: ImageSampling,
-    /// Share of pixels that `--image-sampling covariance` computes at most.
+    /// Share of pixels that `--image-sampling covariance` computes at most, from 0.05 to 1.
     #[arg(long, value_name = "SHARE", value_parser = share, default_value_t = 0.4)]
     pub image_share: f32,
 }
@@ -37,8 +37,8 @@ pub enum ImageSampling {
 
 fn share(text: &str) -> Result<f32, String> {
     match text.parse::<f32>() {
-        Ok(value) if value > 0.0 && value <= 1.0 => Ok(value),
-        _ => Err("must be a number greater than 0, at most 1".to_owned()),
+        Ok(value) if (0.05..=1.0).contains(&value) => Ok(value),
+        _ => Err("must be a number from 0.05 to 1".to_owned()),
     }
 }
 

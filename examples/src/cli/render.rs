@@ -12,7 +12,7 @@ use fogbow::math::Vec2;
 use fogbow::path::{self, InScattered, Radiance, World as PathWorld};
 use fogbow::sampling::uniform2;
 use fogbow::spectrum::Spectrum;
-use fogbow_std::covariance::CovarianceGrid;
+use fogbow_std::covariance::{CovarianceGrid, FillError};
 use fogbow_std::film::Film;
 use fogbow_std::image::write_film;
 use fogbow_std::image_sampling::Plan;
@@ -143,7 +143,15 @@ pub(crate) struct Rendered {
 
 pub(super) fn run(arguments: &RenderArguments) -> Result<Ending, Failure> {
     let outputs = outputs(arguments)?;
-    let Rendered { film, outcome, mut statistics, .. } = render(arguments)?;
+    let rendered = match render(arguments) {
+        // Nothing has been rendered yet, and nothing is wrong.
+        Err(error) if matches!(error.downcast_ref(), Some(FillError::Cancelled)) => {
+            eprintln!("fogbow: {error}");
+            return Ok(Ending::Stopped);
+        }
+        rendered => rendered?,
+    };
+    let Rendered { film, outcome, mut statistics, .. } = rendered;
     statistics.time("write", || outputs.iter().try_for_each(|file| write_film(file, &film, arguments.exposure)))?;
 
     let size = (film.width(), film.height());
@@ -328,6 +336,12 @@ fn outputs(arguments: &RenderArguments) -> Result<Vec<PathBuf>, Failure> {
     caches.check()?;
     if !matches!(arguments.method, Method::Path | Method::March) && !arguments.sampling.is_uniform() {
         return Err("--image-sampling covariance goes with --method path and march".into());
+    }
+    if arguments.march.step != Step::Uniform && arguments.method != Method::March {
+        return Err("--step covariance and frequency need --method march".into());
+    }
+    if arguments.beams.kernel != Kernel::Progressive && arguments.method != Method::PhotonBeams {
+        return Err("--kernel covariance needs --method photon-beams".into());
     }
     arguments.covariance.check()?;
     if arguments.covariance.is_named() && !arguments.needs_grid() {

@@ -23,9 +23,8 @@ use fogbow::bytes::Crc;
 use fogbow::cache::Limits;
 use fogbow::cache::bytes::{self, Attachment, BytesError};
 
-use crate::files::replace;
-
 use super::{Cache, Effort, RadianceCaches, Settings};
+use crate::files;
 
 /// The first bytes.
 const MAGIC: [u8; 8] = *b"\x89FOGSET\n";
@@ -161,7 +160,8 @@ impl From<io::Error> for Problem {
 /// What the system says.
 pub fn save(file: impl AsRef<Path>, caches: &RadianceCaches, tag: u64) -> Result<(), FileError> {
     let path = file.as_ref();
-    replace(path, &encode(caches, tag)).map_err(|error| FileError { path: path.to_owned(), problem: error.into() })
+    files::replace(path, &encode(caches, tag))
+        .map_err(|error| FileError { path: path.to_owned(), problem: error.into() })
 }
 
 /// Reads what [`save`] wrote with the same `tag`, to be used with `settings`: they must ask for the same
@@ -188,17 +188,11 @@ pub fn save(file: impl AsRef<Path>, caches: &RadianceCaches, tag: u64) -> Result
 /// ```
 pub fn load(file: impl AsRef<Path>, settings: Settings, tag: u64) -> Result<RadianceCaches, FileError> {
     let path = file.as_ref();
-    read(path)
+    files::read(path)
+        .map_err(Problem::Io)
+        .and_then(|bytes| bytes.ok_or(Problem::NoFile))
         .and_then(|bytes| decode(&bytes, settings, tag))
         .map_err(|problem| FileError { path: path.to_owned(), problem })
-}
-
-fn read(path: &Path) -> Result<Vec<u8>, Problem> {
-    // Asked before opening: opening a pipe would wait for whoever writes to it.
-    if !std::fs::metadata(path)?.is_file() {
-        return Err(Problem::NoFile);
-    }
-    Ok(std::fs::read(path)?)
 }
 
 /// The efforts of all parts, in the order of [`PARTS`].
