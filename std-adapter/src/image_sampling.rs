@@ -27,6 +27,9 @@ const REACH: i64 = 12;
 /// Relative difference of depth beyond which pixels see different things.
 const SAME_DEPTH: f32 = 0.02;
 
+/// Least share of pixels that a plan computes. With fewer, some filters would find no computed pixel in reach.
+pub const LEAST_PLAN: f32 = 0.05;
+
 /// Least share of computed pixels, where light does not vary.
 const LEAST_SHARE: f32 = 1.0 / 12.0;
 
@@ -54,7 +57,7 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// Computes at most `share` of all pixels (0.02 to 1: with fewer, filters would find none), densest where the image
+    /// Computes at most `share` of all pixels (from [`LEAST_PLAN`] on), densest where the image
     /// varies.
     ///
     /// ```
@@ -72,7 +75,7 @@ impl Plan {
     #[must_use]
     pub fn new(width: u32, height: u32, share: f32, outlooks: Vec<Outlook>) -> Self {
         assert_eq!(outlooks.len(), width as usize * height as usize, "one outlook per pixel");
-        let share = share.clamp(0.02, 1.0);
+        let share = share.clamp(LEAST_PLAN, 1.0);
         let wanted: Vec<f32> = outlooks
             .iter()
             .map(|o| o.covariance.map_or(0.0, |p| sample_density(&floored(&p))))
@@ -232,8 +235,9 @@ mod tests {
     #[test]
     fn even_light_is_filled_in_exactly_and_unread_pixels_do_not_count() {
         for share in [0.0, 0.05, 0.4, 1.0] {
-            let plan = plan(share, |_, _| Outlook { covariance: None, depth: f32::INFINITY });
-            assert!(plan.share() <= share.max(0.02) && plan.share() > 0.5 * share, "{}", plan.share());
+            let even = Symmetric2::diagonal(1e-4, 1e-4);
+            let plan = plan(share, |_, _| Outlook { covariance: Some(even), depth: f32::INFINITY });
+            assert!(plan.share() <= share.max(LEAST_PLAN) && plan.share() > 0.5 * share, "{}", plan.share());
             let mut image = Image::new(40, 40, Spectrum::splat(3.0)).unwrap();
             for (pixel, computed) in image.pixels.iter_mut().zip(&plan.computed) {
                 if !computed {
