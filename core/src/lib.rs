@@ -28,3 +28,4 @@ pub mod spectrum;
 pub mod storage;
 pub mod surface;
 pub mod transmittance;
+pub mod vpl;

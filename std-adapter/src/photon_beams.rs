@@ -11,6 +11,7 @@ use fogbow::beams::{self, Beams, Piece, kernel};
 use fogbow::host::{Medium, Scene};
 use fogbow::math::{Bounds, Ray, Vec3};
 use fogbow::path::{self, InScattered, Radiance, World};
+use fogbow::sampling::Generator;
 use fogbow::sampling::uniform::mix;
 use fogbow::spectrum::Spectrum;
 use fogbow::storage::Full;
@@ -246,7 +247,7 @@ where
             lights: view.world.lights,
         };
         let ray = ray(sample, rng);
-        let seen = path::radiance_beyond(&ray, &world, &view.paths, rng, |segment, most, rng| {
+        let seen = path::radiance_beyond(&ray, &world, &view.paths, rng, |segment: &Ray, most, rng: &mut Generator| {
             if sample.index % length != 0 {
                 return InScattered::default();
             }

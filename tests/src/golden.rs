@@ -10,6 +10,7 @@ use serde_json::{Map, Value, json};
 
 use fogbow::cache::{Blend, Extrapolation, Limits, exponent_limit, valid_radius, weight};
 use fogbow::covariance::{self, ImageCovariance, LightField, Symmetric4, Voxel};
+use fogbow::host::Properties;
 use fogbow::light::{Falloff, Source};
 use fogbow::math::{Frame, Ray, Symmetric2, Symmetric3, Vec3};
 use fogbow::multiple_scatter::Weight;
@@ -19,11 +20,12 @@ use fogbow::sh::{self, expansion, zonal};
 use fogbow::single_scatter::{self, Contribution, Sums};
 use fogbow::spectrum::{Gradient, Spectrum};
 use fogbow::transmittance::thickness::{Marching, Steps, optical_thickness_with_gradients};
+use fogbow::vpl::{self, Bound, Receiver, VirtualLight};
 
 use crate::hosts::{Analytic, Field};
 
 /// Topics of systems that are still to come; each is taken off when its system lands.
-pub const NOT_YET: &[&str] = &["bias_compensation", "vpl"];
+pub const NOT_YET: &[&str] = &[];
 
 /// The folder named by `FOGBOW_GOLDEN_DIR`, else the repository's own. A relative name counts from
 /// where the command was typed if that is this package or the repository's top.
@@ -147,6 +149,8 @@ pub fn outputs(topic: &str, input: &Map<String, Value>) -> Option<Value> {
         "sampling_metrics" => sampling_metrics(&input),
         "scattering_covariance" => scattering_covariance(&input),
         "volumetric_covariance" => volumetric_covariance(&input),
+        "bias_compensation" => bias_compensation(&input),
+        "vpl" => virtual_light(&input),
         _ => return None,
     })
 }
@@ -408,6 +412,44 @@ fn sh_phase(input: &Input<'_>) -> Value {
 fn truncated(input: &Input<'_>) -> Value {
     let sample = truncated_exponential(input.number("xi"), input.number("sigma"), input.number("d"));
     json!({ "t": sample.distance, "pdf": sample.pdf, "weight": sample.weight })
+}
+
+fn bias_compensation(input: &Input<'_>) -> Value {
+    let bound = Bound::new(input.number("bound")).expect("a positive bound");
+    let (r, extinction) = (input.number("r"), input.number("sigma_t"));
+    let cosines = input.number("cos_x").max(0.0) * input.number("cos_y").max(0.0);
+    let geometry = vpl::geometry(r * r, cosines);
+    json!({
+        "G": geometry,
+        "G_clamped": bound.clamped(geometry),
+        "B": bound.missing(r * r, cosines),
+        "d": bound.radius(),
+        "kappa_B": vpl::contraction(extinction, input.number("albedo"), bound.radius()),
+    })
+}
+
+fn virtual_light(input: &Input<'_>) -> Value {
+    let bound = Bound::new(input.number("bound")).expect("a positive bound");
+    let (extinction, scattering) = (input.number("sigma_t"), input.number("sigma_s"));
+    let phase = Phase::from(Lobe::HenyeyGreenstein { g: input.number("g") });
+    let flux = Spectrum::splat(input.number("beta")) * scattering;
+    let light = VirtualLight::in_medium(input.vector("v"), input.direction("w_in"), flux, 1, &phase);
+    let properties = Properties { scattering: Spectrum::splat(scattering), phase, ..Properties::VACUUM };
+    let receiver = Receiver::in_medium(input.vector("y"), input.direction("w"), &properties);
+    let connection = receiver.and_then(|receiver| light.connect(&receiver));
+    let seen = |bound: Bound| {
+        connection.map_or(0.0, |c| c.radiance(bound, Spectrum::splat(extinction * c.way.length).transmitted())[0])
+    };
+    let distance = input.number("t");
+    let missing = connection.map_or(0.0, |c| bound.missing(c.way.length * c.way.length, 1.0));
+    json!({
+        "unclamped": seen(Bound::NONE),
+        "clamped": seen(bound),
+        "missing": seen(Bound::NONE) * missing,
+        "weight": scattering
+            * truncated_exponential(0.0, extinction, bound.radius()).weight
+            * bound.missing(distance * distance, 1.0),
+    })
 }
 
 fn radius(input: &Input<'_>) -> Value {

@@ -25,7 +25,7 @@ fn marched<M: Medium>(
     pick: fn(&path::Radiance) -> Spectrum,
 ) -> Estimate {
     estimate(6000, |rng| {
-        let seen = path::radiance_beyond(ray, world, settings, rng, |segment, most, rng: &mut Generator| {
+        let seen = path::radiance_beyond(ray, world, settings, rng, |segment: &Ray, most, rng: &mut Generator| {
             let settings = Settings { max_scatterings: most, ..*settings };
             let mut light = InScattered::default();
             let offset = uniform(rng);

@@ -1,6 +1,6 @@
 //! Light scattered at one point of the medium, for methods that choose their points themselves.
 
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 
 use super::{InScattered, Settings, World, connect, trace};
 use crate::host::{Medium, Rng, Scene};
@@ -12,6 +12,40 @@ use crate::spectrum::Spectrum;
 /// Up to this number every light is connected to. More: choosing one at random would be cheaper, but which was chosen
 /// is the most part of the noise.
 const FEW: usize = 4;
+
+/// What the lights alone send to `point` and is scattered there by `value(to_light)` (with the cosine, at a surface): a
+/// connection to each, or to one of them where there are more than a few. Rays start at `origin(to_light)`.
+pub(crate) fn direct<M: Medium + ?Sized, S: Scene + ?Sized>(
+    world: &World<'_, M, S>,
+    point: Vec3,
+    origin: impl Fn(Vec3) -> Vec3,
+    value: impl Fn(Vec3) -> Spectrum,
+    rng: &mut Generator,
+) -> Spectrum {
+    let random = (uniform(rng), uniform2(rng));
+    connected(world, point, origin, value, random, rng)
+}
+
+fn connected<M: Medium + ?Sized, S: Scene + ?Sized>(
+    world: &World<'_, M, S>,
+    point: Vec3,
+    origin: impl Fn(Vec3) -> Vec3,
+    value: impl Fn(Vec3) -> Spectrum,
+    random: (f32, Vec2),
+    rng: &mut Generator,
+) -> Spectrum {
+    // Of lights alone, so that nothing is weighed against their being hit: as for a surface, near fields included.
+    let value = |to_light: Vec3| (value(to_light), 0.0);
+    if world.lights.len() > FEW {
+        return connect::next_event(world, point, false, origin, value, random, rng);
+    }
+    // The random numbers are shared: what differs from light to light is no noise between points then.
+    let of = |light| {
+        let world = World { lights: core::slice::from_ref(light), ..*world };
+        connect::next_event(&world, point, false, &origin, value, random, rng)
+    };
+    world.lights.iter().map(of).sum()
+}
 
 /// Radiance `∫ p L dω` (W·m⁻²·sr⁻¹) scattered at `point` towards `to_eye` (unit), *without* `σₛ`: an unbiased
 /// estimate from a connection to each light (one of them, where there are more than a few) and, for light scattered
@@ -44,18 +78,8 @@ pub fn in_scattered<M: Medium + ?Sized, S: Scene + ?Sized>(
         return InScattered::default();
     }
     let mut child = Generator::child(rng);
-    // Of lights alone, so that nothing is weighed against their being hit: as for a surface, near fields included.
-    let value = |to_light: Vec3| (phase.value(deflection(to_light, to_eye)), 0.0);
-    let mut single = Spectrum::ZERO;
-    if world.lights.len() <= FEW {
-        // The random numbers are shared: what differs from light to light is no noise between points then.
-        for light in world.lights {
-            let world = World { lights: core::slice::from_ref(light), ..*world };
-            single += connect::next_event(&world, point, false, |_| point, value, random, &mut child);
-        }
-    } else {
-        single = connect::next_event(world, point, false, |_| point, value, random, &mut child);
-    }
+    let value = |to_light: Vec3| phase.value(deflection(to_light, to_eye));
+    let single = connected(world, point, |_| point, value, random, &mut child);
     let mut multiple = Spectrum::ZERO;
     if settings.max_scatterings > 1 {
         let sample = phase.sample(to_eye, u);

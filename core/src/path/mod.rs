@@ -24,8 +24,9 @@ mod connect;
 mod in_scatter;
 pub mod trace;
 
+pub(crate) use in_scatter::direct;
 pub use in_scatter::in_scattered;
-pub use trace::{radiance, radiance_beyond};
+pub use trace::{Delegate, radiance, radiance_beyond};
 
 use crate::light::Light;
 use crate::spectrum::Spectrum;

@@ -98,15 +98,45 @@ pub fn radiance<M: Medium + ?Sized, S: Scene + ?Sized>(
     settings: &Settings,
     rng: &mut (impl Rng + ?Sized),
 ) -> Radiance {
-    walk::<false, M, S>(ray, world, settings, rng, |_, _, _| InScattered::default())
+    walk::<false, M, S>(ray, world, settings, rng, |_: &Ray, _, _: &mut Generator| InScattered::default())
+}
+
+/// What a path leaves to another method: see [`radiance_beyond`]. A function `(segment, most, rng)` is one that
+/// computes the medium's light alone.
+pub trait Delegate {
+    /// Light that the medium scatters towards the origin of `segment`, attenuated on its way there, of light
+    /// scattered `most` times at most, here included. It will be multiplied by `throughput`.
+    fn in_scattered(&mut self, segment: &Ray, throughput: Spectrum, most: u32, rng: &mut Generator) -> InScattered;
+
+    /// Light that the surface at the end of `segment` reflects towards its origin, but for what comes to it straight
+    /// from the lights; it was scattered `most` times at most before it comes. It will be multiplied by `throughput`.
+    /// `None`, the default, lets the path find it.
+    fn reflected(
+        &mut self,
+        segment: &Ray,
+        hit: &Hit,
+        throughput: Spectrum,
+        most: u32,
+        rng: &mut Generator,
+    ) -> Option<Spectrum> {
+        let _ = (segment, hit, throughput, most, rng);
+        None
+    }
+}
+
+impl<F: FnMut(&Ray, u32, &mut Generator) -> InScattered> Delegate for F {
+    #[inline]
+    fn in_scattered(&mut self, segment: &Ray, _: Spectrum, most: u32, rng: &mut Generator) -> InScattered {
+        self(segment, most, rng)
+    }
 }
 
 /// The same with the medium's part left to another method: where the eye sees into the medium, straight or by
 /// way of mirrors and glass, the path does not collide with it, and what is scattered there comes from
-/// `in_scattered`.
+/// `delegate`.
 ///
-/// That is asked for every such segment, how often at most its light may be scattered, and given
-/// random numbers. From the first surface on that is neither mirror nor glass, paths go on as those of [`radiance`];
+/// From the first surface on that is neither mirror nor glass, paths go on as those of [`radiance`], unless
+/// `delegate` takes that surface's indirect light upon itself, too;
 /// their light counts as that of the surface, also where a medium scattered it on its way there.
 /// The medium's own glow is taken along the way.
 ///
@@ -126,9 +156,9 @@ pub fn radiance_beyond<M: Medium + ?Sized, S: Scene + ?Sized>(
     world: &World<'_, M, S>,
     settings: &Settings,
     rng: &mut (impl Rng + ?Sized),
-    in_scattered: impl FnMut(&Ray, u32, &mut Generator) -> InScattered,
+    delegate: impl Delegate,
 ) -> Radiance {
-    walk::<true, M, S>(ray, world, settings, rng, in_scattered)
+    walk::<true, M, S>(ray, world, settings, rng, delegate)
 }
 
 /// `BEYOND` tells [`radiance_beyond`] from [`radiance`].
@@ -137,9 +167,10 @@ fn walk<const BEYOND: bool, M: Medium + ?Sized, S: Scene + ?Sized>(
     world: &World<'_, M, S>,
     settings: &Settings,
     rng: &mut (impl Rng + ?Sized),
-    mut in_scattered: impl FnMut(&Ray, u32, &mut Generator) -> InScattered,
+    mut delegate: impl Delegate,
 ) -> Radiance {
     let mut is_seen = BEYOND;
+    let mut max_scatterings = settings.max_scatterings;
     let mut path = Path {
         radiance: Radiance::default(),
         throughput: Spectrum::ONE,
@@ -163,9 +194,9 @@ fn walk<const BEYOND: bool, M: Medium + ?Sized, S: Scene + ?Sized>(
         if is_seen {
             let weight = transmittance(world.medium, &segment, &mut child);
             flown = Flight { weight, ..Flight::through(&segment) };
-            let left = settings.max_scatterings.saturating_sub(path.scatterings);
+            let left = max_scatterings.saturating_sub(path.scatterings);
             if left > 0 {
-                let light = in_scattered(&segment, left, &mut child);
+                let light = delegate.in_scattered(&segment, path.throughput, left, &mut child);
                 let first = if path.first == First::Nothing { First::Medium } else { path.first };
                 path.add(path.throughput * light.single, first, path.scatterings + 1);
                 path.add(path.throughput * light.multiple, first, path.scatterings + 2);
@@ -173,7 +204,7 @@ fn walk<const BEYOND: bool, M: Medium + ?Sized, S: Scene + ?Sized>(
         }
         if has_near_fields {
             let random = (uniform(rng), uniform(rng), uniform2(rng));
-            if !is_seen && path.scatterings < settings.max_scatterings && flown.span.1 > flown.span.0 {
+            if !is_seen && path.scatterings < max_scatterings && flown.span.1 > flown.span.0 {
                 let light = connect::along(world, &segment, &flown, random, &mut child);
                 let first = if path.first == First::Nothing { First::Medium } else { path.first };
                 path.add(path.throughput * light, first, path.scatterings + 1);
@@ -192,7 +223,7 @@ fn walk<const BEYOND: bool, M: Medium + ?Sized, S: Scene + ?Sized>(
             path.arrive(First::Medium);
             path.radiance.collisions += 1;
             path.throughput *= properties.albedo();
-            if path.scatterings > settings.max_scatterings || path.throughput.is_black() {
+            if path.scatterings > max_scatterings || path.throughput.is_black() {
                 break;
             }
             let point = segment.at(flown.distance);
@@ -228,10 +259,17 @@ fn walk<const BEYOND: bool, M: Medium + ?Sized, S: Scene + ?Sized>(
                 continue;
             }
             path.arrive(First::Surface);
-            if path.scatterings > settings.max_scatterings {
+            if path.scatterings > max_scatterings {
                 break;
             }
             let to_eye = -ray.direction;
+            let seen_surface = is_seen && !hit.surface.is_discrete();
+            let left = max_scatterings - path.scatterings;
+            if seen_surface && let Some(light) = delegate.reflected(&segment, &hit, path.throughput, left, &mut child) {
+                path.add(path.throughput * light, path.first, path.scatterings + 1);
+                // The path itself goes on only to meet lights, which weigh against connections to them.
+                max_scatterings = path.scatterings;
+            }
             let surface = hit.surface;
             if !surface.is_discrete() {
                 let light = connect::next_event(

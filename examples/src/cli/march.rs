@@ -2,9 +2,9 @@
 
 use fogbow::host::Medium;
 use fogbow::march;
-use fogbow::math::Vec2;
+use fogbow::math::{Ray, Vec2};
 use fogbow::path::{self, InScattered, World as PathWorld};
-use fogbow::sampling::{uniform, uniform2};
+use fogbow::sampling::{Generator, uniform, uniform2};
 use fogbow::spectrum::Spectrum;
 use fogbow_std::film::Film;
 use fogbow_std::stats::{CountingMedium, CountingScene};
@@ -41,23 +41,24 @@ impl WithMedium for MarchJob<'_> {
             let at = Vec2::new(sample.x as f32, sample.y as f32) + uniform2(rng);
             let ray = shot.camera.ray(at / Vec2::new(width as f32, height as f32));
             let mut count = 0_u32;
-            let seen = path::radiance_beyond(&ray, &world, &shot.paths, rng, |segment, most, rng| {
-                if !shot.is_computed(sample, width) {
-                    return InScattered::default();
-                }
-                let settings = path::Settings { max_scatterings: most, ..shot.paths };
-                let mut light = InScattered::default();
-                let offset = uniform(rng);
-                march::steps(segment, world.medium, stride.steps(segment), offset, |at, properties, weight| {
-                    count += 1;
-                    let (point, to_eye) = (segment.at(at), -segment.direction);
-                    let here = path::in_scattered(&world, point, to_eye, &properties.phase, &settings, rng);
-                    let factor: Spectrum = weight * properties.scattering;
-                    light.single += factor * here.single;
-                    light.multiple += factor * here.multiple;
+            let seen =
+                path::radiance_beyond(&ray, &world, &shot.paths, rng, |segment: &Ray, most, rng: &mut Generator| {
+                    if !shot.is_computed(sample, width) {
+                        return InScattered::default();
+                    }
+                    let settings = path::Settings { max_scatterings: most, ..shot.paths };
+                    let mut light = InScattered::default();
+                    let offset = uniform(rng);
+                    march::steps(segment, world.medium, stride.steps(segment), offset, |at, properties, weight| {
+                        count += 1;
+                        let (point, to_eye) = (segment.at(at), -segment.direction);
+                        let here = path::in_scattered(&world, point, to_eye, &properties.phase, &settings, rng);
+                        let factor: Spectrum = weight * properties.scattering;
+                        light.single += factor * here.single;
+                        light.multiple += factor * here.multiple;
+                    });
+                    light
                 });
-                light
-            });
             sample.tally.collide(seen.collisions + count);
             write_layers(&seen, layers);
             if let Some(steps) = layers.get_mut(LAYERS.len()) {

@@ -8,9 +8,9 @@ use clap::{Args, ValueEnum};
 use fogbow::covariance::Grid;
 use fogbow::host::Medium;
 use fogbow::light::Light;
-use fogbow::math::Vec2;
+use fogbow::math::{Ray, Vec2};
 use fogbow::path::{self, InScattered, Radiance, World as PathWorld};
-use fogbow::sampling::uniform2;
+use fogbow::sampling::{Generator, uniform2};
 use fogbow::spectrum::Spectrum;
 use fogbow_std::covariance::{CovarianceGrid, FillError};
 use fogbow_std::film::Film;
@@ -409,7 +409,9 @@ impl WithMedium for Job<'_> {
             let seen = if shot.is_computed(sample, width) {
                 path::radiance(&ray, &world, &shot.paths, rng)
             } else {
-                path::radiance_beyond(&ray, &world, &shot.paths, rng, |_, _, _| InScattered::default())
+                path::radiance_beyond(&ray, &world, &shot.paths, rng, |_: &Ray, _, _: &mut Generator| {
+                    InScattered::default()
+                })
             };
             sample.tally.collide(seen.collisions);
             write_layers(&seen, layers);

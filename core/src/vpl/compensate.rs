@@ -1,0 +1,153 @@
+//! What clamping takes away, found again: the next vertex of a compensation path.
+
+use super::bound::Bound;
+use super::scatterer::{Receiver, Scatterer};
+use crate::host::{Medium, Scene};
+use crate::math::{Ray, float};
+use crate::path::World;
+use crate::sampling::distance::truncated_exponential;
+use crate::sampling::{Generator, uniform, uniform2};
+use crate::single_scatter::nearest_surface;
+use crate::spectrum::Spectrum;
+use crate::transmittance::{flight, transmittance};
+
+/// How far the next vertex lies, and what light loses on the way there.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Flights {
+    /// Woodcock tracking: unbiased; many flights leave the ball in which anything is missing.
+    Woodcock,
+    /// The truncated exponential of the mean extinction around the receiver (Engelhardt et al. 2012, Eq. 4–5), with
+    /// the transmittance that is really there: unbiased, and all flights end within the ball.
+    Truncated,
+    /// The same, and the transmittance is that of the mean extinction, too: cheaper, and biased where extinction
+    /// varies within the ball.
+    LocallyHomogeneous,
+}
+
+/// Which vertices of compensation paths see which virtual lights.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Strategy {
+    /// A point on the eye ray has one compensation path, whose vertices see all lights (Raab et al. 2008).
+    OneToN,
+    /// A point on the eye ray has a compensation path for each light.
+    NToOne,
+    /// Each light has a point on the eye ray of its own, with a compensation path of its own.
+    OneToOne,
+}
+
+/// How what clamping takes away is brought back.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Compensation {
+    /// Who sees whom.
+    pub strategy: Strategy,
+    /// How vertices are found.
+    pub flights: Flights,
+    /// Vertices of a compensation path at most: of what clamping takes, a share of `κ_B` to this power is left (see
+    /// [`contraction`](super::contraction)). `u32::MAX` for no limit.
+    pub steps: u32,
+    /// Whether a vertex that lies behind a surface is none. If not, light leaks through thin walls, by little
+    /// (Engelhardt et al. 2012, § 4.4), and surfaces beside a medium send it nothing back. Receivers on surfaces
+    /// always look.
+    pub local_visibility: bool,
+}
+
+impl Compensation {
+    /// All of it, without bias (Raab et al. 2008): the reference.
+    pub const FULL: Self =
+        Self { strategy: Strategy::OneToN, flights: Flights::Woodcock, steps: u32::MAX, local_visibility: true };
+    /// Engelhardt's N-to-1.
+    pub const N_TO_ONE: Self = Self { strategy: Strategy::NToOne, steps: 2, ..Self::FULL };
+    /// Engelhardt's 1-to-1.
+    pub const ONE_TO_ONE: Self = Self { strategy: Strategy::OneToOne, steps: 2, ..Self::FULL };
+    /// Approximate bias compensation: 1-to-1, locally homogeneous.
+    pub const APPROXIMATE: Self = Self { flights: Flights::LocallyHomogeneous, ..Self::ONE_TO_ONE };
+}
+
+/// The next vertex of a compensation path from `receiver`, and the weight of what is scattered there towards it.
+///
+/// ```text
+/// C(y,ω) = ∫∫ f̂ D V̂ B̂ L_o(y′,ω′) dt dω′ (+ a surface within d)  =  E w L_o(y′)
+/// w = (f̂ D/p(ω′)) T B̂/p(t),   at a surface at s:  (f̂ D/p(ω′)) T B̂/Prob(t ≥ s)
+/// ```
+///
+/// `None` where the path ends. Engelhardt et al. 2012, Eq. 3–5 with the sheet's § 3.3 and 3.4: the paper leaves out the
+/// integral over distance and, in its pseudo-code, `σₛ(y)`.
+#[must_use]
+pub fn next_vertex<M: Medium + ?Sized, S: Scene + ?Sized>(
+    world: &World<'_, M, S>,
+    receiver: &Receiver,
+    bound: Bound,
+    compensation: &Compensation,
+    rng: &mut Generator,
+) -> Option<(Receiver, Spectrum)> {
+    let (choice, u_direction, u_distance) = (uniform(rng), uniform2(rng), uniform(rng));
+    let radius = bound.radius();
+    if !(radius > 0.0) {
+        return None;
+    }
+    let (direction, scattered) = receiver.scatterer.sample(receiver.to_eye, choice, u_direction)?;
+    let cosine = receiver.scatterer.cosine(direction);
+    // Farther along this direction nothing is clamped.
+    let limit = radius * float::sqrt(cosine);
+    let way = Ray { origin: receiver.origin(direction), direction, length: limit };
+    if scattered.is_black() || !(limit > 0.0) {
+        return None;
+    }
+    let looks = compensation.local_visibility || matches!(receiver.scatterer, Scatterer::Surface { .. });
+    let hit = if looks { nearest_surface(&way, world.scene) } else { None };
+    let clear = hit.as_ref().map_or(limit, |hit| hit.distance);
+
+    // Distance to a vertex in the medium, or none; what light loses on the way over the density of arriving there.
+    let (vertex, arriving) = if compensation.flights == Flights::Woodcock {
+        let flown = flight(world.medium, &way.with_length(clear), scattered, u_distance, rng);
+        match flown.collision {
+            Some(properties) => (Some((flown.distance, properties)), flown.weight.ratio(properties.extinction())),
+            None => (None, flown.weight),
+        }
+    } else {
+        let mean = world.medium.mean_extinction(receiver.point, radius);
+        let rate = mean.mean();
+        let sample = truncated_exponential(u_distance, rate, limit);
+        let lost = |distance: f32, rng: &mut Generator| {
+            if compensation.flights == Flights::LocallyHomogeneous {
+                (mean * distance).transmitted()
+            } else {
+                transmittance(world.medium, &way.with_length(distance), rng)
+            }
+        };
+        if sample.distance < clear || hit.is_none() {
+            let properties = world.medium.properties(way.at(sample.distance));
+            (Some((sample.distance, properties)), lost(sample.distance, rng) * (1.0 / sample.pdf))
+        } else {
+            let reached = truncated_exponential_tail(clear, rate, limit);
+            (None, lost(clear, rng) * (1.0 / reached))
+        }
+    };
+    let to_eye = -direction;
+    let (next, distance, cosines) = match (vertex, hit) {
+        (Some((distance, properties)), _) => {
+            (Receiver::in_medium(way.at(distance), to_eye, &properties)?, distance, cosine)
+        }
+        (None, Some(hit)) => {
+            let next = Receiver::on_surface(way.at(hit.distance), to_eye, &hit)?;
+            (next, hit.distance, cosine * next.scatterer.cosine(to_eye))
+        }
+        (None, None) => return None,
+    };
+    let weight = scattered * arriving * bound.missing(distance * distance, cosines);
+    (!weight.is_black()).then_some((next, weight))
+}
+
+/// Probability that a truncated exponential distance is `distance` (m) or more.
+///
+/// ```text
+/// (e^{−σs} − e^{−σd})/(1 − e^{−σd}) = (1 − e^{−σ(d−s)}) e^{−σs}/(1 − e^{−σd})
+/// ```
+fn truncated_exponential_tail(distance: f32, extinction: f32, limit: f32) -> f32 {
+    let rest = limit - distance;
+    let a = extinction * limit;
+    if a < 1e-4 {
+        return (rest / limit) * (1.0 - 0.5 * extinction * distance);
+    }
+    float::exp_m1(-extinction * rest) / float::exp_m1(-a) * float::exp(-extinction * distance)
+}

@@ -1,0 +1,181 @@
+//! Eye rays: where virtual lights are gathered.
+
+use glam::Vec3;
+
+use super::compensate::Strategy;
+use super::gather::{Gathered, Gatherer, LEVELS};
+use super::light::VirtualLight;
+use super::scatterer::Receiver;
+use crate::host::{Hit, Medium, Rng, Scene};
+use crate::march::scattering_points;
+use crate::math::{Ray, float};
+use crate::path::{self, Delegate, InScattered, Radiance};
+use crate::sampling::{Generator, uniform};
+use crate::spectrum::Spectrum;
+use crate::transmittance::thickness::{Marching, optical_thickness};
+
+/// Points on a segment of an eye ray that are held at once; lights beyond as many get points of their own.
+const POINTS: usize = 32;
+
+/// How eye rays see virtual lights.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct EyeSettings {
+    /// How long paths may grow.
+    pub paths: path::Settings,
+    /// Points on a segment of the ray that each light is gathered at.
+    pub points: u32,
+    /// Samples of light that the medium scatters once, for each segment.
+    pub single: u32,
+    /// Compensation paths for light that comes straight from the lights, for each segment.
+    pub primary: u32,
+}
+
+impl EyeSettings {
+    /// One point for each light, four samples of single scattering, two compensation paths.
+    #[must_use]
+    pub fn new(paths: path::Settings) -> Self {
+        Self { paths, points: 1, single: 4, primary: 2 }
+    }
+}
+
+/// What an eye ray sees.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Seen {
+    /// Radiance by what the eye sees first.
+    pub radiance: Radiance,
+    /// Of that, light of virtual lights, clamped.
+    pub clamped: Spectrum,
+    /// Of that, what the steps of compensation added; from the last on all together.
+    pub compensated: [Spectrum; LEVELS],
+}
+
+/// Radiance that arrives at the origin of `ray`, from `lights` a part of all virtual lights: they count `share` times, so
+/// that a host may show each ray a part of them, one of `share` equal ones.
+///
+/// Light that is scattered once, and what is seen in mirrors, comes as in path tracing; light of surfaces and of the
+/// medium scattered more often from the virtual lights. In segments through a medium, points are drawn by the light
+/// they scatter ([`scattering_points`]).
+pub fn radiance<M: Medium + ?Sized, S: Scene + ?Sized>(
+    ray: &Ray,
+    gatherer: &Gatherer<'_, M, S>,
+    lights: &[VirtualLight],
+    share: f32,
+    settings: &EyeSettings,
+    rng: &mut (impl Rng + ?Sized),
+) -> Seen {
+    let mut eye = Eye { gatherer, lights, share, settings, sum: Gathered::default() };
+    let radiance = path::radiance_beyond(ray, &gatherer.world, &settings.paths, rng, &mut eye);
+    Seen { radiance, clamped: eye.sum.clamped, compensated: eye.sum.compensated }
+}
+
+struct Eye<'a, M: ?Sized, S: ?Sized> {
+    gatherer: &'a Gatherer<'a, M, S>,
+    lights: &'a [VirtualLight],
+    share: f32,
+    settings: &'a EyeSettings,
+    sum: Gathered,
+}
+
+type Points = heapless::Vec<(Receiver, Spectrum), POINTS>;
+
+impl<M: Medium + ?Sized, S: Scene + ?Sized> Eye<'_, M, S> {
+    /// About `wanted` points of a segment, each with the weight that it has if it is drawn from them alone.
+    fn points(&self, segment: &Ray, opacity: f32, wanted: usize, rng: &mut Generator) -> Points {
+        let medium = self.gatherer.world.medium;
+        let mut points = Points::new();
+        let mut count = 0_u32;
+        let (u, jitter) = (uniform(rng), uniform(rng));
+        let to_eye: Vec3 = -segment.direction;
+        scattering_points(segment, medium, wanted as f32 / opacity, u, jitter, |distance, properties, weight| {
+            let Some(receiver) = Receiver::in_medium(segment.at(distance), to_eye, properties) else { return };
+            count += 1;
+            // What does not fit takes the place of another, so that each is as likely to be there.
+            if let Err(point) = points.push((receiver, weight)) {
+                let place = (uniform(rng) * count as f32) as usize;
+                if let Some(slot) = points.get_mut(place) {
+                    *slot = point;
+                }
+            }
+        });
+        for (_, weight) in &mut points {
+            *weight *= count as f32;
+        }
+        points
+    }
+
+    fn single(&self, segment: &Ray, rng: &mut Generator) -> Spectrum {
+        let once = path::Settings { max_scatterings: 1, lights_visible: false, ..self.settings.paths };
+        // It ends before the surface.
+        let way = segment.with_length(segment.length * (1.0 - 1e-4));
+        let count = self.settings.single.max(1);
+        let sum: Spectrum =
+            (0..count).map(|_| path::radiance(&way, &self.gatherer.world, &once, rng).medium_single).sum();
+        sum * (1.0 / count as f32)
+    }
+
+    fn add(&mut self, gathered: &Gathered, throughput: Spectrum, weight: Spectrum) -> Spectrum {
+        self.sum.add(gathered, throughput * weight);
+        gathered.total() * weight
+    }
+
+    /// Light scattered more than once, that the medium sends towards the origin of `segment`.
+    fn multiple(&mut self, segment: &Ray, throughput: Spectrum, before: u32, rng: &mut Generator) -> Spectrum {
+        let medium = self.gatherer.world.medium;
+        let marching = Marching::new(medium.resolution(), uniform(rng));
+        let opacity = -float::exp_m1(-optical_thickness(segment, medium, marching).mean());
+        let mut light = Spectrum::ZERO;
+        if !(opacity > 1e-6) {
+            return light;
+        }
+        let primary = self.settings.primary.clamp(1, POINTS as u32 / 2) as usize;
+        let points = self.points(segment, opacity, primary, rng);
+        for (receiver, weight) in &points {
+            let gathered = self.gatherer.of_the_lights(receiver, before, rng);
+            light += self.add(&gathered, throughput, *weight * (1.0 / points.len() as f32));
+        }
+        let own = self.gatherer.compensation.is_some_and(|c| c.strategy == Strategy::OneToOne);
+        for round in 0..self.settings.points.max(1) {
+            let share = Spectrum::splat(self.share / self.settings.points.max(1) as f32);
+            let lights = self.lights;
+            for group in lights.chunks(if own { POINTS / 2 } else { lights.len().max(1) }) {
+                let points = self.points(segment, opacity, if own { group.len() } else { 1 }, rng);
+                if points.is_empty() {
+                    continue;
+                }
+                // Each light takes the next point; which is the first must be left to chance.
+                let first = (uniform(rng) * points.len() as f32) as usize + round as usize;
+                for (i, part) in group.chunks(if own { 1 } else { group.len() }).enumerate() {
+                    let (receiver, weight) = &points[(first + i) % points.len()];
+                    let gathered = self.gatherer.gather(receiver, part, before, rng);
+                    light += self.add(&gathered, throughput, *weight * share);
+                }
+            }
+        }
+        light
+    }
+}
+
+impl<M: Medium + ?Sized, S: Scene + ?Sized> Delegate for &mut Eye<'_, M, S> {
+    fn in_scattered(&mut self, segment: &Ray, throughput: Spectrum, most: u32, rng: &mut Generator) -> InScattered {
+        let single = self.single(segment, rng);
+        let multiple = if most > 1 { self.multiple(segment, throughput, most - 1, rng) } else { Spectrum::ZERO };
+        InScattered { single, multiple }
+    }
+
+    fn reflected(
+        &mut self,
+        segment: &Ray,
+        hit: &Hit,
+        throughput: Spectrum,
+        most: u32,
+        rng: &mut Generator,
+    ) -> Option<Spectrum> {
+        let Some(receiver) = Receiver::on_surface(segment.at(hit.distance), -segment.direction, hit) else {
+            return Some(Spectrum::ZERO);
+        };
+        let primary = self.gatherer.of_the_lights(&receiver, most, rng);
+        let gathered = self.gatherer.gather(&receiver, self.lights, most, rng);
+        let light = self.add(&primary, throughput, Spectrum::ONE);
+        Some(light + self.add(&gathered, throughput, Spectrum::splat(self.share)))
+    }
+}

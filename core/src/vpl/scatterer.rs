@@ -1,0 +1,119 @@
+//! What scatters light at a point: a medium or a surface.
+
+use glam::{Vec2, Vec3};
+
+use crate::host::{Hit, Properties};
+use crate::phase::{Phase, deflection};
+use crate::spectrum::Spectrum;
+use crate::surface::Surface;
+
+/// What scatters light at a point: `f̂` of Engelhardt et al. 2012, with its cosine `D`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Scatterer {
+    /// A medium: `f̂ = σₛ p`, `D = 1`.
+    Medium {
+        /// `σₛ` (m⁻¹).
+        scattering: Spectrum,
+        /// `p`.
+        phase: Phase,
+    },
+    /// A surface: `f̂ = f_r`, `D = n·ω`.
+    Surface {
+        /// Its normal (unit).
+        normal: Vec3,
+        /// What it does to light.
+        surface: Surface,
+    },
+}
+
+impl Scatterer {
+    /// `f̂` for light that comes from `to_light` and leaves towards `to_eye` (unit), per steradian (and metre, in a
+    /// medium).
+    #[inline]
+    #[must_use]
+    pub fn value(&self, to_eye: Vec3, to_light: Vec3) -> Spectrum {
+        match self {
+            Self::Medium { scattering, phase } => *scattering * phase.value(deflection(to_light, to_eye)),
+            Self::Surface { normal, surface } => surface.value(*normal, to_eye, to_light),
+        }
+    }
+
+    /// `D` of a direction that leaves the point: the cosine before a surface, 0 behind it, 1 in a medium.
+    #[inline]
+    #[must_use]
+    pub fn cosine(&self, direction: Vec3) -> f32 {
+        match self {
+            Self::Medium { .. } => 1.0,
+            Self::Surface { normal, .. } => normal.dot(direction).max(0.0),
+        }
+    }
+
+    /// Draws the direction from which light comes that leaves towards `to_eye`, with `f̂ D` over the density.
+    #[inline]
+    #[must_use]
+    pub fn sample(&self, to_eye: Vec3, choice: f32, u: Vec2) -> Option<(Vec3, Spectrum)> {
+        match self {
+            Self::Medium { scattering, phase } => {
+                let sample = phase.sample(to_eye, u);
+                Some((sample.to_light, *scattering * sample.weight))
+            }
+            Self::Surface { normal, surface } => {
+                let sample = surface.sample(*normal, to_eye, choice, u)?;
+                Some((sample.to_light, sample.weight))
+            }
+        }
+    }
+}
+
+/// A point that light is gathered for, and where that light goes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Receiver {
+    /// Where (m); on a surface the very point, which rays to it have to leave.
+    pub point: Vec3,
+    /// Where the light leaves to (unit).
+    pub to_eye: Vec3,
+    /// What scatters it there.
+    pub scatterer: Scatterer,
+}
+
+impl Receiver {
+    /// A point of a medium; `None` where nothing scatters.
+    #[inline]
+    #[must_use]
+    pub fn in_medium(point: Vec3, to_eye: Vec3, properties: &Properties) -> Option<Self> {
+        let scattering = properties.scattering;
+        (!scattering.is_black()).then_some(Self {
+            point,
+            to_eye,
+            scatterer: Scatterer::Medium { scattering, phase: properties.phase },
+        })
+    }
+
+    /// A point of a surface; `None` for surfaces that send light on in discrete directions, and for black ones.
+    #[inline]
+    #[must_use]
+    pub fn on_surface(point: Vec3, to_eye: Vec3, hit: &Hit) -> Option<Self> {
+        let scatters = !hit.surface.is_discrete() && !hit.surface.albedo().is_black();
+        (scatters && hit.normal.dot(to_eye) > 0.0).then_some(Self {
+            point,
+            to_eye,
+            scatterer: Scatterer::Surface { normal: hit.normal, surface: hit.surface },
+        })
+    }
+
+    /// Where a ray towards `direction` starts (m).
+    #[inline]
+    #[must_use]
+    pub fn origin(&self, direction: Vec3) -> Vec3 {
+        origin(self.point, &self.scatterer, direction)
+    }
+}
+
+/// `point`, moved off its surface to the side of `direction`.
+#[inline]
+pub(super) fn origin(point: Vec3, scatterer: &Scatterer, direction: Vec3) -> Vec3 {
+    match scatterer {
+        Scatterer::Medium { .. } => point,
+        Scatterer::Surface { normal, .. } => crate::path::trace::leave(point, *normal, direction, 0.0),
+    }
+}
