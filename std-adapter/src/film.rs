@@ -199,6 +199,21 @@ impl Film {
         Some(Image { width: self.width, height: self.height, pixels })
     }
 
+    /// The same picture with its first `layers` layers alone.
+    ///
+    /// # Errors
+    /// [`SizeError::NoLayers`] for none, [`SizeError::Memory`].
+    pub fn first(&self, layers: usize) -> Result<Self, SizeError> {
+        let names = &self.names[..layers.min(self.names.len())];
+        let mut film = Self::new(self.width, self.height, names)?;
+        let kept = names.len();
+        for (to, from) in film.sums.chunks_exact_mut(kept).zip(self.sums.chunks_exact(self.names.len())) {
+            to.copy_from_slice(&from[..kept]);
+        }
+        film.counts.copy_from_slice(&self.counts);
+        Ok(film)
+    }
+
     /// Sums and count of row `y`, columns `from..to`; the caller stays inside.
     pub(crate) fn row(&self, y: u32, from: u32, to: u32) -> (&[[f64; 3]], &[u32]) {
         let (a, b) = self.span(y, from, to);

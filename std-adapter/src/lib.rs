@@ -11,6 +11,7 @@
 //! | [`radiance_cache`] | filling radiance caches in parallel; their files |
 //! | [`image`] | PNG, PFM and (feature `exr`, on by default) OpenEXR files |
 //! | [`image_sampling`] | which pixels are computed, and filling in the others |
+//! | [`virtual_lights`] | many virtual lights in parallel, pass by pass |
 //! | [`stats`] | seconds per phase, queries of the world |
 //!
 //! A glowing fog in front of a black wall, 2 m away at the left and 6 m at the right:
@@ -49,3 +50,4 @@ pub mod radiance_cache;
 pub mod seed;
 pub mod stats;
 pub mod tiles;
+pub mod virtual_lights;

@@ -21,7 +21,7 @@ use crate::film::Film;
 use crate::progress::Control;
 use crate::seed::{SampleRng, independent};
 use crate::stats::{CountingMedium, CountingScene};
-use crate::tiles::{self, Outcome, RenderError, Sample, render_prepared};
+use crate::tiles::{self, Outcome, Passes, RenderError, Sample, render_prepared};
 
 /// How to shoot and gather.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -240,7 +240,7 @@ where
     // A multiple of the length, `u32::MAX` included.
     let samples = tiles.samples.checked_next_multiple_of(length.get()).unwrap_or(u32::MAX / length * length.get());
     let tiles = &tiles::Settings { samples, ..*tiles };
-    render_prepared(film, tiles, control, length, prepare, |beams, sample, rng, layers| {
+    render_prepared(film, tiles, control, Passes { length, may_break: false }, prepare, |beams, sample, rng, layers| {
         let world = World {
             medium: &CountingMedium { medium: view.world.medium, tally: sample.tally },
             scene: &CountingScene { scene: view.world.scene, tally: sample.tally },

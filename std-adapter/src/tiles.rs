@@ -145,12 +145,21 @@ where
     Ok(Outcome { samples: film.min_count(), reason, counters, seconds: clock.elapsed() })
 }
 
-/// As [`render`], in passes of `length` samples of every pixel, for methods whose samples share something that is
+/// Passes of samples that share something.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Passes {
+    /// Samples of every pixel in a pass.
+    pub length: NonZero<u32>,
+    /// Whether time may end a render within a pass: the samples of a part of a pass make a picture, too.
+    pub may_break: bool,
+}
+
+/// As [`render`], in `passes`, for methods whose samples share something that is
 /// made anew for each pass: `prepare` is told the number of the pass, and what it makes is lent to `integrand`.
 ///
 /// `prepare` may use all threads of the pool it is called in. For bits that do not depend on their number, let what it
-/// makes depend on the number of the pass alone. Time ends a render between passes; the last is cut short where
-/// [`Settings::samples`] says so.
+/// makes depend on the number of the pass alone. Time ends a render between passes, unless these may break; the last is
+/// cut short where [`Settings::samples`] says so.
 ///
 /// # Errors
 /// As [`render`], and what `prepare` fails with; the film then holds the passes up to there.
@@ -158,10 +167,11 @@ where
 /// ```
 /// use core::num::NonZero;
 /// use fogbow::spectrum::Spectrum;
-/// use fogbow_std::{film::Film, progress::Control, tiles::{RenderError, Settings, render_prepared}};
+/// use fogbow_std::{film::Film, progress::Control, tiles::{Passes, RenderError, Settings, render_prepared}};
 /// let mut film = Film::new(2, 2, &["total"]).unwrap();
 /// let settings = Settings { samples: 6, ..Settings::default() };
-/// render_prepared(&mut film, &settings, &Control::default(), NonZero::new(2).unwrap(),
+/// let passes = Passes { length: NonZero::new(2).unwrap(), may_break: false };
+/// render_prepared(&mut film, &settings, &Control::default(), passes,
 ///     |pass| Ok::<f32, RenderError>(pass as f32),
 ///     |prepared, _, _, layers| layers[0] = Spectrum::splat(*prepared),
 /// ).unwrap();
@@ -171,7 +181,7 @@ pub fn render_prepared<T, E, P, F>(
     film: &mut Film,
     settings: &Settings,
     control: &Control<'_>,
-    length: NonZero<u32>,
+    passes: Passes,
     mut prepare: P,
     integrand: F,
 ) -> Result<Outcome, E>
@@ -195,21 +205,34 @@ where
                 return Ok((Reason::Cancelled, counters));
             }
             let before = reporter.elapsed();
-            let pass = done / length;
+            let pass = done / passes.length;
             let prepared = prepare(pass)?;
             let integrand = |sample: &Sample<'_>, rng: &mut SampleRng, layers: &mut [Spectrum]| {
                 integrand(&prepared, sample, rng, layers);
             };
-            let until = (pass * length.get()).saturating_add(length.get()).min(settings.samples);
-            let (reporter, film_of) = (&reporter, Mutex::new(&mut *film));
-            counters += Pass { film: film_of, settings, control, reporter, integrand: &integrand, until }.run();
-            if film.min_count() < until {
-                return Ok((Reason::Cancelled, counters));
-            }
-            let now = reporter.elapsed();
-            // The next pass will take about as long as this one.
-            if settings.time.is_some_and(|budget| until < settings.samples && now + (now - before) > budget) {
-                return Ok((Reason::TimeUp, counters));
+            let end = (pass * passes.length.get()).saturating_add(passes.length.get()).min(settings.samples);
+            let mut until = if passes.may_break && settings.time.is_some() { done + 1 } else { end };
+            loop {
+                let (from, start) = (film.min_count(), reporter.elapsed());
+                let (reporter, film_of) = (&reporter, Mutex::new(&mut *film));
+                counters += Pass { film: film_of, settings, control, reporter, integrand: &integrand, until }.run();
+                if film.min_count() < until {
+                    return Ok((Reason::Cancelled, counters));
+                }
+                let now = reporter.elapsed();
+                if until == end {
+                    // The next pass will take about as long as this one.
+                    let next = if passes.may_break { Duration::ZERO } else { now - before };
+                    if settings.time.is_some_and(|budget| until < settings.samples && now + next > budget) {
+                        return Ok((Reason::TimeUp, counters));
+                    }
+                    break;
+                }
+                let (Some(affordable), true) = (affordable(settings, now, now - start, until - from), until < end)
+                else {
+                    return Ok((Reason::TimeUp, counters));
+                };
+                until = until.saturating_add(affordable.min(until)).min(end);
             }
         }
     })?;
@@ -265,18 +288,25 @@ where
         }
         let now = reporter.elapsed();
         length = until.min(LONGEST_PASS);
-        if let Some(budget) = settings.time
-            && until < settings.samples
-        {
-            let per_sample = (now - before).as_secs_f64() / f64::from(until - done);
-            let affordable = (budget.saturating_sub(now).as_secs_f64() / per_sample).min(1e6);
-            if now >= budget || affordable < 1.0 {
-                return (Reason::TimeUp, counters);
+        if until < settings.samples {
+            match affordable(settings, now, now - before, until - done) {
+                Some(affordable) => length = length.min(affordable),
+                None => return (Reason::TimeUp, counters),
             }
-            // Passes vary in speed: most of what is left now, the rest by a better estimate.
-            length = length.min((0.75 * affordable) as u32).max(1);
         }
     }
+}
+
+/// How many samples the time left allows, after `samples` took `taken`; `None` if it is up.
+fn affordable(settings: &Settings, now: Duration, taken: Duration, samples: u32) -> Option<u32> {
+    let Some(budget) = settings.time else { return Some(u32::MAX) };
+    let per_sample = taken.as_secs_f64() / f64::from(samples);
+    let affordable = (budget.saturating_sub(now).as_secs_f64() / per_sample).min(1e6);
+    if now >= budget || affordable < 1.0 {
+        return None;
+    }
+    // Passes vary in speed: most of what is left now, the rest by a better estimate.
+    Some(((0.75 * affordable) as u32).max(1))
 }
 
 /// One pass: every pixel gets its samples up to `until`.

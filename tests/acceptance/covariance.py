@@ -79,7 +79,7 @@ def steps(options):
 
     uniform = curve("uniform", [("--step-length", length) for length in (1.2, 0.6, 0.3, 0.15, 0.075)])
     grid = ("--grid-paths", options.paths, "--step-length", 8)
-    ours = curve("covariance", [("--step", "covariance", "--steps", n, *grid) for n in (8, 16, 32)])
+    ours = curve("covariance", [("--step", "covariance", "--step-count", n, *grid) for n in (8, 16, 32)])
     curve("frequency", [("--step", "frequency", *grid)])
     curve("64 against", [("--step", "covariance", *grid, "--grid-cells", n) for n in (32, 128)])
     errors, samples, seconds, _ = map(np.log, np.maximum(np.array(uniform).T, 1e-9))

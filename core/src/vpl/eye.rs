@@ -1,7 +1,5 @@
 //! Eye rays: where virtual lights are gathered.
 
-use glam::Vec3;
-
 use super::compensate::Strategy;
 use super::gather::{Gathered, Gatherer, LEVELS};
 use super::light::VirtualLight;
@@ -9,7 +7,7 @@ use super::scatterer::Receiver;
 use crate::host::{Hit, Medium, Rng, Scene};
 use crate::march::scattering_points;
 use crate::math::{Ray, float};
-use crate::path::{self, Delegate, InScattered, Radiance};
+use crate::path::{self, Delegate, InScattered, Radiance, World};
 use crate::sampling::{Generator, uniform};
 use crate::spectrum::Spectrum;
 use crate::transmittance::thickness::{Marching, optical_thickness};
@@ -68,6 +66,51 @@ pub fn radiance<M: Medium + ?Sized, S: Scene + ?Sized>(
     Seen { radiance, clamped: eye.sum.clamped, compensated: eye.sum.compensated }
 }
 
+/// Calls `visit(receiver, weight)` for a point of the medium and the surface that an eye ray would gather at; `weight` is
+/// what light from there counts for in the picture. For each segment, behind mirrors and glass, too.
+///
+/// By what lights send to a few such points it is seen which of them matter: see [`select`](super::select).
+pub fn receivers<M: Medium + ?Sized, S: Scene + ?Sized>(
+    ray: &Ray,
+    world: &World<'_, M, S>,
+    paths: &path::Settings,
+    rng: &mut (impl Rng + ?Sized),
+    visit: impl FnMut(&Receiver, Spectrum),
+) {
+    path::radiance_beyond(ray, world, paths, rng, Scout { medium: world.medium, visit });
+}
+
+struct Scout<'a, M: ?Sized, F> {
+    medium: &'a M,
+    visit: F,
+}
+
+impl<M: Medium + ?Sized, F: FnMut(&Receiver, Spectrum)> Delegate for Scout<'_, M, F> {
+    fn in_scattered(&mut self, segment: &Ray, throughput: Spectrum, _: u32, rng: &mut Generator) -> InScattered {
+        let opacity = opacity_of(segment, self.medium, rng);
+        if opacity > INVISIBLE {
+            for (receiver, weight) in &points_on(self.medium, segment, opacity, 1, rng) {
+                (self.visit)(receiver, throughput * *weight);
+            }
+        }
+        InScattered::default()
+    }
+
+    fn reflected(
+        &mut self,
+        segment: &Ray,
+        hit: &Hit,
+        throughput: Spectrum,
+        _: u32,
+        _: &mut Generator,
+    ) -> Option<Spectrum> {
+        if let Some(receiver) = Receiver::on_surface(segment.at(hit.distance), -segment.direction, hit) {
+            (self.visit)(&receiver, throughput);
+        }
+        Some(Spectrum::ZERO)
+    }
+}
+
 struct Eye<'a, M: ?Sized, S: ?Sized> {
     gatherer: &'a Gatherer<'a, M, S>,
     lights: &'a [VirtualLight],
@@ -78,31 +121,44 @@ struct Eye<'a, M: ?Sized, S: ?Sized> {
 
 type Points = heapless::Vec<(Receiver, Spectrum), POINTS>;
 
-impl<M: Medium + ?Sized, S: Scene + ?Sized> Eye<'_, M, S> {
-    /// About `wanted` points of a segment, each with the weight that it has if it is drawn from them alone.
-    fn points(&self, segment: &Ray, opacity: f32, wanted: usize, rng: &mut Generator) -> Points {
-        let medium = self.gatherer.world.medium;
-        let mut points = Points::new();
-        let mut count = 0_u32;
-        let (u, jitter) = (uniform(rng), uniform(rng));
-        let to_eye: Vec3 = -segment.direction;
-        scattering_points(segment, medium, wanted as f32 / opacity, u, jitter, |distance, properties, weight| {
-            let Some(receiver) = Receiver::in_medium(segment.at(distance), to_eye, properties) else { return };
-            count += 1;
-            // What does not fit takes the place of another, so that each is as likely to be there.
-            if let Err(point) = points.push((receiver, weight)) {
-                let place = (uniform(rng) * count as f32) as usize;
-                if let Some(slot) = points.get_mut(place) {
-                    *slot = point;
-                }
-            }
-        });
-        for (_, weight) in &mut points {
-            *weight *= count as f32;
-        }
-        points
-    }
+/// Opacity of a segment below which its medium is not looked at.
+const INVISIBLE: f32 = 1e-6;
 
+/// Opacity of a segment, by the mean of the channels' optical thickness.
+fn opacity_of(segment: &Ray, medium: &(impl Medium + ?Sized), rng: &mut Generator) -> f32 {
+    let marching = Marching::new(medium.resolution(), uniform(rng));
+    -float::exp_m1(-optical_thickness(segment, medium, marching).mean())
+}
+
+/// About `wanted` points of a segment of `opacity`, each with the weight that it has if it is drawn from them alone.
+fn points_on(
+    medium: &(impl Medium + ?Sized),
+    segment: &Ray,
+    opacity: f32,
+    wanted: usize,
+    rng: &mut Generator,
+) -> Points {
+    let mut points = Points::new();
+    let mut count = 0_u32;
+    let (u, jitter) = (uniform(rng), uniform(rng));
+    scattering_points(segment, medium, wanted as f32 / opacity, u, jitter, |distance, properties, weight| {
+        let Some(receiver) = Receiver::in_medium(segment.at(distance), -segment.direction, properties) else { return };
+        count += 1;
+        // What does not fit takes the place of another, so that each is as likely to be there.
+        if let Err(point) = points.push((receiver, weight)) {
+            let place = (uniform(rng) * count as f32) as usize;
+            if let Some(slot) = points.get_mut(place) {
+                *slot = point;
+            }
+        }
+    });
+    for (_, weight) in &mut points {
+        *weight *= count as f32;
+    }
+    points
+}
+
+impl<M: Medium + ?Sized, S: Scene + ?Sized> Eye<'_, M, S> {
     fn single(&self, segment: &Ray, rng: &mut Generator) -> Spectrum {
         let once = path::Settings { max_scatterings: 1, lights_visible: false, ..self.settings.paths };
         // It ends before the surface.
@@ -121,14 +177,13 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Eye<'_, M, S> {
     /// Light scattered more than once, that the medium sends towards the origin of `segment`.
     fn multiple(&mut self, segment: &Ray, throughput: Spectrum, before: u32, rng: &mut Generator) -> Spectrum {
         let medium = self.gatherer.world.medium;
-        let marching = Marching::new(medium.resolution(), uniform(rng));
-        let opacity = -float::exp_m1(-optical_thickness(segment, medium, marching).mean());
+        let opacity = opacity_of(segment, medium, rng);
         let mut light = Spectrum::ZERO;
-        if !(opacity > 1e-6) {
+        if !(opacity > INVISIBLE) {
             return light;
         }
         let primary = self.settings.primary.clamp(1, POINTS as u32 / 2) as usize;
-        let points = self.points(segment, opacity, primary, rng);
+        let points = points_on(medium, segment, opacity, primary, rng);
         for (receiver, weight) in &points {
             let gathered = self.gatherer.of_the_lights(receiver, before, rng);
             light += self.add(&gathered, throughput, *weight * (1.0 / points.len() as f32));
@@ -138,7 +193,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Eye<'_, M, S> {
             let share = Spectrum::splat(self.share / self.settings.points.max(1) as f32);
             let lights = self.lights;
             for group in lights.chunks(if own { POINTS / 2 } else { lights.len().max(1) }) {
-                let points = self.points(segment, opacity, if own { group.len() } else { 1 }, rng);
+                let points = points_on(medium, segment, opacity, if own { group.len() } else { 1 }, rng);
                 if points.is_empty() {
                     continue;
                 }

@@ -29,9 +29,9 @@ mod generate;
 pub mod light;
 mod scatterer;
 
-pub use bound::{Bound, NoBound, contraction, geometry, radius_for};
+pub use bound::{Bound, NoBound, contraction, geometry, radius_for, usual_bound};
 pub use compensate::{Compensation, Flights, Strategy, next_vertex};
-pub use eye::{EyeSettings, Seen, radiance};
+pub use eye::{EyeSettings, Seen, radiance, receivers};
 pub use gather::{Gathered, Gatherer, LEVELS};
 pub use generate::{select, shoot};
 pub use light::{Connection, VirtualLight};

@@ -49,7 +49,7 @@ pub struct MarchArguments {
     pub step_length: Option<f64>,
     /// How fine `--step covariance` is: about the number of steps where light fills a ray.
     #[arg(long, value_name = "N", value_parser = steps, default_value_t = 16.0)]
-    pub steps: f32,
+    pub step_count: f32,
     /// Shortest step with covariances [default: a twentieth of the grid's cell].
     #[arg(long, value_name = "LENGTH", value_parser = output::positive)]
     pub step_least: Option<f64>,
@@ -154,7 +154,7 @@ impl MarchArguments {
         let least = given(self.step_least).unwrap_or(least).min(longest);
         let rule = match self.step {
             Step::Uniform => None,
-            Step::Covariance => Some(Rule::Error { count: self.steps }),
+            Step::Covariance => Some(Rule::Error { count: self.step_count }),
             Step::Frequency => Some(Rule::Frequency),
         };
         Stride { along: grid.zip(rule), limits: (least, longest) }

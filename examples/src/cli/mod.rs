@@ -15,6 +15,7 @@ mod radiance_cache;
 mod records;
 pub(crate) mod render;
 mod report;
+mod vpl;
 
 use std::process::ExitCode;
 
@@ -30,6 +31,7 @@ pub use probe::{HessianArguments, Probe, ProbeArguments};
 pub use radiance_cache::{CacheArguments, Kind, Single};
 pub use records::RecordsArguments;
 pub use render::{Method, RenderArguments};
+pub use vpl::{Clamp, Recovery, Switch, VplArguments};
 
 /// Light in fog, smoke and clouds.
 #[derive(Debug, Parser)]
@@ -44,7 +46,7 @@ pub struct Arguments {
 #[derive(Debug, Subcommand)]
 pub enum Command {
     /// Renders a Mitsuba 3 scene.
-    Render(RenderArguments),
+    Render(Box<RenderArguments>),
     /// Draws where the records of radiance caches lie.
     Records(RecordsArguments),
     /// Says how far an image is from a reference.

@@ -27,7 +27,8 @@ pub struct BeamArguments {
     /// Paths sent from the lights in each pass [default: as many as leave four pieces of beams for every pixel].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1 << 24))]
     pub beams: Option<u32>,
-    /// Samples per pixel in each pass; beams are gathered by the first of them [default: 8].
+    /// Samples per pixel in each pass, of virtual lights, too; beams are gathered by the first of them, virtual lights are
+    /// dealt out among them [default: 8, for virtual lights 64].
     #[arg(long, value_name = "N")]
     pub pass_samples: Option<NonZero<u32>>,
     /// Radius of the blur in the first pass, in the scene's unit of length [default: 0.005 of the scene's diagonal].

@@ -27,6 +27,7 @@ use super::march::MarchJob;
 use super::photon_beams::{BeamArguments, BeamJob, Kernel};
 use super::radiance_cache::{CacheArguments, CacheJob, check_depth};
 use super::report::{Bar, Report};
+use super::vpl::{self, Audit, VplArguments, VplJob};
 use super::{Ending, Failure, output};
 use crate::camera::Camera;
 use crate::scene_file::SceneFile;
@@ -83,6 +84,9 @@ pub struct RenderArguments {
     /// Of photon beams.
     #[command(flatten)]
     pub beams: BeamArguments,
+    /// Of virtual lights.
+    #[command(flatten)]
+    pub vpl: VplArguments,
     /// Of ray marching.
     #[command(flatten)]
     pub march: MarchArguments,
@@ -104,6 +108,8 @@ pub enum Method {
     /// Progressive photon beams: the medium's light from beams sent by the lights, blurred less and less;
     /// surfaces' light as with `path`.
     PhotonBeams,
+    /// Virtual lights with bias compensation: light scattered more than once from the vertices of paths from the lights.
+    Vpl,
     /// Ray marching: the medium's light from steps along eye rays, each with a connection to a light and a path;
     /// surfaces' light as with `path`.
     March,
@@ -120,6 +126,20 @@ const MARCH_LAYERS: [&str; 7] =
 /// The same for radiance caching, which knows light from surfaces apart.
 const CACHE_LAYERS: [&str; 7] =
     ["total", "emitted", "surface_direct", "surface_indirect", "medium_single", "medium_surface", "medium_multiple"];
+
+/// The same for virtual lights, with what clamping leaves and compensation adds.
+const VPL_LAYERS: [&str; 11] = {
+    let mut layers = [""; 11];
+    let mut i = 0;
+    while i < 11 {
+        layers[i] = if i < 6 { LAYERS[i] } else { vpl::OWN[i - 6] };
+        i += 1;
+    }
+    layers
+};
+
+/// Samples per pixel of virtual lights: one pass.
+const VPL_SAMPLES: u32 = 64;
 
 /// Samples per pixel of radiance caching: what is left for them to even out are edges and direct light.
 const CACHE_SAMPLES: u32 = 64;
@@ -139,6 +159,8 @@ pub(crate) struct Rendered {
     pub(crate) camera: Camera,
     /// Of radiance caching.
     pub(crate) caches: Option<RadianceCaches>,
+    /// Of virtual lights, where it was asked for.
+    pub(crate) audit: Option<Audit>,
 }
 
 pub(super) fn run(arguments: &RenderArguments) -> Result<Ending, Failure> {
@@ -151,11 +173,14 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<Ending, Failure> {
         }
         rendered => rendered?,
     };
-    let Rendered { film, outcome, mut statistics, .. } = rendered;
+    let Rendered { mut film, outcome, mut statistics, audit, .. } = rendered;
+    if !arguments.aov && film.layers().len() > 1 {
+        film = film.first(1)?;
+    }
     statistics.time("write", || outputs.iter().try_for_each(|file| write_film(file, &film, arguments.exposure)))?;
 
     let size = (film.width(), film.height());
-    let report = Report { arguments, outputs: &outputs, outcome: &outcome, statistics: &statistics, size };
+    let report = Report { arguments, outputs: &outputs, outcome: &outcome, statistics: &statistics, size, audit };
     if let Some(file) = &arguments.stats {
         std::fs::write(file, report.json()).map_err(|e| format!("{}: cannot be written: {e}", file.display()))?;
     }
@@ -180,9 +205,10 @@ pub(crate) fn render(arguments: &RenderArguments) -> Result<Rendered, Failure> {
     let world = statistics.time("build", || World::new(&scene, &mut storage))?;
     let (width, height) = arguments.size.unwrap_or((scene.sensor.width, scene.sensor.height));
     let layers: &[&str] = match (arguments.aov, arguments.method) {
+        (_, Method::Vpl) if arguments.aov || arguments.stats.is_some() => &VPL_LAYERS,
         (false, _) if arguments.sampling.is_uniform() => &["total"],
         (false, _) => &LAYERS,
-        (true, Method::Path | Method::PhotonBeams) => &LAYERS,
+        (true, Method::Path | Method::PhotonBeams | Method::Vpl) => &LAYERS,
         (true, Method::March) => &MARCH_LAYERS,
         (true, Method::RadianceCache) => &CACHE_LAYERS,
     };
@@ -206,6 +232,9 @@ pub(crate) fn render(arguments: &RenderArguments) -> Result<Rendered, Failure> {
         (None, None) if arguments.method == Method::RadianceCache => {
             let is_direct = path_settings(&scene, arguments.max_depth).max_scatterings <= 1;
             if is_direct { DIRECT_SAMPLES } else { CACHE_SAMPLES }
+        }
+        (None, None) if arguments.method == Method::Vpl => {
+            arguments.beams.pass_samples.map_or(VPL_SAMPLES, core::num::NonZero::get)
         }
         (None, None) => scene.sensor.samples,
     };
@@ -245,10 +274,17 @@ pub(crate) fn render(arguments: &RenderArguments) -> Result<Rendered, Failure> {
         grid: grid.as_ref(),
         plan: plan.as_ref(),
     };
-    let mut cached = None;
+    let (mut cached, mut audit) = (None, None);
     let outcome = match arguments.method {
         Method::Path => world.media().with(Job { shot, film: &mut film })?,
         Method::PhotonBeams => world.media().with(BeamJob { shot, film: &mut film, arguments: &arguments.beams })?,
+        Method::Vpl => {
+            let pass_samples = arguments.beams.pass_samples;
+            let job = VplJob { shot, film: &mut film, arguments: &arguments.vpl, pass_samples };
+            let (outcome, bound) = world.media().with(job)?;
+            audit = arguments.stats.is_some().then(|| Audit::new(&film, bound, &arguments.vpl));
+            outcome
+        }
         Method::March => world.media().with(MarchJob { shot, film: &mut film, arguments: &arguments.march })?,
         Method::RadianceCache => {
             let done = world.media().with(CacheJob {
@@ -291,7 +327,7 @@ pub(crate) fn render(arguments: &RenderArguments) -> Result<Rendered, Failure> {
     }
     statistics.add("render", outcome.seconds);
     statistics.counters = outcome.counters;
-    Ok(Rendered { film, outcome, statistics, camera, caches: cached.map(|c| c.caches) })
+    Ok(Rendered { film, outcome, statistics, camera, caches: cached.map(|c| c.caches), audit })
 }
 
 impl RenderArguments {
@@ -303,7 +339,7 @@ impl RenderArguments {
         match self.method {
             Method::March => self.march.step != Step::Uniform,
             Method::PhotonBeams => self.beams.kernel == Kernel::Covariance,
-            Method::Path | Method::RadianceCache => false,
+            Method::Path | Method::RadianceCache | Method::Vpl => false,
         }
     }
 }
@@ -342,6 +378,10 @@ fn outputs(arguments: &RenderArguments) -> Result<Vec<PathBuf>, Failure> {
     }
     if arguments.beams.kernel != Kernel::Progressive && arguments.method != Method::PhotonBeams {
         return Err("--kernel covariance needs --method photon-beams".into());
+    }
+    arguments.vpl.check()?;
+    if arguments.vpl.is_named() && arguments.method != Method::Vpl {
+        return Err("options of virtual lights need --method vpl".into());
     }
     arguments.covariance.check()?;
     if arguments.covariance.is_named() && !arguments.needs_grid() {

@@ -8,6 +8,7 @@ use fogbow_std::stats::{Seconds, Statistics};
 use fogbow_std::tiles::{Outcome, Reason};
 use indicatif::{ProgressBar, ProgressStyle};
 
+use super::vpl::Audit;
 use super::{Method, RenderArguments};
 
 /// Steps of the progress bar.
@@ -63,6 +64,7 @@ pub(super) struct Report<'a> {
     pub(super) outcome: &'a Outcome,
     pub(super) statistics: &'a Statistics,
     pub(super) size: (u32, u32),
+    pub(super) audit: Option<Audit>,
 }
 
 impl Report<'_> {
@@ -112,19 +114,34 @@ impl Report<'_> {
                 counts.iter().map(|(name, count)| format!("{}: {count}", quoted(name))).collect();
             entries.join(", ")
         };
+        let energy = self.audit.map_or_else(String::new, |audit| {
+            let recovered: Vec<String> = audit.recovered.iter().map(|part| format!("{part:.6e}")).collect();
+            let left = audit.left.map_or_else(|| "null".to_owned(), |left| format!("{left:.6e}"));
+            let bound = if audit.bound.is_finite() { format!("{:.6e}", audit.bound) } else { "null".to_owned() };
+            let lost = audit.left.map_or_else(
+                || "null".to_owned(),
+                |left| format!("{:.6e}", left + audit.recovered.iter().sum::<f64>()),
+            );
+            format!(
+                "\"energy\": {{\"bound\": {bound}, \"clamped_layer\": {:.6e}, \"clamped_away\": {lost}, \"recovered\": [{}], \"left\": {left}}},\n  ",
+                audit.clamped,
+                recovered.join(", "),
+            )
+        });
         let (bytes, records) = (listed(&self.statistics.bytes), listed(&self.statistics.records));
         format!(
             "{{\n  \"scene\": {},\n  \"method\": \"{}\",\n  \"width\": {},\n  \"height\": {},\n  \
              \"samples_per_pixel\": {},\n  \"seed\": {},\n  \"ended\": \"{reason}\",\n  \
              \"seconds\": {{{phases}\n  }},\n  \"counts\": {{\"samples\": {}, \"rays\": {}, \"shadow_rays\": {}, \
              \"collisions\": {}, \"medium_lookups\": {}, \"medium_stretches\": {}, \"cache_lookups\": {}, \"cache_misses\": {}, \"non_finite\": {}}},\n  \
-             \"records\": {{{records}}},\n  \"bytes\": {{{bytes}}}\n}}\n",
+             {energy}\"records\": {{{records}}},\n  \"bytes\": {{{bytes}}}\n}}\n",
             quoted(&self.arguments.scene.display().to_string()),
             match self.arguments.method {
                 Method::Path => "path",
                 Method::RadianceCache => "radiance-cache",
                 Method::PhotonBeams => "photon-beams",
                 Method::March => "march",
+                Method::Vpl => "vpl",
             },
             self.size.0,
             self.size.1,

@@ -138,7 +138,7 @@ fn measured(plan: &Plan, folder: &Path) -> Result<String, Failure> {
         let options = ["--step", "covariance", "--grid-paths", paths, "--grid-cells", cells, "--grid-out", &file];
         let (_, shot) = bench.shot(&options)?;
         let fill = shot.seconds("fill grid");
-        let of = |count| vec!["--step", "covariance", "--steps", count, "--grid-in", &file];
+        let of = |count| vec!["--step", "covariance", "--step-count", count, "--grid-in", &file];
         let points = bench.all(&COUNTS.map(of))?;
         grids.push((cells, fill, points, file));
     }
@@ -169,11 +169,11 @@ fn measured(plan: &Plan, folder: &Path) -> Result<String, Failure> {
     let mut page = format!(
         "## Figs 12 to 15: steps along eye rays\n\n![light and steps](fig-12-steps.png)\n\nThe nave, light scattered at most once, \
          {edge} × {edge} pixels: left light scattered by the medium, then how many steps a ray takes, black for none and \
-         brightest for {most:.0} or more: in the middle with `--step covariance --steps {}`, right with `--step frequency \
+         brightest for {most:.0} or more: in the middle with `--step covariance --step-count {}`, right with `--step frequency \
          --step-length {}` (B's Alg. 1, which does not ask how bright light is).\n\n\
          ![error by samples](fig-12-samples.svg)\n\n![error by time](fig-12-seconds.svg)\n\n\
          relRMSE of that light, with {SPP} samples per pixel for all, so that the noise of where rays start in their pixels is \
-         the same; uniform steps of {} m; steps by covariance with `--steps` {}; by frequency with `--step-length` {} m. The grid \
+         the same; uniform steps of {} m; steps by covariance with `--step-count` {}; by frequency with `--step-length` {} m. The grid \
          has 64 cells along its longest side, {paths} photons and took {fill:.2} s. The truth are two renders with \
          {judging} samples per pixel and uniform steps of 0.3 m, without bias as all of them are, used so that their \
          noise cancels.\n\nAt equal error, uniform steps over adaptive ones, halfway (in logarithms) between the errors that both \

@@ -22,6 +22,7 @@ mod triangles;
 use fogbow::host::{Hit, Scene};
 use fogbow::light::Light;
 use fogbow::math::{Bounds, Ray, Symmetric3, Vec3};
+use fogbow::surface::Surface;
 
 pub use build::bounds_of;
 pub use lights::Storage;
@@ -147,6 +148,13 @@ impl<'a> World<'a> {
     #[must_use]
     pub fn bounds(&self) -> Bounds {
         self.bounds
+    }
+
+    /// Whether any surface is a mirror or glass.
+    #[must_use]
+    pub fn has_mirrors(&self) -> bool {
+        let sends_on = |surface| matches!(surface, Surface::Mirror { .. } | Surface::Dielectric { .. });
+        self.materials.iter().any(|material| sends_on(material.surface))
     }
 
     /// How many flat pieces, spheres and boxes there are, and how many triangles.

@@ -1,0 +1,242 @@
+//! `fogbow render --method vpl`.
+
+use core::num::NonZero;
+use core::str::FromStr;
+
+use clap::{Args, ValueEnum};
+use fogbow::host::Medium;
+use fogbow::math::{Bounds, Vec2};
+use fogbow::path;
+use fogbow::sampling::uniform2;
+use fogbow::spectrum::Spectrum;
+use fogbow::vpl::{self, Bound, Compensation, LEVELS, Seen};
+use fogbow_std::film::Film;
+use fogbow_std::photon_beams::View;
+use fogbow_std::tiles::Outcome;
+use fogbow_std::virtual_lights::{self, Settings};
+
+use super::Failure;
+use super::render::{LAYERS, Shot, write_layers};
+use crate::world::WithMedium;
+
+/// Options of `--method vpl`.
+#[derive(Debug, Clone, Args)]
+#[command(next_help_heading = "Virtual lights")]
+pub struct VplArguments {
+    /// Virtual lights of each pass.
+    #[arg(long, value_name = "N", default_value_t = 1000, value_parser = clap::value_parser!(u32).range(1..=1 << 24))]
+    pub lights: u32,
+    /// How many times as many are made; those are kept that matter most for the picture. 1 keeps all.
+    #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..=256))]
+    pub candidates: u32,
+    /// Bound of geometry terms, by which near virtual lights are clamped, in the scene's unit of length to the power of
+    /// -2; `auto` finds one that two steps of compensation nearly bring back, `off` leaves bright splotches.
+    #[arg(long, value_name = "auto|off|VALUE", default_value = "auto", allow_hyphen_values = true)]
+    pub clamp: Clamp,
+    /// How what clamping takes away is brought back.
+    #[arg(long, value_enum, default_value_t = Recovery::Abc)]
+    pub compensation: Recovery,
+    /// Steps of compensation [default: 2].
+    #[arg(long, value_name = "K", value_parser = clap::value_parser!(u32).range(1..))]
+    pub steps: Option<u32>,
+    /// Whether compensation asks what lies between a point of the medium and the next [default: on].
+    #[arg(long, value_enum, value_name = "on|off")]
+    pub local_visibility: Option<Switch>,
+    /// Points on each eye ray at which each light is gathered.
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=4096))]
+    pub light_points: u32,
+}
+
+/// How what clamping takes away is brought back.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Recovery {
+    /// It stays lost.
+    None,
+    /// All of it, without bias: the reference; one path for all lights.
+    Full,
+    /// A path for each light, from one point on the eye ray.
+    #[value(name = "n-to-1")]
+    NToOne,
+    /// A point and a path for each light.
+    #[value(name = "1-to-1")]
+    OneToOne,
+    /// The same in media taken as even around each point: approximate bias compensation.
+    Abc,
+}
+
+/// On or off.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Switch {
+    /// On.
+    On,
+    /// Off.
+    Off,
+}
+
+/// A bound, or how to find one.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Clamp {
+    /// [`vpl::usual_bound`].
+    Auto,
+    /// This one.
+    To(Bound),
+}
+
+impl FromStr for Clamp {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text {
+            "auto" => Ok(Self::Auto),
+            "off" => Ok(Self::To(Bound::NONE)),
+            _ => match text.parse::<f32>().map(Bound::new) {
+                Ok(Ok(bound)) if bound != Bound::NONE => Ok(Self::To(bound)),
+                _ => Err("must be a positive finite number, `auto` or `off`".to_owned()),
+            },
+        }
+    }
+}
+
+impl VplArguments {
+    /// Options that would do nothing are mistakes.
+    pub(super) fn check(&self) -> Result<(), Failure> {
+        let is_clamped = self.clamp != Clamp::To(Bound::NONE);
+        match self.compensation {
+            Recovery::None if self.steps.is_some() || self.local_visibility.is_some() => {
+                Err("--steps and --local-visibility need --compensation other than none".into())
+            }
+            Recovery::Full if self.steps.is_some() || self.local_visibility.is_some() => Err(
+                "--compensation full takes as many steps as there are, and asks for visibility: leave out --steps and --local-visibility"
+                    .into(),
+            ),
+            _ if !is_clamped && (self.steps.is_some() || self.local_visibility.is_some()) => {
+                Err("--clamp off leaves nothing to compensate: leave out --steps and --local-visibility".into())
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Whether any option was given.
+    pub(super) fn is_named(&self) -> bool {
+        self.clamp != Clamp::Auto
+            || self.compensation != Recovery::Abc
+            || self.steps.is_some()
+            || self.local_visibility.is_some()
+            || self.lights != 1000
+            || self.candidates != 4
+            || self.light_points != 1
+    }
+
+    fn compensation(&self) -> Option<Compensation> {
+        let base = match self.compensation {
+            Recovery::None => return None,
+            Recovery::Full => return Some(Compensation::FULL),
+            Recovery::NToOne => Compensation::N_TO_ONE,
+            Recovery::OneToOne => Compensation::ONE_TO_ONE,
+            Recovery::Abc => Compensation::APPROXIMATE,
+        };
+        let local_visibility = self.local_visibility.map_or(base.local_visibility, |switch| switch == Switch::On);
+        Some(Compensation { steps: self.steps.unwrap_or(base.steps), local_visibility, ..base })
+    }
+
+    fn bound(&self, medium: &impl Medium, bounds: &Bounds) -> Bound {
+        match self.clamp {
+            Clamp::Auto => vpl::usual_bound(medium, bounds),
+            Clamp::To(bound) => bound,
+        }
+    }
+}
+
+/// Layers that virtual lights add: their clamped light, and what each step of compensation adds to that.
+pub(super) const OWN: [&str; 1 + LEVELS] =
+    ["clamped", "compensated_1", "compensated_2", "compensated_3", "compensated_rest"];
+
+/// A render by virtual lights, to be done with a medium of any type.
+pub(super) struct VplJob<'a> {
+    pub(super) shot: Shot<'a>,
+    pub(super) film: &'a mut Film,
+    pub(super) arguments: &'a VplArguments,
+    pub(super) pass_samples: Option<NonZero<u32>>,
+}
+
+impl WithMedium for VplJob<'_> {
+    type Output = Result<(Outcome, Bound), Failure>;
+
+    fn with<M: Medium + Sync>(self, medium: &M) -> Self::Output {
+        let shot = self.shot;
+        let (width, height) = (self.film.width(), self.film.height());
+        let bounds = shot.world.bounds();
+        let bound = self.arguments.bound(medium, &bounds);
+        let usual = Settings::new(bound);
+        let settings = Settings {
+            lights: self.arguments.lights,
+            candidates: self.arguments.candidates,
+            samples: self.pass_samples.unwrap_or(usual.samples),
+            compensation: self.arguments.compensation(),
+            points: self.arguments.light_points,
+            has_mirrors: shot.world.has_mirrors(),
+            ..usual
+        };
+        let view =
+            View { world: path::World { medium, scene: shot.world, lights: shot.lights }, bounds, paths: shot.paths };
+        let outcome = virtual_lights::render(
+            self.film,
+            shot.settings,
+            &settings,
+            shot.control,
+            &view,
+            |sample, rng| {
+                let at = Vec2::new(sample.x as f32, sample.y as f32) + uniform2(rng);
+                shot.camera.ray(at / Vec2::new(width as f32, height as f32))
+            },
+            write,
+        )?;
+        Ok((outcome, bound))
+    }
+}
+
+fn write(seen: &Seen, layers: &mut [Spectrum]) {
+    write_layers(&seen.radiance, layers);
+    let own = core::iter::once(seen.clamped).chain(seen.compensated);
+    for (layer, part) in layers.iter_mut().skip(LAYERS.len()).zip(own) {
+        *layer = part;
+    }
+}
+
+/// What became of the light that virtual lights send to the picture: means over its pixels and channels (W·m⁻²·sr⁻¹).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Audit {
+    /// By which connections were clamped (m⁻²).
+    pub(crate) bound: f32,
+    /// What clamping leaves.
+    pub(crate) clamped: f64,
+    /// What steps of compensation brought back.
+    pub(crate) recovered: [f64; LEVELS],
+    /// What further steps would, if each went on to bring back as much of the one before as the last did.
+    pub(crate) left: Option<f64>,
+}
+
+impl Audit {
+    /// Of a film with layers [`OWN`].
+    pub(super) fn new(film: &Film, bound: Bound, arguments: &VplArguments) -> Self {
+        let mean = |name: &str| {
+            let image = film.layers().iter().position(|layer| layer == name).and_then(|i| film.mean(i));
+            image.map_or(0.0, |image| {
+                let sum: f64 = image.pixels.iter().map(|pixel| f64::from(pixel.mean())).sum();
+                sum / (image.pixels.len().max(1) as f64)
+            })
+        };
+        let [clamped, recovered @ ..] = OWN.map(mean);
+        let left = match arguments.compensation().map(|c| c.steps as usize) {
+            None => None,
+            Some(steps) if steps > LEVELS => Some(0.0),
+            Some(1) => None,
+            Some(steps) => {
+                let (before, last) = (recovered[steps - 2], recovered[steps - 1]);
+                let ratio = if before > 0.0 { last / before } else { 0.0 };
+                (ratio < 1.0).then(|| last * ratio / (1.0 - ratio))
+            }
+        };
+        Self { bound: bound.value(), clamped, recovered, left }
+    }
+}
