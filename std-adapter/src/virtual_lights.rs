@@ -9,13 +9,13 @@ use core::fmt;
 use core::num::NonZero;
 
 use fogbow::host::{Medium, Scene};
-use fogbow::math::Ray;
+use fogbow::math::{Bounds, Ray, Vec3};
 use fogbow::path::World;
 use fogbow::sampling::uniform;
 use fogbow::sampling::uniform::mix;
 use fogbow::spectrum::Spectrum;
 use fogbow::vpl::{self, Bound, Compensation, EyeSettings, Gatherer, Receiver, Seen, VirtualLight};
-use rayon::iter::{IndexedParallelIterator, IntoParallelIterator, IntoParallelRefIterator, ParallelIterator};
+use rayon::iter::{IndexedParallelIterator, IntoParallelIterator, ParallelIterator};
 
 use crate::film::Film;
 use crate::photon_beams::View;
@@ -44,12 +44,12 @@ pub struct Settings {
 }
 
 impl Settings {
-    /// A thousand lights out of four thousand, 64 samples, approximate compensation.
+    /// A thousand lights out of sixteen thousand, 64 samples, approximate compensation.
     #[must_use]
     pub fn new(bound: Bound) -> Self {
         Self {
             lights: 1000,
-            candidates: 4,
+            candidates: 16,
             samples: NonZero::<u32>::MIN.saturating_add(63),
             bound,
             compensation: Some(Compensation::APPROXIMATE),
@@ -100,12 +100,8 @@ const MOST_PATHS: u32 = 1 << 22;
 /// Eye rays by whose points the lights that matter are found.
 const SCOUTS: u32 = 64;
 
-/// Lowest importance of a light over the mean, times its strength over the mean: what the few points do not see may still
-/// matter.
+/// Weight of a light's flux in its importance: what the few points do not see may still matter.
 const DEFENSIVE: f32 = 0.1;
-
-/// A point that tells which lights matter, and how much light from there counts in the picture.
-type Witness = (Receiver, f32);
 
 /// `paths` paths' virtual lights, each for the flux of one path; in the order of paths.
 fn trace<M, S>(view: &View<'_, M, S>, paths: u32, seed: u64, pass: u32) -> Vec<VirtualLight>
@@ -120,7 +116,7 @@ where
         .map(|job| {
             let mut lights = Vec::new();
             for path in job * JOB..(job * JOB).saturating_add(JOB).min(paths) {
-                let mut rng = independent(seed, u64::from(pass) << 32 | u64::from(job), path);
+                let mut rng = Sequence::LowDiscrepancy.start(seed, u64::from(pass), path);
                 vpl::shoot(&view.world, &view.bounds, &view.paths, &mut rng, &mut |light| lights.push(light));
             }
             lights
@@ -167,7 +163,7 @@ pub fn lights<M, S>(
     view: &View<'_, M, S>,
     settings: &Settings,
     paths: u32,
-    witnesses: &[Witness],
+    witnesses: &[Receiver],
     pass: u32,
     seed: u64,
 ) -> Vec<VirtualLight>
@@ -179,6 +175,9 @@ where
     let mut lights: Vec<_> = trace(view, paths, seed, pass).into_iter().map(|light| light.scaled(share)).collect();
     let mut rng = independent(mix(seed ^ 0x0d1b_7a5e_66c2_93f4), u64::from(pass), 0);
     if !witnesses.is_empty() && lights.len() > settings.lights as usize {
+        // Systematic sampling keeps as many of every stretch of the list as it should: near lights belong together.
+        let bounds = Bounds::of(lights.iter().map(|light| light.position));
+        lights.sort_by_cached_key(|light| (light.is_on_surface(), curve(light.position, &bounds)));
         let mut importance = importance(view, settings, &lights, witnesses, seed ^ u64::from(pass));
         let kept = vpl::select(&mut lights, &mut importance, settings.lights as f32, uniform(&mut rng));
         lights.truncate(kept);
@@ -190,36 +189,52 @@ where
     lights
 }
 
-/// What each light, clamped, sends to the witnesses, mixed with its strength.
+/// Place of a point along a curve that fills the box: 16 bits of each coordinate, interleaved (Morton 1966).
+fn curve(point: Vec3, bounds: &Bounds) -> u64 {
+    let unit = (point - bounds.min) / bounds.size().max(Vec3::splat(f32::MIN_POSITIVE));
+    let [x, y, z] = unit.to_array().map(|x| (x.clamp(0.0, 1.0) * 65_535.0) as u64);
+    let bit = |i: u32| (x >> i & 1) << (3 * i) | (y >> i & 1) << (3 * i + 1) | (z >> i & 1) << (3 * i + 2);
+    (0..16).map(bit).sum()
+}
+
+/// How much of what a witness sees each light, clamped, is: the root of the mean square over the witnesses, mixed with the
+/// light's share of all flux. Lights kept with such probabilities make errors small everywhere, dark corners included.
 fn importance<M, S>(
     view: &View<'_, M, S>,
     settings: &Settings,
     lights: &[VirtualLight],
-    witnesses: &[Witness],
+    witnesses: &[Receiver],
     seed: u64,
 ) -> Vec<f32>
 where
     M: Medium + Sync + ?Sized,
     S: Scene + Sync + ?Sized,
 {
-    let gatherer =
-        Gatherer { world: view.world, bound: settings.bound, compensation: None, has_mirrors: settings.has_mirrors };
-    let seen: Vec<f32> = lights
-        .par_iter()
-        .with_min_len(16)
-        .enumerate()
-        .map(|(i, light)| {
-            let mut rng = independent(seed, i as u64, 1);
-            witnesses.iter().map(|(at, weight)| weight * gatherer.connected(at, light, &mut rng).mean()).sum()
-        })
-        .collect();
-    let mean =
-        |values: &mut dyn Iterator<Item = f32>| values.map(f64::from).sum::<f64>() / (lights.len().max(1) as f64);
-    let of_seen = mean(&mut seen.iter().copied()) as f32;
-    let of_flux = mean(&mut lights.iter().map(|light| light.flux.mean())) as f32;
-    // All black: by their flux alone.
-    let of_seen = if of_seen > 0.0 { of_seen } else { 1.0 };
-    seen.iter().zip(lights).map(|(seen, light)| seen + DEFENSIVE * of_seen * light.flux.mean() / of_flux).collect()
+    let gatherer = Gatherer {
+        world: view.world,
+        bound: settings.bound,
+        compensation: None,
+        has_mirrors: settings.has_mirrors,
+    };
+    // For all lights one witness after the other: a table of all would be larger than the lights themselves.
+    let mut squares = vec![0.0_f32; lights.len()];
+    let mut seen = vec![0.0_f32; lights.len()];
+    for (w, witness) in witnesses.iter().enumerate() {
+        (lights, seen.as_mut_slice()).into_par_iter().with_min_len(64).enumerate().for_each(|(i, (light, seen))| {
+            let mut rng = independent(seed, i as u64, w as u32);
+            *seen = gatherer.connected(witness, light, &mut rng).mean();
+        });
+        let total: f64 = seen.iter().copied().map(f64::from).sum();
+        if total > 0.0 {
+            for (square, seen) in squares.iter_mut().zip(&seen) {
+                *square += ((f64::from(*seen) / total) as f32).powi(2);
+            }
+        }
+    }
+    let flux: f64 = lights.iter().map(|light| f64::from(light.flux.mean())).sum();
+    let of_flux = |light: &VirtualLight| if flux > 0.0 { (f64::from(light.flux.mean()) / flux) as f32 } else { 1.0 };
+    let count = witnesses.len().max(1) as f32;
+    squares.iter().zip(lights).map(|(square, light)| (square / count).sqrt() + DEFENSIVE * of_flux(light)).collect()
 }
 
 /// Points of a few eye rays, spread over the picture.
@@ -228,7 +243,7 @@ fn witnesses<M, S>(
     size: (u32, u32),
     seed: u64,
     ray: impl Fn(&Sample<'_>, &mut SampleRng) -> Ray,
-) -> Vec<Witness>
+) -> Vec<Receiver>
 where
     M: Medium + ?Sized,
     S: Scene + ?Sized,
@@ -243,9 +258,7 @@ where
         let sample = Sample { x: pixel.0, y: pixel.1, index: 0, tally: &tally };
         let mut rng = Sequence::Independent.start(mix(seed ^ 0x2f6b_11d0_99ac_4e57), u64::from(i), 0);
         let ray = ray(&sample, &mut rng);
-        vpl::receivers(&ray, &view.world, &view.paths, &mut rng, |receiver, weight| {
-            found.push((*receiver, weight.mean()));
-        });
+        vpl::receivers(&ray, &view.world, &view.paths, &mut rng, |receiver, _| found.push(*receiver));
     }
     found
 }

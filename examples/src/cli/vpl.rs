@@ -27,7 +27,7 @@ pub struct VplArguments {
     #[arg(long, value_name = "N", default_value_t = 1000, value_parser = clap::value_parser!(u32).range(1..=1 << 24))]
     pub lights: u32,
     /// How many times as many are made; those are kept that matter most for the picture. 1 keeps all.
-    #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..=256))]
+    #[arg(long, value_name = "N", default_value_t = 16, value_parser = clap::value_parser!(u32).range(1..=256))]
     pub candidates: u32,
     /// Bound of geometry terms, by which near virtual lights are clamped, in the scene's unit of length to the power of
     /// -2; `auto` finds one that two steps of compensation nearly bring back, `off` leaves bright splotches.
@@ -123,7 +123,7 @@ impl VplArguments {
             || self.steps.is_some()
             || self.local_visibility.is_some()
             || self.lights != 1000
-            || self.candidates != 4
+            || self.candidates != 16
             || self.light_points != 1
     }
 
