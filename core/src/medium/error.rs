@@ -17,6 +17,8 @@ pub enum MediumError {
     Size,
     /// Room lent for block bounds that is not of [`Grid::block_count`](super::Grid::block_count).
     Blocks,
+    /// Room lent for means that is not of [`Pyramid::cell_count`](super::Pyramid::cell_count).
+    Means,
     /// Densities must be finite and not negative.
     Density,
     /// A parameter of procedural noise out of its range.
@@ -34,6 +36,7 @@ impl core::fmt::Display for MediumError {
             Self::Placement => "the placement must be finite and invertible",
             Self::Size => "the grid's size is zero or its values do not fill it",
             Self::Blocks => "the room lent for block bounds is not of the size `Grid::block_count` states",
+            Self::Means => "the room lent for means is not of the size `Pyramid::cell_count` states",
             Self::Density => "densities must be finite and not negative",
             Self::Noise => "a parameter of the noise is out of range",
             Self::TooManyLobes => "overlapping media have too many different phase functions",

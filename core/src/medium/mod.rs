@@ -21,6 +21,7 @@
 //! | [`region`] | parts of space: boxes, balls |
 //! | [`placed`] | a medium in a region, with holes |
 //! | [`overlap`] | several in the same space |
+//! | [`pyramid`] | any of them with means in balls by look-up |
 //! | [`any`] | one of the above as plain data |
 //! | `ball` | quadrature in a ball |
 //! | [`error`] | what constructors refuse |
@@ -37,6 +38,7 @@ pub mod noise;
 pub mod overlap;
 mod perlin;
 pub mod placed;
+pub mod pyramid;
 pub mod region;
 
 pub use any::AnyMedium;
@@ -48,4 +50,5 @@ pub use majorant::{BLOCK, MinMax};
 pub use noise::{FractalNoise, MAX_OCTAVES, Noise};
 pub use overlap::Overlap;
 pub use placed::Placed;
+pub use pyramid::Pyramid;
 pub use region::{BoxRegion, Crossing, Region, SphereRegion};

@@ -6,5 +6,6 @@ mod faces;
 mod grid;
 mod mean;
 mod others;
+mod pyramid;
 mod refusals;
 mod speed;

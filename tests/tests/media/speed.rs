@@ -3,10 +3,11 @@
 use std::time::Instant;
 
 use fogbow::host::Medium;
-use fogbow::math::{Affine3, Mat3, Ray, Vec3, float};
-use fogbow::medium::{AnyMedium, BLOCK, FractalNoise, Noise, Placed, Region};
+use fogbow::math::{Affine3, Bounds, Mat3, Ray, Vec3, float};
+use fogbow::medium::{AnyMedium, BLOCK, FractalNoise, Noise, Placed, Pyramid, Region};
 use fogbow::phase::Phase;
 use fogbow::sampling::{Generator, uniform};
+use fogbow::spectrum::Spectrum;
 
 use crate::common::*;
 
@@ -42,6 +43,12 @@ fn speed() {
         .collect();
     let points: Vec<Vec3> = (0..2000).map(|_| point(&mut rng, 1.0)).collect();
     measure("grid", &grid, &rays, &points);
+    let mut cells = vec![Spectrum::ZERO; Pyramid::<()>::cell_count(size)];
+    let bounds = Bounds { min: Vec3::splat(-1.0), max: Vec3::splat(1.0) };
+    let started = Instant::now();
+    let pyramid = Pyramid::new(grid, bounds, size, &mut cells).unwrap();
+    println!("pyramid filled in {:.1} ms", started.elapsed().as_secs_f64() * 1e3);
+    measure("pyramid of grid", &pyramid, &rays, &points);
     measure("noise", &noise, &rays, &points);
     measure("any grid", &AnyMedium::from(grid), &rays, &points);
     let ball = Region::sphere(Vec3::ZERO, 1.0).unwrap();
