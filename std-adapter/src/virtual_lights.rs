@@ -10,6 +10,7 @@ use core::num::NonZero;
 
 use fogbow::host::{Medium, Scene};
 use fogbow::math::{Bounds, Ray, Vec3};
+use fogbow::medium::{MediumError, Pyramid};
 use fogbow::path::World;
 use fogbow::sampling::uniform;
 use fogbow::sampling::uniform::mix;
@@ -41,6 +42,8 @@ pub struct Settings {
     pub points: u32,
     /// Whether the world has mirrors or glass. If not, no rays look for them.
     pub has_mirrors: bool,
+    /// Cells of the [`Pyramid`] of mean extinctions along the longest side of the world.
+    pub cells: u32,
 }
 
 impl Settings {
@@ -55,17 +58,20 @@ impl Settings {
             compensation: Some(Compensation::APPROXIMATE),
             points: 1,
             has_mirrors: true,
+            cells: 64,
         }
     }
 }
 
 /// Why rendering ended without a result.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub enum LightsError {
     /// The medium glows; paths leave lights only, so light of the medium that it scatters itself would be missing.
     Glowing,
-    /// No lights, no candidates or no points.
+    /// No lights, no candidates, no points or no cells.
     Settings,
+    /// The bounds are not finite, or the medium's extinction is negative or not finite somewhere.
+    Medium(MediumError),
     /// What [`tiles::render`] fails with.
     Render(RenderError),
 }
@@ -74,7 +80,8 @@ impl fmt::Display for LightsError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Glowing => f.write_str("virtual lights do not know light of glowing media: take another method"),
-            Self::Settings => f.write_str("there must be at least one virtual light, one candidate, one point"),
+            Self::Settings => f.write_str("there must be at least one virtual light, candidate, point and cell"),
+            Self::Medium(error) => write!(f, "virtual lights cannot average the medium's extinction: {error}"),
             Self::Render(error) => error.fmt(f),
         }
     }
@@ -85,6 +92,12 @@ impl core::error::Error for LightsError {}
 impl From<RenderError> for LightsError {
     fn from(error: RenderError) -> Self {
         Self::Render(error)
+    }
+}
+
+impl From<MediumError> for LightsError {
+    fn from(error: MediumError) -> Self {
+        Self::Medium(error)
     }
 }
 
@@ -283,12 +296,18 @@ where
     M: Medium + Sync,
     S: Scene + Sync,
 {
-    if settings.lights == 0 || settings.candidates == 0 || settings.points == 0 {
+    if settings.lights == 0 || settings.candidates == 0 || settings.points == 0 || settings.cells == 0 {
         return Err(LightsError::Settings);
     }
     if view.world.medium.is_emissive() {
         return Err(LightsError::Glowing);
     }
+    let bounds = solid(&view.bounds);
+    let size = cells(&bounds, settings.cells);
+    let mut means = vec![Spectrum::ZERO; Pyramid::<()>::cell_count(size)];
+    let medium = Pyramid::new(view.world.medium, bounds, size, &mut means)?;
+    let world = World { medium: &medium, scene: view.world.scene, lights: view.world.lights };
+    let view = &View { world, bounds: view.bounds, paths: view.paths };
     let witnesses = if settings.candidates > 1 {
         witnesses(view, (film.width(), film.height()), tiles.seed, &ray)
     } else {
@@ -322,6 +341,23 @@ where
         sample.tally.collide(seen.radiance.collisions);
         write(&seen, layers);
     })
+}
+
+/// A box with a volume: where there is nothing, or something flat, a pyramid needs one all the same.
+fn solid(bounds: &Bounds) -> Bounds {
+    let size = bounds.size();
+    if size.min_element() < 0.0 {
+        return Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE };
+    }
+    let margin = Vec3::splat((1e-3 * size.max_element()).max(1e-3));
+    Bounds { min: bounds.min - margin, max: bounds.max + margin }
+}
+
+/// Cells that are about cubes, `longest` along the longest side.
+fn cells(bounds: &Bounds, longest: u32) -> [u32; 3] {
+    let size = bounds.size();
+    let edge = size.max_element() / longest as f32;
+    size.to_array().map(|side| ((side / edge).ceil() as u32).clamp(1, longest))
 }
 
 /// One of `count` equal parts.
