@@ -78,7 +78,8 @@ fn a_pyramid_agrees_with_dense_sums_and_not_one_level_off() {
     let bounds = Region::bounds(CUBE).unwrap();
     // Measured: 0.0023 and 0.022, 0.0035 and 0.034, 0.0123 and 0.102, 0.0213 and 0.099. Patches and noise vary within a
     // few cells, where it matters that the kernel is no ball. One level off, means are at least 1.6 times as large.
-    let media: [(&str, &dyn Medium, u32, (f32, f32)); 4] = [
+    type Case<'a> = (&'a str, &'a dyn Medium, u32, (f32, f32));
+    let media: [Case<'_>; 4] = [
         ("smoke", &smoke, 72, (0.0035, 0.04)),
         ("smoke, cells twice as long", &smoke, 36, (0.005, 0.045)),
         ("patches", &patches.grid(), 64, (0.017, 0.15)),
