@@ -42,8 +42,6 @@ pub struct Settings {
     pub points: u32,
     /// Whether the world has mirrors or glass. If not, no rays look for them.
     pub has_mirrors: bool,
-    /// Cells of the [`Pyramid`] of mean extinctions along the longest side of the world.
-    pub cells: u32,
 }
 
 impl Settings {
@@ -58,7 +56,6 @@ impl Settings {
             compensation: Some(Compensation::APPROXIMATE),
             points: 1,
             has_mirrors: true,
-            cells: 64,
         }
     }
 }
@@ -68,7 +65,7 @@ impl Settings {
 pub enum LightsError {
     /// The medium glows; paths leave lights only, so light of the medium that it scatters itself would be missing.
     Glowing,
-    /// No lights, no candidates, no points or no cells.
+    /// No lights, no candidates or no points.
     Settings,
     /// The bounds are not finite, or the medium's extinction is negative or not finite somewhere.
     Medium(MediumError),
@@ -80,7 +77,7 @@ impl fmt::Display for LightsError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Glowing => f.write_str("virtual lights do not know light of glowing media: take another method"),
-            Self::Settings => f.write_str("there must be at least one virtual light, candidate, point and cell"),
+            Self::Settings => f.write_str("there must be at least one virtual light, candidate and point"),
             Self::Medium(error) => write!(f, "virtual lights cannot average the medium's extinction: {error}"),
             Self::Render(error) => error.fmt(f),
         }
@@ -112,6 +109,9 @@ const MOST_PATHS: u32 = 1 << 22;
 
 /// Eye rays by whose points the lights that matter are found.
 const SCOUTS: u32 = 64;
+
+/// Cells of the pyramid of mean extinctions along the longest side of the world, at most.
+const MOST_CELLS: u32 = 128;
 
 /// Weight of a light's flux in its importance: what the few points do not see may still matter.
 const DEFENSIVE: f32 = 0.1;
@@ -223,12 +223,8 @@ where
     M: Medium + Sync + ?Sized,
     S: Scene + Sync + ?Sized,
 {
-    let gatherer = Gatherer {
-        world: view.world,
-        bound: settings.bound,
-        compensation: None,
-        has_mirrors: settings.has_mirrors,
-    };
+    let gatherer =
+        Gatherer { world: view.world, bound: settings.bound, compensation: None, has_mirrors: settings.has_mirrors };
     // For all lights one witness after the other: a table of all would be larger than the lights themselves.
     let mut squares = vec![0.0_f32; lights.len()];
     let mut seen = vec![0.0_f32; lights.len()];
@@ -296,14 +292,14 @@ where
     M: Medium + Sync,
     S: Scene + Sync,
 {
-    if settings.lights == 0 || settings.candidates == 0 || settings.points == 0 || settings.cells == 0 {
+    if settings.lights == 0 || settings.candidates == 0 || settings.points == 0 {
         return Err(LightsError::Settings);
     }
     if view.world.medium.is_emissive() {
         return Err(LightsError::Glowing);
     }
     let bounds = solid(&view.bounds);
-    let size = cells(&bounds, settings.cells);
+    let size = cells(&bounds, settings.bound.radius());
     let mut means = vec![Spectrum::ZERO; Pyramid::<()>::cell_count(size)];
     let medium = Pyramid::new(view.world.medium, bounds, size, &mut means)?;
     let world = World { medium: &medium, scene: view.world.scene, lights: view.world.lights };
@@ -353,11 +349,12 @@ fn solid(bounds: &Bounds) -> Bounds {
     Bounds { min: bounds.min - margin, max: bounds.max + margin }
 }
 
-/// Cells that are about cubes, `longest` along the longest side.
-fn cells(bounds: &Bounds, longest: u32) -> [u32; 3] {
+/// Cells of a pyramid asked for the mean extinction in balls of `radius` (m): about cubes, half as long.
+fn cells(bounds: &Bounds, radius: f32) -> [u32; 3] {
     let size = bounds.size();
-    let edge = size.max_element() / longest as f32;
-    size.to_array().map(|side| ((side / edge).ceil() as u32).clamp(1, longest))
+    let longest = size.max_element();
+    let edge = (0.5 * radius).max(longest / MOST_CELLS as f32).min(longest);
+    size.to_array().map(|side| ((side / edge).ceil() as u32).clamp(1, MOST_CELLS))
 }
 
 /// One of `count` equal parts.

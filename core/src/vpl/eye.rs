@@ -1,6 +1,5 @@
 //! Eye rays: where virtual lights are gathered.
 
-use super::compensate::Strategy;
 use super::gather::{Gathered, Gatherer, LEVELS};
 use super::light::VirtualLight;
 use super::scatterer::Receiver;
@@ -188,18 +187,19 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Eye<'_, M, S> {
             let gathered = self.gatherer.of_the_lights(receiver, before, rng);
             light += self.add(&gathered, throughput, *weight * (1.0 / points.len() as f32));
         }
-        let own = self.gatherer.compensation.is_some_and(|c| c.strategy == Strategy::OneToOne);
-        for round in 0..self.settings.points.max(1) {
-            let share = Spectrum::splat(self.share / self.settings.points.max(1) as f32);
-            let lights = self.lights;
-            for group in lights.chunks(if own { POINTS / 2 } else { lights.len().max(1) }) {
-                let points = points_on(medium, segment, opacity, if own { group.len() } else { 1 }, rng);
+        // Without compensation lights share points as with it: pictures differ by what it adds alone.
+        let per_point = self.gatherer.compensation.map_or(1, |c| c.lights_per_point.max(1)) as usize;
+        let share = Spectrum::splat(self.share / self.settings.points.max(1) as f32);
+        let lights = self.lights;
+        for _ in 0..self.settings.points.max(1) {
+            for group in lights.chunks(per_point.saturating_mul(POINTS / 2)) {
+                let points = points_on(medium, segment, opacity, group.len().div_ceil(per_point), rng);
                 if points.is_empty() {
                     continue;
                 }
-                // Each light takes the next point; which is the first must be left to chance.
-                let first = (uniform(rng) * points.len() as f32) as usize + round as usize;
-                for (i, part) in group.chunks(if own { 1 } else { group.len() }).enumerate() {
+                // The lights take one point after the other; which is the first must be left to chance.
+                let first = (uniform(rng) * points.len() as f32) as usize;
+                for (i, part) in group.chunks(per_point).enumerate() {
                     let (receiver, weight) = &points[(first + i) % points.len()];
                     let gathered = self.gatherer.gather(receiver, part, before, rng);
                     light += self.add(&gathered, throughput, *weight * share);

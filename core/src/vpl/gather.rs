@@ -1,7 +1,7 @@
 //! Light of virtual lights at a point, and what compensation adds.
 
 use super::bound::Bound;
-use super::compensate::{Compensation, Strategy, next_vertex};
+use super::compensate::{Compensation, next_vertex};
 use super::light::VirtualLight;
 use super::scatterer::{Receiver, Scatterer};
 use crate::host::{Medium, Scene};
@@ -131,7 +131,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Gatherer<'_, M, S> {
     /// What `lights` make `receiver` send to the eye, with what compensation adds for them; of light that was scattered
     /// `most` times at most before it comes to the receiver.
     ///
-    /// [`Compensation::strategy`] decides whether all lights share one compensation path. Light that comes straight
+    /// Groups of [`Compensation::lights_per_path`] lights share a compensation path. Light that comes straight
     /// from the lights to a vertex is not in here: see [`Self::of_the_lights`].
     ///
     /// ```text
@@ -139,8 +139,8 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Gatherer<'_, M, S> {
     /// ```
     pub fn gather(&self, receiver: &Receiver, lights: &[VirtualLight], most: u32, rng: &mut Generator) -> Gathered {
         let mut gathered = Gathered { clamped: self.sum(receiver, lights, most, rng), ..Gathered::default() };
-        let is_shared = self.compensation.is_some_and(|c| c.strategy == Strategy::OneToN);
-        for group in lights.chunks(if is_shared { lights.len().max(1) } else { 1 }) {
+        let Some(compensation) = self.compensation else { return gathered };
+        for group in lights.chunks(compensation.lights_per_path.max(1) as usize) {
             // No vertex sees light that has been scattered before.
             let first = group.iter().map(|light| light.scatterings).min().unwrap_or(u32::MAX);
             self.compensate(receiver, most.saturating_sub(first), rng, |step, vertex, weight, rng| {

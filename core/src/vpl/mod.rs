@@ -30,7 +30,7 @@ pub mod light;
 mod scatterer;
 
 pub use bound::{Bound, NoBound, contraction, geometry, radius_for, usual_bound};
-pub use compensate::{Compensation, Flights, Strategy, next_vertex};
+pub use compensate::{Compensation, Flights, next_vertex};
 pub use eye::{EyeSettings, Seen, radiance, receivers};
 pub use gather::{Gathered, Gatherer, LEVELS};
 pub use generate::{select, shoot};

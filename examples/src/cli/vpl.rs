@@ -42,6 +42,10 @@ pub struct VplArguments {
     /// Whether compensation asks what lies between a point of the medium and the next [default: on].
     #[arg(long, value_enum, value_name = "on|off")]
     pub local_visibility: Option<Switch>,
+    /// Lights that share a point on the eye ray and a compensation path, with 1-to-1 and abc: more cost less, and are
+    /// noisier together [default: 1, for abc 4].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1 << 24))]
+    pub share: Option<u32>,
     /// Points on each eye ray at which each light is gathered.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=4096))]
     pub light_points: u32,
@@ -60,7 +64,7 @@ pub enum Recovery {
     /// A point and a path for each light.
     #[value(name = "1-to-1")]
     OneToOne,
-    /// The same in media taken as even around each point: approximate bias compensation.
+    /// The same for groups of lights, in media taken as even around each point: approximate bias compensation.
     Abc,
 }
 
@@ -109,6 +113,9 @@ impl VplArguments {
                 "--compensation full takes as many steps as there are, and asks for visibility: leave out --steps and --local-visibility"
                     .into(),
             ),
+            Recovery::None | Recovery::Full | Recovery::NToOne if self.share.is_some() => {
+                Err("--share needs --compensation 1-to-1 or abc".into())
+            }
             _ if !is_clamped && (self.steps.is_some() || self.local_visibility.is_some()) => {
                 Err("--clamp off leaves nothing to compensate: leave out --steps and --local-visibility".into())
             }
@@ -122,6 +129,7 @@ impl VplArguments {
             || self.compensation != Recovery::Abc
             || self.steps.is_some()
             || self.local_visibility.is_some()
+            || self.share.is_some()
             || self.lights != 1000
             || self.candidates != 16
             || self.light_points != 1
@@ -136,6 +144,10 @@ impl VplArguments {
             Recovery::Abc => Compensation::APPROXIMATE,
         };
         let local_visibility = self.local_visibility.map_or(base.local_visibility, |switch| switch == Switch::On);
+        let base = match self.share {
+            Some(n) => Compensation { lights_per_point: n, lights_per_path: n, ..base },
+            None => base,
+        };
         Some(Compensation { steps: self.steps.unwrap_or(base.steps), local_visibility, ..base })
     }
 
