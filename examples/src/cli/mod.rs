@@ -48,7 +48,7 @@ pub enum Command {
     /// Renders a Mitsuba 3 scene.
     Render(Box<RenderArguments>),
     /// Draws where the records of radiance caches lie.
-    Records(RecordsArguments),
+    Records(Box<RecordsArguments>),
     /// Says how far an image is from a reference.
     Compare(CompareArguments),
     /// Says in numbers what is in a scene.
