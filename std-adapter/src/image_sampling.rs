@@ -1,7 +1,7 @@
 //! Adaptive sampling of images: where light is smooth few pixels are computed, and the others filled in from them.
 //!
-//! Belcour et al. 2014, § 6.3: the density of computed pixels follows `√det P` of the image's covariance, and
-//! Gaussians of the shape that it gives spread them. Pixel `i` is the mean of computed pixels `j`,
+//! Belcour et al. 2014, § 6.3: Gaussians of the shape that the image's covariance gives spread computed pixels, whose density
+//! is the inverse of the Gaussians' area: `√det P`, as in B, where no border of depth cuts them. Pixel `i` is the mean of computed pixels `j`,
 //!
 //! ```text
 //! Lᵢ = Σⱼ wᵢⱼ Lⱼ / Σⱼ wᵢⱼ,    wᵢⱼ = √(gᵢ(j) gⱼ(i)) / ρⱼ
@@ -10,9 +10,9 @@
 //! with `g` the Gaussian of a pixel and `ρ` the density of computed pixels. Three things keep means of a picture what they are:
 //! without `1/ρⱼ`, crowds of pixels around bright shafts outvote the dark pixels beside them; with `gᵢ` alone, wide filters
 //! in the dark take light from narrow ones that give none back; and `ρ` follows the filters as they are used, bounded by
-//! their neighbours', for a narrow filter over a sparse lattice finds the bright side of a border only.
+//! their neighbours' and by depth, for a narrow filter over few computed pixels finds one side of a border only.
 
-use fogbow::covariance::{filter_precision, sample_density};
+use fogbow::covariance::filter_precision;
 use fogbow::math::Symmetric2;
 use fogbow::spectrum::Spectrum;
 use rayon::prelude::*;
@@ -55,13 +55,7 @@ pub struct Outlook {
 /// Which pixels are computed, and how the others are filled in.
 #[derive(Debug, Clone)]
 pub struct Plan {
-    width: u32,
-    height: u32,
-    outlooks: Vec<Outlook>,
-    /// Covariance of each pixel's filter.
-    shapes: Vec<Symmetric2>,
-    /// How depth changes (m) from a pixel to the next in the row, and to the one below.
-    slopes: Vec<[f32; 2]>,
+    filters: Filters,
     /// Pixel by pixel, row by row, whether it is computed.
     pub computed: Vec<bool>,
     /// The share of neighbours that should be computed.
@@ -88,10 +82,9 @@ impl Plan {
     pub fn new(width: u32, height: u32, share: f32, outlooks: Vec<Outlook>) -> Self {
         assert_eq!(outlooks.len(), width as usize * height as usize, "one outlook per pixel");
         let share = share.clamp(LEAST_PLAN, 1.0);
-        let shapes = shapes(width as usize, height as usize, &outlooks);
+        let filters = Filters::new(width, height, outlooks);
         // As many computed pixels under every filter.
-        let wanted: Vec<f32> =
-            shapes.iter().map(sample_density).map(|d| if d.is_finite() { d } else { 0.0 }).collect();
+        let wanted: Vec<f32> = (0..filters.outlooks.len()).into_par_iter().map(|i| 1.0 / filters.area(i)).collect();
         // The factor at which the mean of the clamped densities is the share: by halving.
         let least = LEAST_SHARE.min(share);
         let density_at = |factor: f32| wanted.iter().map(move |d| (d * factor).clamp(least, 1.0));
@@ -103,8 +96,7 @@ impl Plan {
         }
         let density: Vec<f32> = density_at(low).collect();
         let computed = dithered(width as usize, height as usize, &density, share);
-        let slopes = slopes(width as usize, height as usize, &outlooks);
-        Self { width, height, outlooks, shapes, slopes, computed, density }
+        Self { filters, computed, density }
     }
 
     /// The share of computed pixels.
@@ -116,53 +108,82 @@ impl Plan {
     /// Covariance (cycles² per pixel²) whose Gaussian fills in a pixel.
     #[must_use]
     pub fn shape(&self, index: usize) -> Symmetric2 {
-        self.shapes[index]
+        self.filters.shapes[index]
     }
 
     /// The image that the computed pixels of `image` give; the others' values are not read.
     #[must_use]
     pub fn filled(&self, image: &Image) -> Image {
-        let (width, height) = (i64::from(self.width), i64::from(self.height));
-        let precisions: Vec<Symmetric2> = self.shapes.iter().map(filter_precision).collect();
         let pixels = (0..self.computed.len())
             .into_par_iter()
             .map(|index| {
-                let (x, y) = (index as i64 % width, index as i64 / width);
                 let (mut sum, mut total) = (Spectrum::ZERO, 0.0_f32);
                 // Where no filter reaches: whether it sees another surface, its distance, its colour.
                 let mut nearest: Option<((bool, i64), Spectrum)> = None;
-                for up in (y - REACH).max(0)..=(y + REACH).min(height - 1) {
-                    for at in (x - REACH).max(0)..=(x + REACH).min(width - 1) {
-                        let other = (up * width + at) as usize;
-                        if !self.computed[other] {
-                            continue;
-                        }
-                        let colour = image.pixels[other];
-                        let distance2 = (at - x).pow(2) + (up - y).pow(2);
-                        let (dx, dy) = ((at - x) as f32, (up - y) as f32);
-                        let is_same = self.is_same(index, other, dx, dy);
-                        if nearest.is_none_or(|(key, _)| (!is_same, distance2) < key) {
-                            nearest = Some(((!is_same, distance2), colour));
-                        }
-                        let exponent = 0.25 * (precisions[index].along(dx, dy) + precisions[other].along(dx, dy));
-                        if exponent < 8.0 && is_same {
-                            let weight = (-exponent).exp() / self.density[other];
-                            sum += colour * weight;
-                            total += weight;
-                        }
+                for (other, at) in self.filters.around(index).filter(|&(other, _)| self.computed[other]) {
+                    let colour = image.pixels[other];
+                    let weight = self.filters.weight(index, other, at);
+                    if let Some(weight) = weight.filter(|&w| w > 0.0) {
+                        let weight = weight / self.density[other];
+                        sum += colour * weight;
+                        total += weight;
+                    }
+                    let key = (weight.is_none(), at[0] * at[0] + at[1] * at[1]);
+                    if nearest.is_none_or(|(best, _)| key < best) {
+                        nearest = Some((key, colour));
                     }
                 }
                 if total > 0.0 { sum / total } else { nearest.map_or(Spectrum::ZERO, |(_, colour)| colour) }
             })
             .collect();
-        Image { width: self.width, height: self.height, pixels }
+        Image { width: self.filters.width, height: self.filters.height, pixels }
+    }
+}
+
+/// What fills in the pixels of a picture, computed or not.
+#[derive(Debug, Clone)]
+struct Filters {
+    width: u32,
+    height: u32,
+    outlooks: Vec<Outlook>,
+    /// Covariance of each pixel's Gaussian.
+    shapes: Vec<Symmetric2>,
+    /// How depth changes (m) from a pixel to the next in the row, and to the one below.
+    slopes: Vec<[f32; 2]>,
+}
+
+impl Filters {
+    fn new(width: u32, height: u32, outlooks: Vec<Outlook>) -> Self {
+        let shapes = shapes(width as usize, height as usize, &outlooks);
+        let slopes = slopes(width as usize, height as usize, &outlooks);
+        Self { width, height, outlooks, shapes, slopes }
     }
 
-    /// Whether two pixels, `(dx, dy)` apart, see one surface, or two that meet.
-    fn is_same(&self, a: usize, b: usize, dx: f32, dy: f32) -> bool {
+    /// Pixels in reach of one, itself included, and how far to the right and down they are.
+    fn around(&self, index: usize) -> impl Iterator<Item = (usize, [i64; 2])> {
+        let (width, height) = (i64::from(self.width), i64::from(self.height));
+        let (x, y) = (index as i64 % width, index as i64 / width);
+        let rows = (y - REACH).max(0)..=(y + REACH).min(height - 1);
+        rows.flat_map(move |up| {
+            let columns = (x - REACH).max(0)..=(x + REACH).min(width - 1);
+            columns.map(move |at| ((up * width + at) as usize, [at - x, up - y]))
+        })
+    }
+
+    /// By how much two pixels fill each other in, the second `at` from the first; `None` where they see different things.
+    fn weight(&self, a: usize, b: usize, at: [i64; 2]) -> Option<f32> {
+        let [dx, dy] = at.map(|n| n as f32);
         let (near, far) = (self.outlooks[a].depth, self.outlooks[b].depth);
         let [rise, other] = [a, b].map(|i| (self.slopes[i][0] * dx + self.slopes[i][1] * dy).abs());
-        near == far || (near - far).abs() < SAME_DEPTH * near.min(far) + rise.max(other)
+        let is_same = near == far || (near - far).abs() < SAME_DEPTH * near.min(far) + rise.max(other);
+        // Of the geometric mean of both Gaussians.
+        let exponent = 0.25 * filter_precision(&self.shapes[a].plus(&self.shapes[b])).along(dx, dy);
+        is_same.then(|| if exponent < 8.0 { (-exponent).exp() } else { 0.0 })
+    }
+
+    /// Pixels under a pixel's filter, those counted in part that it weighs less than itself.
+    fn area(&self, index: usize) -> f32 {
+        self.around(index).filter_map(|(other, at)| self.weight(index, other, at)).sum::<f32>().max(1.0)
     }
 }
 

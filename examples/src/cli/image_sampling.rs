@@ -8,9 +8,10 @@ use fogbow::spectrum::Spectrum;
 use fogbow_std::film::{Film, Image};
 use fogbow_std::image_sampling::{Outlook, Plan};
 use fogbow_std::stats::Statistics;
+use fogbow_std::tiles::Sample;
 
 use super::Failure;
-use super::render::LAYERS;
+use super::render::CACHE_LAYERS;
 use crate::camera::Camera;
 use crate::world::{WithMedium, World};
 
@@ -105,6 +106,12 @@ fn in_pixels(p: &Symmetric2, [a, b]: [Vec2; 2]) -> Symmetric2 {
 /// deviations along its axes (pixels) with the angle (rad) of the longer from the rows.
 const OWN: [&str; 3] = ["computed", "density", "filter"];
 
+/// Whether the medium's light is wanted at a pixel, or filled in from others.
+#[inline]
+pub(super) fn is_computed(plan: Option<&Plan>, sample: &Sample<'_>, width: u32) -> bool {
+    plan.is_none_or(|plan| plan.computed[(sample.y * width + sample.x) as usize])
+}
+
 /// The film with light of the medium filled in.
 pub(super) fn finished(film: &Film, plan: &Plan, has_layers: bool) -> Result<Film, Failure> {
     let mut layers: Vec<Image> = (0..film.layers().len()).filter_map(|i| film.mean(i)).collect();
@@ -116,11 +123,12 @@ pub(super) fn finished(film: &Film, plan: &Plan, has_layers: bool) -> Result<Fil
     let names: Vec<&str> =
         if has_layers { film.layers().iter().map(String::as_str).chain(OWN).collect() } else { vec!["total"] };
     let mut out = Film::new(film.width(), film.height(), &names)?;
-    let parts = LAYERS.len();
+    // Layers of light, in any method; ray marching has one that counts.
+    let parts = film.layers().iter().skip(1).take_while(|name| CACHE_LAYERS.contains(&name.as_str())).count();
     let mut colours = Vec::new();
     for index in 0..plan.computed.len() {
         colours.clear();
-        colours.push(layers[1..parts].iter().map(|layer| layer.pixels[index]).sum::<Spectrum>());
+        colours.push(layers[1..=parts].iter().map(|layer| layer.pixels[index]).sum::<Spectrum>());
         if has_layers {
             colours.extend(layers[1..].iter().map(|layer| layer.pixels[index]));
             colours.push(Spectrum::splat(f32::from(u8::from(plan.computed[index]))));

@@ -118,7 +118,7 @@ const MARCH_LAYERS: [&str; 7] =
     ["total", "emitted", "surface_direct", "surface_indirect", "medium_single", "medium_multiple", "steps"];
 
 /// The same for radiance caching, which knows light from surfaces apart.
-const CACHE_LAYERS: [&str; 7] =
+pub(super) const CACHE_LAYERS: [&str; 7] =
     ["total", "emitted", "surface_direct", "surface_indirect", "medium_single", "medium_surface", "medium_multiple"];
 
 /// Samples per pixel of radiance caching: what is left for them to even out are edges and direct light.
@@ -181,10 +181,10 @@ pub(crate) fn render(arguments: &RenderArguments) -> Result<Rendered, Failure> {
     let (width, height) = arguments.size.unwrap_or((scene.sensor.width, scene.sensor.height));
     let layers: &[&str] = match (arguments.aov, arguments.method) {
         (false, _) if arguments.sampling.is_uniform() => &["total"],
+        (_, Method::RadianceCache) => &CACHE_LAYERS,
         (false, _) => &LAYERS,
         (true, Method::Path | Method::PhotonBeams) => &LAYERS,
         (true, Method::March) => &MARCH_LAYERS,
-        (true, Method::RadianceCache) => &CACHE_LAYERS,
     };
     let mut film = Film::new(width, height, layers)?;
     statistics.bytes.push(("film".to_owned(), film.bytes() as u64));
@@ -260,6 +260,7 @@ pub(crate) fn render(arguments: &RenderArguments) -> Result<Rendered, Failure> {
                 settings: &settings,
                 control: &control,
                 arguments: &arguments.cache,
+                plan: plan.as_ref(),
                 tag: arguments.cache.tag(&arguments.scene, &paths)?,
             })?;
             let outcome = done.render;
@@ -334,9 +335,6 @@ fn outputs(arguments: &RenderArguments) -> Result<Vec<PathBuf>, Failure> {
         return Err("--cache-in and --cache-out need --method radiance-cache".into());
     }
     caches.check()?;
-    if !matches!(arguments.method, Method::Path | Method::March) && !arguments.sampling.is_uniform() {
-        return Err("--image-sampling covariance goes with --method path and march".into());
-    }
     if arguments.march.step != Step::Uniform && arguments.method != Method::March {
         return Err("--step covariance and frequency need --method march".into());
     }
@@ -382,7 +380,7 @@ impl Shot<'_> {
     /// Whether the medium's light is wanted at a pixel, or filled in from others.
     #[inline]
     pub(super) fn is_computed(&self, sample: &Sample<'_>, width: u32) -> bool {
-        self.plan.is_none_or(|plan| plan.computed[(sample.y * width + sample.x) as usize])
+        image_sampling::is_computed(self.plan, sample, width)
     }
 }
 
