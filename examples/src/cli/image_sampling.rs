@@ -166,7 +166,8 @@ mod tests {
         let film = render(&arguments).unwrap().film;
         let mean = |is_wanted: &dyn Fn(&str) -> bool| -> f64 {
             let layers = film.layers().iter().enumerate().filter(|(_, name)| is_wanted(name));
-            let sums = layers.map(|(i, _)| film.mean(i).unwrap().pixels.iter().map(|p| f64::from(p.mean())).sum::<f64>());
+            let sums =
+                layers.map(|(i, _)| film.mean(i).unwrap().pixels.iter().map(|p| f64::from(p.mean())).sum::<f64>());
             sums.sum::<f64>() / f64::from(film.width() * film.height())
         };
         let (medium, computed) = (mean(&|name| name.starts_with("medium")), mean(&|name| name == "computed"));
