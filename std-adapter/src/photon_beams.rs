@@ -206,7 +206,8 @@ where
 ///
 /// [`tiles::Settings::samples`] is rounded up to whole passes, so that light of the medium and of surfaces count alike.
 ///
-/// `ray` is the eye ray of a sample; `radius` is told a point (m) and the pass's radius (m) and says how wide
+/// `ray` is the eye ray of a sample; `is_gathered` says whether light of the medium is wanted at its pixel (`|_| true`
+/// everywhere; see [`crate::image_sampling`]); `radius` is told a point (m) and the pass's radius (m) and says how wide
 /// the kernel is there: `|_, pass| pass` for progressive photon beams, `|point, pass| pass.max(…)` where
 /// something is known of how fast light changes. `write` puts what was seen into the film's layers.
 ///
@@ -220,6 +221,7 @@ pub fn render<M, S>(
     control: &Control<'_>,
     view: &View<'_, M, S>,
     ray: impl Fn(&Sample<'_>, &mut SampleRng) -> Ray + Sync,
+    is_gathered: impl Fn(&Sample<'_>) -> bool + Sync,
     radius: impl Fn(Vec3, f32) -> f32 + Sync,
     write: impl Fn(&Radiance, &mut [Spectrum]) + Sync,
 ) -> Result<Outcome, BeamsError>
@@ -248,7 +250,7 @@ where
         };
         let ray = ray(sample, rng);
         let seen = path::radiance_beyond(&ray, &world, &view.paths, rng, |segment: &Ray, most, rng: &mut Generator| {
-            if sample.index % length != 0 {
+            if sample.index % length != 0 || !is_gathered(sample) {
                 return InScattered::default();
             }
             let light = beams.gather(segment, world.medium, most, rng).light;

@@ -275,10 +275,11 @@ where
 /// Adds samples to `film` as [`tiles::render`] does, in passes of [`Settings::samples`] with lights of their own.
 ///
 /// [`tiles::Settings::samples`] is rounded up to whole passes, so that all lights count alike. `ray` is the eye ray of a
-/// sample; `write` puts what was seen into the film's layers.
+/// sample; where `sees_medium` says no, the medium's light is left out; `write` puts what was seen into the film's layers.
 ///
 /// # Errors
 /// See [`LightsError`].
+#[expect(clippy::too_many_arguments, reason = "the host's film, world, camera and settings")]
 pub fn render<M, S>(
     film: &mut Film,
     tiles: &tiles::Settings,
@@ -286,6 +287,7 @@ pub fn render<M, S>(
     control: &Control<'_>,
     view: &View<'_, M, S>,
     ray: impl Fn(&Sample<'_>, &mut SampleRng) -> Ray + Sync,
+    sees_medium: impl Fn(&Sample<'_>) -> bool + Sync,
     write: impl Fn(&Seen, &mut [Spectrum]) + Sync,
 ) -> Result<Outcome, LightsError>
 where
@@ -333,6 +335,7 @@ where
         };
         let part = part(lights, sample.index % length, length);
         let ray = ray(sample, rng);
+        let eye = EyeSettings { sees_medium: sees_medium(sample), ..eye };
         let seen = vpl::radiance(&ray, &gatherer, part, length.get() as f32, &eye, rng);
         sample.tally.collide(seen.radiance.collisions);
         write(&seen, layers);

@@ -337,7 +337,7 @@ fn by_beams<M: Medium + Sync>(medium: &M, paths: path::Settings, tiles: tiles::S
         eye_ray(sample.x as f32 + jitter.x, sample.y as f32 + jitter.y)
     };
     let control = Control::default();
-    photon_beams::render(&mut film, &tiles, &settings, &control, &view, ray, |_, pass| pass, write).unwrap();
+    photon_beams::render(&mut film, &tiles, &settings, &control, &view, ray, |_| true, |_, pass| pass, write).unwrap();
     film
 }
 
@@ -430,7 +430,7 @@ fn what_beams_cannot_do_is_an_error() {
         let mut film = Film::new(2, 2, &NAMES).unwrap();
         let tiles = tiles::Settings::default();
         let ray = |_: &tiles::Sample<'_>, _: &mut fogbow_std::seed::SampleRng| eye_ray(1.0, 1.0);
-        photon_beams::render(&mut film, &tiles, &settings, &Control::default(), &view, ray, |_, r| r, write)
+        photon_beams::render(&mut film, &tiles, &settings, &Control::default(), &view, ray, |_| true, |_, r| r, write)
     };
     let good = Settings::new(&BOUNDS);
     // Without lights there is nothing to send: black, and no error.

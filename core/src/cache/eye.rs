@@ -257,6 +257,28 @@ pub fn radiance<M: Medium + ?Sized, S: Scene + ?Sized>(
     settings: &EyeSettings,
     rng: &mut (impl Rng + ?Sized),
 ) -> Seen {
+    gathered(ray, estimator, caches, settings, true, rng)
+}
+
+/// As [`radiance`], but for light that the medium scatters: emission, and surfaces seen through the medium.
+pub fn radiance_beyond<M: Medium + ?Sized, S: Scene + ?Sized>(
+    ray: &Ray,
+    estimator: &Estimator<'_, M, S>,
+    caches: &Caches<'_>,
+    settings: &EyeSettings,
+    rng: &mut (impl Rng + ?Sized),
+) -> Seen {
+    gathered(ray, estimator, caches, settings, false, rng)
+}
+
+fn gathered<M: Medium + ?Sized, S: Scene + ?Sized>(
+    ray: &Ray,
+    estimator: &Estimator<'_, M, S>,
+    caches: &Caches<'_>,
+    settings: &EyeSettings,
+    in_scattered: bool,
+    rng: &mut (impl Rng + ?Sized),
+) -> Seen {
     let along = [uniform(rng), uniform(rng)];
     let light = [uniform(rng), uniform(rng), uniform(rng)];
     let surface = (uniform(rng), uniform2(rng));
@@ -264,6 +286,7 @@ pub fn radiance<M: Medium + ?Sized, S: Scene + ?Sized>(
         estimator,
         caches,
         settings,
+        in_scattered,
         seen: Seen::default(),
         along,
         light,
@@ -280,6 +303,8 @@ struct Gather<'a, M: ?Sized, S: ?Sized> {
     estimator: &'a Estimator<'a, M, S>,
     caches: &'a Caches<'a>,
     settings: &'a EyeSettings,
+    /// Whether light that the medium scatters counts.
+    in_scattered: bool,
     seen: Seen,
     /// Random numbers of the sample: for connections along segments, from points, from surfaces.
     along: [f32; 2],
@@ -373,7 +398,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Gather<'_, M, S> {
 
 impl<M: Medium + ?Sized, S: Scene + ?Sized> Sight for Gather<'_, M, S> {
     fn segment(&mut self, segment: &Ray, throughput: Spectrum) {
-        if self.caches.single.is_some() {
+        if self.caches.single.is_some() || !self.in_scattered {
             return;
         }
         let count = self.settings.connections.max(1);
@@ -388,6 +413,9 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Sight for Gather<'_, M, S> {
 
     #[inline]
     fn scatter(&mut self, point: Vec3, to_eye: Vec3, properties: &Properties, weight: Spectrum) {
+        if !self.in_scattered {
+            return;
+        }
         let k = self.points;
         self.points += 1;
         let (caches, estimator) = (self.caches, self.estimator);

@@ -42,7 +42,7 @@ mod store;
 
 pub use estimate::Estimator;
 pub use extrapolate::{Blend, Extrapolation, exponent_limit, weight};
-pub use eye::{Caches, EyeSettings, Place, Reader, Seen, places, radiance};
+pub use eye::{Caches, EyeSettings, Place, Reader, Seen, places, radiance, radiance_beyond};
 pub use guide::{Guide, Guided, Looks};
 pub use index::{Block, Index, Node};
 pub use lookup::{Basis, Reading, TURNING_DEGREE, TurningBasis};

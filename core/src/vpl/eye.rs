@@ -25,13 +25,15 @@ pub struct EyeSettings {
     pub single: u32,
     /// Compensation paths for light that comes straight from the lights, for each segment.
     pub primary: u32,
+    /// Whether the medium's light is wanted; if not, only that of surfaces behind it.
+    pub sees_medium: bool,
 }
 
 impl EyeSettings {
     /// One point for each light, four samples of single scattering, two compensation paths.
     #[must_use]
     pub fn new(paths: path::Settings) -> Self {
-        Self { paths, points: 1, single: 4, primary: 2 }
+        Self { paths, points: 1, single: 4, primary: 2, sees_medium: true }
     }
 }
 
@@ -212,6 +214,9 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Eye<'_, M, S> {
 
 impl<M: Medium + ?Sized, S: Scene + ?Sized> Delegate for &mut Eye<'_, M, S> {
     fn in_scattered(&mut self, segment: &Ray, throughput: Spectrum, most: u32, rng: &mut Generator) -> InScattered {
+        if !self.settings.sees_medium {
+            return InScattered::default();
+        }
         let single = self.single(segment, rng);
         let multiple = if most > 1 { self.multiple(segment, throughput, most - 1, rng) } else { Spectrum::ZERO };
         InScattered { single, multiple }

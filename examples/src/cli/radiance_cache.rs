@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use fogbow::bytes::Crc;
-use fogbow::cache::{Estimator, Extrapolation, EyeSettings, Limits, Seen, radiance};
+use fogbow::cache::{Estimator, Extrapolation, EyeSettings, Limits, Seen, radiance, radiance_beyond};
 use fogbow::host::Medium;
 use fogbow::light::Light;
 use fogbow::math::{Ray, Vec2};
@@ -14,11 +14,13 @@ use fogbow::phase::Phase;
 use fogbow::sampling::uniform2;
 use fogbow::transmittance::thickness::Steps;
 use fogbow_std::film::Film;
+use fogbow_std::image_sampling::Plan;
 use fogbow_std::progress::Control;
 use fogbow_std::radiance_cache::{self as cache, Effort, Problem, RadianceCaches};
 use fogbow_std::stats::{CountingMedium, CountingScene, Seconds, Stopwatch};
 use fogbow_std::tiles::{self, Outcome};
 
+use super::image_sampling::is_computed;
 use super::{Failure, output};
 use crate::camera::Camera;
 use crate::error::SceneError;
@@ -181,6 +183,8 @@ pub(super) struct CacheJob<'a> {
     pub(super) settings: &'a tiles::Settings,
     pub(super) control: &'a Control<'a>,
     pub(super) arguments: &'a CacheArguments,
+    /// Which pixels are computed; `None` for all.
+    pub(super) plan: Option<&'a Plan>,
     /// See [`CacheArguments::tag`].
     pub(super) tag: u64,
 }
@@ -315,8 +319,10 @@ impl WithMedium for CacheJob<'_> {
             let ray = self.camera.ray(film);
             let seen = if self.paths.max_scatterings == 0 {
                 Seen { emitted: path::radiance(&ray, &estimator.world, &self.paths, rng).emitted, ..Seen::default() }
-            } else {
+            } else if is_computed(self.plan, sample, width as u32) {
                 radiance(&ray, &estimator, &reader, &eye, rng)
+            } else {
+                radiance_beyond(&ray, &estimator, &reader, &eye, rng)
             };
             sample.tally.look_up(seen.lookups, seen.misses);
             if has_layers {

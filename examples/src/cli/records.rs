@@ -114,6 +114,7 @@ pub(super) fn run(arguments: &RecordsArguments) -> Result<Ending, Failure> {
         settings: &settings,
         control: &control,
         arguments: &arguments.cache,
+        plan: None,
         tag: arguments.cache.tag(&arguments.scene, &paths)?,
     })?;
     bar.finish();

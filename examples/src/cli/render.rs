@@ -124,7 +124,7 @@ const MARCH_LAYERS: [&str; 7] =
     ["total", "emitted", "surface_direct", "surface_indirect", "medium_single", "medium_multiple", "steps"];
 
 /// The same for radiance caching, which knows light from surfaces apart.
-const CACHE_LAYERS: [&str; 7] =
+pub(super) const CACHE_LAYERS: [&str; 7] =
     ["total", "emitted", "surface_direct", "surface_indirect", "medium_single", "medium_surface", "medium_multiple"];
 
 /// The same for virtual lights, with what clamping leaves and compensation adds.
@@ -205,12 +205,12 @@ pub(crate) fn render(arguments: &RenderArguments) -> Result<Rendered, Failure> {
     let world = statistics.time("build", || World::new(&scene, &mut storage))?;
     let (width, height) = arguments.size.unwrap_or((scene.sensor.width, scene.sensor.height));
     let layers: &[&str] = match (arguments.aov, arguments.method) {
-        (_, Method::Vpl) if arguments.aov || arguments.stats.is_some() => &VPL_LAYERS,
+        (_, Method::Vpl) if arguments.is_audited() => &VPL_LAYERS,
         (false, _) if arguments.sampling.is_uniform() => &["total"],
+        (_, Method::RadianceCache) => &CACHE_LAYERS,
         (false, _) => &LAYERS,
         (true, Method::Path | Method::PhotonBeams | Method::Vpl) => &LAYERS,
         (true, Method::March) => &MARCH_LAYERS,
-        (true, Method::RadianceCache) => &CACHE_LAYERS,
     };
     let mut film = Film::new(width, height, layers)?;
     statistics.bytes.push(("film".to_owned(), film.bytes() as u64));
@@ -282,7 +282,7 @@ pub(crate) fn render(arguments: &RenderArguments) -> Result<Rendered, Failure> {
             let pass_samples = arguments.beams.pass_samples;
             let job = VplJob { shot, film: &mut film, arguments: &arguments.vpl, pass_samples };
             let (outcome, bound) = world.media().with(job)?;
-            audit = arguments.stats.is_some().then(|| Audit::new(&film, bound, &arguments.vpl));
+            audit = arguments.is_audited().then(|| Audit::new(&film, bound, &arguments.vpl));
             outcome
         }
         Method::March => world.media().with(MarchJob { shot, film: &mut film, arguments: &arguments.march })?,
@@ -296,6 +296,7 @@ pub(crate) fn render(arguments: &RenderArguments) -> Result<Rendered, Failure> {
                 settings: &settings,
                 control: &control,
                 arguments: &arguments.cache,
+                plan: plan.as_ref(),
                 tag: arguments.cache.tag(&arguments.scene, &paths)?,
             })?;
             let outcome = done.render;
@@ -331,6 +332,11 @@ pub(crate) fn render(arguments: &RenderArguments) -> Result<Rendered, Failure> {
 }
 
 impl RenderArguments {
+    /// Whether virtual lights' layers are kept: pixels that are filled in have none.
+    fn is_audited(&self) -> bool {
+        (self.aov || self.stats.is_some()) && self.sampling.is_uniform()
+    }
+
     /// Whether anything asked for takes a covariance grid.
     fn needs_grid(&self) -> bool {
         if !self.sampling.is_uniform() {
@@ -370,9 +376,6 @@ fn outputs(arguments: &RenderArguments) -> Result<Vec<PathBuf>, Failure> {
         return Err("--cache-in and --cache-out need --method radiance-cache".into());
     }
     caches.check()?;
-    if !matches!(arguments.method, Method::Path | Method::March) && !arguments.sampling.is_uniform() {
-        return Err("--image-sampling covariance goes with --method path and march".into());
-    }
     if arguments.march.step != Step::Uniform && arguments.method != Method::March {
         return Err("--step covariance and frequency need --method march".into());
     }
@@ -422,7 +425,7 @@ impl Shot<'_> {
     /// Whether the medium's light is wanted at a pixel, or filled in from others.
     #[inline]
     pub(super) fn is_computed(&self, sample: &Sample<'_>, width: u32) -> bool {
-        self.plan.is_none_or(|plan| plan.computed[(sample.y * width + sample.x) as usize])
+        image_sampling::is_computed(self.plan, sample, width)
     }
 }
 

@@ -201,6 +201,7 @@ impl WithMedium for VplJob<'_> {
                 let at = Vec2::new(sample.x as f32, sample.y as f32) + uniform2(rng);
                 shot.camera.ray(at / Vec2::new(width as f32, height as f32))
             },
+            |sample| shot.is_computed(sample, width),
             write,
         )?;
         Ok((outcome, bound))

@@ -67,9 +67,8 @@ pub(super) fn section(plan: &Plan) -> Result<String, Failure> {
          The last line has as many samples of the medium as the first. Light at surfaces is computed at all pixels and is \
          in the times. The smooth half are the pixels around which the truth, evened out over 5 × 5, varies less than its \
          median. Filling in evens out noise where light is smooth, and spreads bright outliers over their neighbours. Bias is what is \
-         too bright or too dark on the whole, noise included. Pixels at other depths do not fill each other in: along \
-         walls seen at a grazing angle, where depth changes from pixel to pixel, light keeps streaks and more pixels are \
-         needed.\n\n",
+         too bright or too dark on the whole, noise included. Pixels fill each other in where they see one surface or two that \
+         meet, and not over a jump in depth.\n\n",
         percent(share),
         line("adaptive", all, &adaptive),
         line("all", all, &full),
