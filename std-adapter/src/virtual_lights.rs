@@ -30,7 +30,8 @@ use crate::tiles::{self, Outcome, Passes, RenderError, Sample, render_prepared};
 pub struct Settings {
     /// Virtual lights of each pass, about.
     pub lights: u32,
-    /// How many times as many are made, of which those are kept that matter most for the picture; 1 keeps all.
+    /// How many times as many are made, of which those are kept that matter most for the picture; 1 keeps all. No more
+    /// than 131 072, or as many as lights.
     pub candidates: u32,
     /// Samples of every pixel in a pass; each sees an equal part of the lights.
     pub samples: NonZero<u32>,
@@ -109,6 +110,9 @@ const MOST_PATHS: u32 = 1 << 22;
 
 /// Eye rays by whose points the lights that matter are found.
 const SCOUTS: u32 = 64;
+
+/// Candidates of a pass at most, or as many as lights: so that they take no more memory than a picture.
+const MOST_CANDIDATES: u32 = 1 << 17;
 
 /// Cells of the pyramid of mean extinctions along the longest side of the world, at most.
 const MOST_CELLS: u32 = 128;
@@ -314,7 +318,7 @@ where
     let eye = EyeSettings { points: settings.points, ..EyeSettings::new(view.paths) };
     let mut paths = None;
     let prepare = |pass: u32| {
-        let wanted = settings.lights.saturating_mul(settings.candidates);
+        let wanted = settings.lights.saturating_mul(settings.candidates).min(MOST_CANDIDATES.max(settings.lights));
         let paths = *paths.get_or_insert_with(|| paths_for(view, wanted, tiles.seed));
         Ok::<_, LightsError>(lights(view, settings, paths, &witnesses, pass, tiles.seed))
     };

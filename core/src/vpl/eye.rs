@@ -23,7 +23,7 @@ pub struct EyeSettings {
     pub points: u32,
     /// Samples of light that the medium scatters once, for each segment.
     pub single: u32,
-    /// Compensation paths for light that comes straight from the lights, for each segment.
+    /// Compensation paths for light that comes straight from the lights, for each segment and round of points.
     pub primary: u32,
     /// Whether the medium's light is wanted; if not, only that of surfaces behind it.
     pub sees_medium: bool,
@@ -183,17 +183,24 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Eye<'_, M, S> {
         if !(opacity > INVISIBLE) {
             return light;
         }
-        let primary = self.settings.primary.clamp(1, POINTS as u32 / 2) as usize;
-        let points = points_on(medium, segment, opacity, primary, rng);
-        for (receiver, weight) in &points {
-            let gathered = self.gatherer.of_the_lights(receiver, before, rng);
-            light += self.add(&gathered, throughput, *weight * (1.0 / points.len() as f32));
+        let rounds = self.settings.points.max(1);
+        let mut left = self.settings.primary.max(1).saturating_mul(rounds) as usize;
+        let all = left as f32;
+        while left > 0 {
+            let wanted = left.min(POINTS / 2);
+            let points = points_on(medium, segment, opacity, wanted, rng);
+            for (receiver, weight) in &points {
+                let gathered = self.gatherer.of_the_lights(receiver, before, rng);
+                let share = wanted as f32 / (points.len() as f32 * all);
+                light += self.add(&gathered, throughput, *weight * share);
+            }
+            left -= wanted;
         }
         // Without compensation lights share points as with it: pictures differ by what it adds alone.
         let per_point = self.gatherer.compensation.map_or(1, |c| c.lights_per_point.max(1)) as usize;
-        let share = Spectrum::splat(self.share / self.settings.points.max(1) as f32);
+        let share = Spectrum::splat(self.share / rounds as f32);
         let lights = self.lights;
-        for _ in 0..self.settings.points.max(1) {
+        for _ in 0..rounds {
             for group in lights.chunks(per_point.saturating_mul(POINTS / 2)) {
                 let points = points_on(medium, segment, opacity, group.len().div_ceil(per_point), rng);
                 if points.is_empty() {

@@ -12,6 +12,7 @@ use fogbow::math::{Ray, Vec2};
 use fogbow::path::{self, InScattered, Radiance, World as PathWorld};
 use fogbow::sampling::{Generator, uniform2};
 use fogbow::spectrum::Spectrum;
+use fogbow::vpl::VirtualLight;
 use fogbow_std::covariance::{CovarianceGrid, FillError};
 use fogbow_std::film::Film;
 use fogbow_std::image::write_film;
@@ -282,6 +283,8 @@ pub(crate) fn render(arguments: &RenderArguments) -> Result<Rendered, Failure> {
             let pass_samples = arguments.beams.pass_samples;
             let job = VplJob { shot, film: &mut film, arguments: &arguments.vpl, pass_samples };
             let (outcome, bound) = world.media().with(job)?;
+            let bytes = u64::from(arguments.vpl.lights) * size_of::<VirtualLight>() as u64;
+            statistics.bytes.push(("virtual lights".to_owned(), bytes));
             audit = arguments.is_audited().then(|| Audit::new(&film, bound, &arguments.vpl));
             outcome
         }

@@ -26,7 +26,8 @@ pub struct VplArguments {
     /// Virtual lights of each pass.
     #[arg(long, value_name = "N", default_value_t = 1000, value_parser = clap::value_parser!(u32).range(1..=1 << 24))]
     pub lights: u32,
-    /// How many times as many are made; those are kept that matter most for the picture. 1 keeps all.
+    /// How many times as many are made; those are kept that matter most for the picture. 1 keeps all; no more
+    /// than 131072 are made, or as many as lights.
     #[arg(long, value_name = "N", default_value_t = 16, value_parser = clap::value_parser!(u32).range(1..=256))]
     pub candidates: u32,
     /// Bound of geometry terms, by which near virtual lights are clamped, in the scene's unit of length to the power of
