@@ -81,7 +81,7 @@ def unbiased(scenes, options):
 
 
 def strategies(_, options):
-    scene, common_options = "cornell-hetero-iso", ("--size", "32x32", "--lights", 256, "--pass-samples", 2, "--spp", 2)
+    scene, common_options = "cornell-hetero-iso", ("--size", "32x32", "--lights", 64, "--pass-samples", 2, "--spp", 2)
     ways = {
         "1-to-N": ("--compensation", "full"),
         "n-to-1": ("--compensation", "n-to-1", "--steps", 8),
@@ -92,13 +92,13 @@ def strategies(_, options):
     added = lambda seen: sum(seen[name] for name in COMPENSATED)
     truth, base = {}, {}
     for seed in range(1, options.seeds + 1):
-        seen, _, _ = layers(scene, *common_options, *ways["1-to-N"], "--seed", seed, "--light-points", 256)
+        seen, _, _ = layers(scene, *common_options, *ways["1-to-N"], "--seed", seed, "--light-points", 192)
         truth[seed] = added(seen)
         base[seed] = layers(scene, *common_options, "--compensation", "none", "--seed", seed)[1]
     curves = {}
     for name, way in ways.items():
         curve = []
-        for points in (1, 4, 16, 48) if name == "1-to-N" else (1, 3, 9):
+        for points in (1, 3, 9, 27) if name == "1-to-N" else (1, 3, 9):
             squares, seconds = [], []
             for seed in truth:
                 seen, spent, _ = layers(scene, *common_options, *way, "--seed", seed, "--light-points", points)
