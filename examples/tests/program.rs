@@ -2,6 +2,8 @@
 
 #[path = "program/radiance_cache.rs"]
 mod radiance_cache;
+#[path = "program/vpl.rs"]
+mod vpl;
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};

@@ -24,9 +24,6 @@ use fogbow::vpl::{self, Bound, Receiver, VirtualLight};
 
 use crate::hosts::{Analytic, Field};
 
-/// Topics of systems that are still to come; each is taken off when its system lands.
-pub const NOT_YET: &[&str] = &[];
-
 /// The folder named by `FOGBOW_GOLDEN_DIR`, else the repository's own. A relative name counts from
 /// where the command was typed if that is this package or the repository's top.
 #[must_use]

@@ -1,6 +1,6 @@
 //! Golden vectors, from `tests/golden` or the folder named by `FOGBOW_GOLDEN_DIR`.
 
-use fogbow_tests::golden::{self, NOT_YET};
+use fogbow_tests::golden;
 
 #[test]
 fn golden_vectors_hold() {
@@ -8,10 +8,6 @@ fn golden_vectors_hold() {
     let mut failures = Vec::new();
     for (path, file) in golden::files(&folder) {
         let topic = file.topic.as_str();
-        if NOT_YET.contains(&topic) {
-            println!("{topic}: not yet implemented ({} cases)", file.cases.len());
-            continue;
-        }
         let before = failures.len();
         for case in &file.cases {
             match golden::outputs(topic, &case.input) {
@@ -27,14 +23,11 @@ fn golden_vectors_hold() {
     assert!(failures.is_empty(), "{} golden mismatches:\n{}", failures.len(), failures.join("\n"));
 }
 
-/// The comparison itself: every output of every implemented topic, moved by three tolerances, must
+/// The comparison itself: every output of every topic, moved by three tolerances, must
 /// be noticed.
 #[test]
 fn golden_comparison_notices_a_wrong_output() {
     for (_, file) in golden::files(&golden::folder()) {
-        if NOT_YET.contains(&file.topic.as_str()) {
-            continue;
-        }
         let Some(case) = file.cases.first() else { continue };
         let Some(got) = golden::outputs(&file.topic, &case.input) else { continue };
         for key in case.output.keys() {

@@ -46,6 +46,8 @@ pub struct Seen {
     pub clamped: Spectrum,
     /// Of that, what the steps of compensation added; from the last on all together.
     pub compensated: [Spectrum; LEVELS],
+    /// Of what they added, light that came straight from the lights.
+    pub straight: Spectrum,
 }
 
 /// Radiance that arrives at the origin of `ray`, from `lights` a part of all virtual lights: they count `share` times, so
@@ -64,7 +66,7 @@ pub fn radiance<M: Medium + ?Sized, S: Scene + ?Sized>(
 ) -> Seen {
     let mut eye = Eye { gatherer, lights, share, settings, sum: Gathered::default() };
     let radiance = path::radiance_beyond(ray, &gatherer.world, &settings.paths, rng, &mut eye);
-    Seen { radiance, clamped: eye.sum.clamped, compensated: eye.sum.compensated }
+    Seen { radiance, clamped: eye.sum.clamped, compensated: eye.sum.compensated, straight: eye.sum.straight }
 }
 
 /// Calls `visit(receiver, weight)` for a point of the medium and the surface that an eye ray would gather at; `weight` is

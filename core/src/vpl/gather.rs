@@ -29,6 +29,8 @@ pub struct Gathered {
     pub clamped: Spectrum,
     /// What each step of compensation adds.
     pub compensated: [Spectrum; LEVELS],
+    /// Of that, light that comes straight from the lights to a vertex: the part that needs no virtual light.
+    pub straight: Spectrum,
     /// Light that comes by way of mirrors and glass, where no virtual light can be seen from.
     pub mirrored: Spectrum,
 }
@@ -46,6 +48,7 @@ impl Gathered {
     pub fn add(&mut self, other: &Self, weight: Spectrum) {
         self.clamped += other.clamped * weight;
         self.mirrored += other.mirrored * weight;
+        self.straight += other.straight * weight;
         for (sum, part) in self.compensated.iter_mut().zip(other.compensated) {
             *sum += part * weight;
         }
@@ -161,6 +164,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Gatherer<'_, M, S> {
         let mut gathered = Gathered { mirrored: self.mirrored(receiver, most, rng), ..Gathered::default() };
         self.compensate(receiver, most, rng, |step, vertex, weight, rng| {
             let light = self.direct(vertex, rng) + self.mirrored(vertex, most - step, rng);
+            gathered.straight += weight * light;
             gathered.add_step(step, weight * light);
         });
         gathered

@@ -129,10 +129,10 @@ pub(super) const CACHE_LAYERS: [&str; 7] =
     ["total", "emitted", "surface_direct", "surface_indirect", "medium_single", "medium_surface", "medium_multiple"];
 
 /// The same for virtual lights, with what clamping leaves and compensation adds.
-const VPL_LAYERS: [&str; 11] = {
-    let mut layers = [""; 11];
+const VPL_LAYERS: [&str; 12] = {
+    let mut layers = [""; 12];
     let mut i = 0;
-    while i < 11 {
+    while i < 12 {
         layers[i] = if i < 6 { LAYERS[i] } else { vpl::OWN[i - 6] };
         i += 1;
     }

@@ -160,9 +160,10 @@ impl VplArguments {
     }
 }
 
-/// Layers that virtual lights add: their clamped light, and what each step of compensation adds to that.
-pub(super) const OWN: [&str; 1 + LEVELS] =
-    ["clamped", "compensated_1", "compensated_2", "compensated_3", "compensated_rest"];
+/// Layers that virtual lights add: their clamped light, what each step of compensation adds to that, and of it the part
+/// that comes straight from the lights.
+pub(super) const OWN: [&str; 2 + LEVELS] =
+    ["clamped", "compensated_1", "compensated_2", "compensated_3", "compensated_rest", "compensated_straight"];
 
 /// A render by virtual lights, to be done with a medium of any type.
 pub(super) struct VplJob<'a> {
@@ -211,7 +212,7 @@ impl WithMedium for VplJob<'_> {
 
 fn write(seen: &Seen, layers: &mut [Spectrum]) {
     write_layers(&seen.radiance, layers);
-    let own = core::iter::once(seen.clamped).chain(seen.compensated);
+    let own = core::iter::once(seen.clamped).chain(seen.compensated).chain([seen.straight]);
     for (layer, part) in layers.iter_mut().skip(LAYERS.len()).zip(own) {
         *layer = part;
     }
@@ -240,7 +241,7 @@ impl Audit {
                 sum / (image.pixels.len().max(1) as f64)
             })
         };
-        let [clamped, recovered @ ..] = OWN.map(mean);
+        let [clamped, recovered @ .., _] = OWN.map(mean);
         let left = match arguments.compensation().map(|c| c.steps as usize) {
             None => None,
             Some(steps) if steps > LEVELS => Some(0.0),
