@@ -19,7 +19,8 @@ const POINTS: usize = 32;
 pub struct EyeSettings {
     /// How long paths may grow.
     pub paths: path::Settings,
-    /// Points on a segment of the ray that each light is gathered at.
+    /// Points on a segment of the ray that each light is gathered at; on surfaces, how often each is, with compensation
+    /// paths of its own.
     pub points: u32,
     /// Samples of light that the medium scatters once, for each segment.
     pub single: u32,
@@ -242,9 +243,15 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Delegate for &mut Eye<'_, M, S> {
         let Some(receiver) = Receiver::on_surface(segment.at(hit.distance), -segment.direction, hit) else {
             return Some(Spectrum::ZERO);
         };
-        let primary = self.gatherer.of_the_lights(&receiver, most, rng);
-        let gathered = self.gatherer.gather(&receiver, self.lights, most, rng);
-        let light = self.add(&primary, throughput, Spectrum::ONE);
-        Some(light + self.add(&gathered, throughput, Spectrum::splat(self.share)))
+        let rounds = self.settings.points.max(1);
+        let share = 1.0 / rounds as f32;
+        let mut light = Spectrum::ZERO;
+        for _ in 0..rounds {
+            let primary = self.gatherer.of_the_lights(&receiver, most, rng);
+            light += self.add(&primary, throughput, Spectrum::splat(share));
+            let gathered = self.gatherer.gather(&receiver, self.lights, most, rng);
+            light += self.add(&gathered, throughput, Spectrum::splat(self.share * share));
+        }
+        Some(light)
     }
 }
