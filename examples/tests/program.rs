@@ -81,7 +81,7 @@ fn every_scene_here_renders_with_layers_and_statistics() {
         }
         count += 1;
     }
-    assert_eq!(count, 15);
+    assert_eq!(count, 17);
 }
 
 #[test]
