@@ -100,9 +100,8 @@ pub(super) fn evened(image: &Image) -> Result<Image, Failure> {
     })
 }
 
-/// Pictures beside each other, enlarged where they are small.
-pub(super) fn strip(plan: &Plan, images: &[Image], gain: f32) -> Result<Image, Failure> {
-    let by = if plan.quick { 2 } else { 1 };
+/// Pictures beside each other, brightened, every pixel `by` × `by`.
+pub(super) fn strip(by: u32, images: &[Image], gain: f32) -> Result<Image, Failure> {
     let shown = |image: &Image| montage::enlarged(&montage::brightened(image, gain), by);
     montage::beside(&images.iter().map(shown).collect::<Result<Vec<_>, _>>()?)
 }
