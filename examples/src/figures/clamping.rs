@@ -152,7 +152,8 @@ pub(super) fn room(plan: &Plan) -> Result<String, Failure> {
         "## Fig. 11: a room with smoke\n\n![room](fig-11-room.png)\n\n`room-plume.xml`, {} × {} pixels, {lights} virtual lights of \
          one pass. Above: clamped, one step of `abc`, two, and `--compensation full` with {reference} samples instead of {samples}. Below, for the first three, and for the last cut after two steps: \
          {SCALE} times the light lost (green) and overcompensated (red), against the last, evened out over 5 × 5 pixels; what \
-         noise is left shows in both colours. What is green on the right is left to the third step and later ones.\n\n| | virtual lights' light, of full | lost | too much |\n|---|---|---|---|\n{}{}{}\n\
+         noise is left shows in both colours. What is green on the right is left to the third step and later ones. \
+         Grain on the ceiling is in light straight from the lamps, which needs no virtual light.\n\n| | virtual lights' light, of full | lost | too much |\n|---|---|---|---|\n{}{}{}\n\
          Processor time: {:.1} s with two steps, {:.1} s for full.\n\n",
         size[0],
         size[1],
