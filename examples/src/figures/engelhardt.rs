@@ -49,7 +49,8 @@ fn head(plan: &Plan, seconds: f64) -> String {
          Figures of Engelhardt et al. 2012 (E), with the scenes of this repository.{note}\n\
          ```sh\ncargo run --release --bin fogbow -- figures engelhardt{quick}\n```\n\n\
          makes all of this, the numbers on this page among it; here in {:.1} minutes. Virtual lights that are compared are \
-         the same: each picture is one pass, whose lights depend on the seed alone. Where it says *of light scattered more \
+         the same: each picture is one pass, whose lights depend on the seed alone, \
+         and on the bound where the best of many are kept. Where it says *of light scattered more \
          than once*, light that comes straight from the lamps and is scattered once is left out; no virtual light is \
          needed for it.\n\n",
         seconds / 60.0
