@@ -8,6 +8,8 @@ mod vpl;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
+use fogbow_examples::figures::{self, belcour, engelhardt};
+
 const SCENE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/smoke-box-homogeneous-anisotropic.xml");
 
 /// A folder of its own, gone when dropped.
@@ -83,7 +85,7 @@ fn every_scene_here_renders_with_layers_and_statistics() {
         }
         count += 1;
     }
-    assert_eq!(count, 15);
+    assert_eq!(count, 17);
 }
 
 #[test]
@@ -159,6 +161,29 @@ fn figures_come_with_a_page_that_shows_them_all() {
     let output = folder.run(&["figures", "jarosz", "--only", "8", "--scenes", "nowhere", "-o", "c"]);
     assert_eq!(output.status.code(), Some(2));
     assert!(said(&output).contains("atrium.xml"), "{}", said(&output));
+}
+
+#[test]
+fn the_pages_here_show_all_figures() {
+    for (paper, numbers) in
+        [("jarosz", figures::NUMBERS.as_slice()), ("belcour", &belcour::NUMBERS), ("engelhardt", &engelhardt::NUMBERS)]
+    {
+        let folder = Path::new(SCENE).parent().unwrap().join("../figures").join(paper);
+        let page = std::fs::read_to_string(folder.join("README.md")).unwrap();
+        let heads: Vec<&str> = page.lines().filter(|line| line.starts_with("## Fig")).collect();
+        for number in numbers {
+            let is_word =
+                |head: &&str| head.split(|c: char| !c.is_ascii_digit()).any(|word| *word == number.to_string());
+            assert!(heads.iter().any(is_word), "{paper} {number}");
+        }
+        for entry in std::fs::read_dir(&folder).unwrap() {
+            let name = entry.unwrap().file_name().to_string_lossy().into_owned();
+            assert!(name == "README.md" || page.contains(&format!("]({name})")), "{paper}: {name} is not on the page");
+        }
+        for name in page.split("](").skip(1).filter_map(|rest| rest.split(')').next()) {
+            assert!(folder.join(name).exists(), "{paper}: {name}");
+        }
+    }
 }
 
 #[test]

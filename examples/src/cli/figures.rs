@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 
 use super::{Ending, Failure};
-use crate::figures::{self, Plan, belcour};
+use crate::figures::{self, Plan, belcour, engelhardt};
 
 /// Rebuilds the figures of a paper, with a page that explains them. Runs in the repository's top folder.
 #[derive(Debug, Args)]
@@ -41,12 +41,16 @@ pub enum Paper {
     /// Belcour et al. 2014, A Local Frequency Analysis of Light Scattering and Absorption: figures 6, 8, 10, 11, 12 to 15
     /// (`--only 12`), 18 to 21 (`--only 18`).
     Belcour,
+    /// Engelhardt et al. 2012, Approximate Bias Compensation for Rendering Scenes with Heterogeneous Participating Media:
+    /// figures 2, 4 to 8, 10, 11, 13; 2, 4 and 5 are made together, and 6 and 7.
+    Engelhardt,
 }
 
 pub(super) fn run(arguments: &FiguresArguments) -> Result<Ending, Failure> {
     let (name, numbers): (_, &[u32]) = match arguments.paper {
         Paper::Jarosz => ("jarosz", &figures::NUMBERS),
         Paper::Belcour => ("belcour", &belcour::NUMBERS),
+        Paper::Engelhardt => ("engelhardt", &engelhardt::NUMBERS),
     };
     if let Some(number) = arguments.only.iter().find(|number| !numbers.contains(number)) {
         let all: Vec<String> = numbers.iter().map(u32::to_string).collect();
@@ -63,6 +67,7 @@ pub(super) fn run(arguments: &FiguresArguments) -> Result<Ending, Failure> {
     match arguments.paper {
         Paper::Jarosz => figures::rebuild(&plan)?,
         Paper::Belcour => belcour::rebuild(&plan)?,
+        Paper::Engelhardt => engelhardt::rebuild(&plan)?,
     }
     Ok(Ending::Done)
 }

@@ -1,5 +1,5 @@
 //! Figures of papers, rebuilt with the scenes here, and pages that explain them: of Jarosz et al. 2008, *Radiance Caching
-//! for Participating Media* (J), and of Belcour et al. 2014 (B). Every number on a page is measured as it is made.
+//! for Participating Media* (J), of Belcour et al. 2014 (B) and of Engelhardt et al. 2012 (E). Every number on a page is measured as it is made.
 //!
 //! | file | holds |
 //! |---|---|
@@ -13,11 +13,19 @@
 //! | `pixels` | B's Fig. 11: adaptive sampling of images |
 //! | `steps` | B's Figs 12 to 15: adaptive steps along eye rays |
 //! | `beams` | B's Figs 18 to 21: photon beams |
+//! | [`engelhardt`] | the figures of E |
+//! | `clamping` | E's Figs 2, 4, 5, 11, 13: what clamping takes and compensation brings back |
+//! | `strategies` | E's Figs 6 and 7: strategies of compensation at equal time |
+//! | `visibility` | E's Fig. 8: local visibility |
+//! | `costs` | E's Fig. 10: seconds of each part |
 //! | `judged` | errors of pictures, told by two judges |
 //! | `montage`, `plot` | pictures made of pictures; line plots |
 
 mod beams;
 pub mod belcour;
+mod clamping;
+mod costs;
+pub mod engelhardt;
 pub mod extrapolation;
 pub mod hessian;
 mod judged;
@@ -29,6 +37,8 @@ mod records;
 mod rendered;
 mod slices;
 mod steps;
+mod strategies;
+mod visibility;
 
 use std::path::PathBuf;
 use std::time::Instant;

@@ -1,0 +1,181 @@
+//! Strategies of compensation at equal time: Figs 6 and 7 of Engelhardt et al. 2012.
+
+use std::fmt::Write;
+
+use fogbow::host::Medium;
+use fogbow::light::Light;
+use fogbow::math::Vec2;
+use fogbow::medium::Pyramid;
+use fogbow::path::{self, World as PathWorld};
+use fogbow::sampling::uniform2;
+use fogbow::spectrum::Spectrum;
+use fogbow::vpl::{self, Bound, Compensation, EyeSettings, Flights, Gatherer};
+use fogbow_std::film::{Film, Image};
+use fogbow_std::photon_beams::View;
+use fogbow_std::progress::Control;
+use fogbow_std::tiles;
+use fogbow_std::virtual_lights::{self, Settings};
+
+use super::engelhardt::{mean, strip};
+use super::judged::Judges;
+use super::plot::{BLACK, BLUE, GREEN, Line, ORANGE, PURPLE, Plot};
+use super::{Plan, montage, percent, rendered};
+use crate::cli::Failure;
+use crate::cli::render::path_settings;
+use crate::scene_file::SceneFile;
+use crate::world::{Storage, WithMedium, World};
+
+/// Clamps within this radius (m).
+const RADIUS: f32 = 0.1;
+
+/// Name, colour in the plot, and how; two steps each.
+const STRATEGIES: [(&str, &str, Compensation); 5] = [
+    ("1-to-N", BLACK, Compensation { steps: 2, ..Compensation::FULL }),
+    ("N-to-1", ORANGE, Compensation::N_TO_ONE),
+    ("1-to-1", GREEN, Compensation::ONE_TO_ONE),
+    ("1-to-1, locally even", PURPLE, Compensation { flights: Flights::LocallyHomogeneous, ..Compensation::ONE_TO_ONE }),
+    ("abc, by fours", BLUE, Compensation::APPROXIMATE),
+];
+
+/// What is rendered: all samples see all of the same virtual lights, and no other.
+struct Job<'a> {
+    world: &'a World<'a>,
+    lamps: &'a [Light<'a>],
+    paths: path::Settings,
+    /// Virtual lights, about.
+    wanted: u32,
+    film: &'a mut Film,
+    settings: &'a tiles::Settings,
+    compensation: Compensation,
+}
+
+impl WithMedium for Job<'_> {
+    type Output = Result<f64, Failure>;
+
+    fn with<M: Medium + Sync>(self, medium: &M) -> Self::Output {
+        let paths = self.paths;
+        let bounds = self.world.bounds();
+        let bound = Bound::within(RADIUS).map_err(|e| e.to_string())?;
+        let size = (bounds.size() * (2.0 / RADIUS)).to_array().map(|side| (side.ceil() as u32).clamp(1, 128));
+        let mut means = vec![Spectrum::ZERO; Pyramid::<()>::cell_count(size)];
+        let medium = Pyramid::new(medium, bounds, size, &mut means).map_err(|e| e.to_string())?;
+        let lit = PathWorld { medium: &medium, scene: self.world, lights: self.lamps };
+        let view = View { world: lit, bounds, paths };
+        let count = virtual_lights::paths_for(&view, self.wanted, 0);
+        let lights = virtual_lights::lights(&view, &Settings::new(bound), count, &[], 0, 0);
+        // The lamps are off: what comes straight from them is the same for all strategies.
+        let world = PathWorld { lights: &[], ..view.world };
+        let gatherer = Gatherer { world, bound, compensation: Some(self.compensation), has_mirrors: false };
+        let eye = EyeSettings { single: 1, primary: 1, ..EyeSettings::new(paths) };
+        let camera = self.world.camera_for(self.film.width(), self.film.height());
+        let size = Vec2::new(self.film.width() as f32, self.film.height() as f32);
+        let outcome = tiles::render(self.film, self.settings, &Control::default(), |sample, rng, layers| {
+            let at = Vec2::new(sample.x as f32, sample.y as f32) + uniform2(rng);
+            let seen = vpl::radiance(&camera.ray(at / size), &gatherer, &lights, 1.0, &eye, rng);
+            layers[0] = seen.compensated.into_iter().sum();
+        })?;
+        Ok(outcome.seconds.cpu.unwrap_or(outcome.seconds.wall))
+    }
+}
+
+/// One measurement.
+struct Point {
+    samples: u32,
+    cpu: f64,
+    error: f64,
+    bias: f64,
+    image: Image,
+}
+
+/// The section of the page.
+pub(super) fn section(plan: &Plan) -> Result<String, Failure> {
+    let (edge, lights, judging, counts): (u32, u32, u32, &[u32]) =
+        if plan.quick { (48, 128, 32, &[1, 2, 3, 4, 6, 8]) } else { (96, 512, 128, &[1, 2, 3, 4, 6, 8, 12]) };
+    let scene = SceneFile::read(&rendered::scene_of(plan, "smoke"))?;
+    let mut storage = Storage::new(&scene);
+    let world = World::new(&scene, &mut storage)?;
+    let lamps = world.lights();
+    let render = |compensation: Compensation, samples: u32, seed: u64| -> Result<(Image, f64), Failure> {
+        let mut film = Film::new(edge, edge, &["compensation"])?;
+        let settings = tiles::Settings { samples, seed, threads: plan.threads, ..tiles::Settings::default() };
+        let paths = path_settings(&scene, None);
+        let job = Job {
+            world: &world,
+            lamps: &lamps,
+            paths,
+            wanted: lights,
+            film: &mut film,
+            settings: &settings,
+            compensation,
+        };
+        let cpu = world.media().with(job)?;
+        Ok((film.mean(0).ok_or("no picture")?, cpu))
+    };
+    let reference = STRATEGIES[0].2;
+    let judges = Judges::new([render(reference, judging, 101)?.0, render(reference, judging, 102)?.0]);
+    let mut all = Vec::new();
+    for (name, colour, compensation) in STRATEGIES {
+        plan.say(&format!("figure 6, {name}"));
+        let mut points = Vec::new();
+        for samples in counts {
+            let (image, cpu) = render(compensation, *samples, 1)?;
+            let (error, bias) = (judges.rel_mse(&image).sqrt(), judges.bias(&image));
+            points.push(Point { samples: *samples, cpu, error, bias, image });
+        }
+        all.push((name, colour, points));
+    }
+    // Those nearest in time to the first strategy's.
+    let target = all[0].2[counts.len() / 2].cpu;
+    let apart = |p: &Point| (p.cpu / target).ln().abs();
+    let chosen: Vec<_> = all
+        .iter()
+        .filter_map(|(name, _, points)| Some((name, points.iter().min_by(|a, b| apart(a).total_cmp(&apart(b)))?)))
+        .collect();
+    let mut images: Vec<Image> = chosen.iter().map(|(_, point)| point.image.clone()).collect();
+    let truth = judges.mean();
+    let gain = 0.6 * rendered::gain(&truth);
+    images.push(truth);
+    montage::save(
+        &plan.output.join("fig-06-strategies.png"),
+        &strip(if plan.quick { 3 } else { 1 }, &images, gain)?,
+        0.0,
+    )?;
+    let mut table =
+        "| strategy | samples | processor time | relRMSE | brighter than 1-to-N |\n|---|---|---|---|---|\n".to_owned();
+    for (name, p) in &chosen {
+        // Writing to a string cannot fail.
+        let _ =
+            writeln!(table, "| {name} | {} | {:.2} s | {} | {} |", p.samples, p.cpu, percent(p.error), percent(p.bias));
+    }
+    let points = || all.iter().flat_map(|(_, _, points)| points);
+    let range = |of: fn(&Point) -> f64| {
+        [points().map(of).fold(f64::INFINITY, f64::min) / 1.15, points().map(of).fold(0.0, f64::max) * 1.15]
+    };
+    let line = |(name, colour, points): &(&'static str, &'static str, Vec<Point>)| Line {
+        name,
+        colour,
+        width: 1.6,
+        points: points.iter().map(|p| [p.cpu, p.error]).collect(),
+    };
+    let plot = Plot {
+        across: "processor time (s)",
+        upwards: "relRMSE",
+        x: range(|p| p.cpu),
+        y: range(|p| p.error),
+        lines: all.iter().map(line).collect(),
+    };
+    plan.write("fig-07-errors.svg", &plot.svg_over_decades())?;
+    Ok(format!(
+        "## Figs 6 and 7: strategies of compensation\n\n![compensation](fig-06-strategies.png)\n\nWhat two steps of compensation add for \
+         about {lights} virtual lights in smoke (`smoke.xml`, {edge} × {edge} pixels), with about as much processor time, as near as whole samples \
+         get; light that comes straight from the lamps left out. From left to right: 1-to-N, one path for all \
+         lights; N-to-1, a path for each from one point; 1-to-1, a point and a path for each; the same in media taken as even around each \
+         point; the same by fours, as `--compensation abc` does it; and the mean of two converged 1-to-N, {judging} samples per pixel \
+         each, of the same virtual lights, which stand in for the truth such that their noise cancels. Each sample here sees all lights; \
+         the program deals them out to the samples of a pass. Clamped light is gathered at the same points and is in the \
+         times.\n\n{table}\n![error by time](fig-07-errors.svg)\n\nrelRMSE by processor time, with {} samples per pixel. The mean of \
+         the truth is {:.3} W·m⁻²·sr⁻¹.\n\n",
+        counts.iter().map(u32::to_string).collect::<Vec<_>>().join(", "),
+        mean(&judges.mean()),
+    ))
+}
