@@ -11,7 +11,7 @@ use crate::photon::{self, Event};
 ///
 /// Each stands for the flux of this one path: divide by the number of paths ([`VirtualLight::scaled`]). There is none
 /// on the lights themselves: their own light is connected to, and single scattering would count twice (sheet § 3.2).
-/// Walks, roulette and [`Settings::max_scatterings`]: see [`photon::trace`]. The same random numbers give the same
+/// Walks, roulette and [`Settings::max_scatterings`]: see [`photon::trace()`]. The same random numbers give the same
 /// lights: an animation that keeps them from frame to frame flickers less (Engelhardt et al. 2012, § 7).
 ///
 /// ```
