@@ -133,7 +133,7 @@ def strategies(_, options):
 def quality(scenes, options):
     failures = 0
     for scene in scenes or ["cornell-hetero-iso", "cornell-homog-iso", "room-plume"]:
-        size = ("--size", "64x64", "--light-points", 4)
+        size = ("--size", "64x64")
         single, many, energy = [], [], []
         sums = {}
         for seed in range(1, options.seeds + 1):
@@ -180,7 +180,7 @@ def cost(scenes, options):
 
 def visibility(scenes, options):
     for scene in scenes or ["room-plume", "cornell-hetero-iso", "cornell-homog-iso"]:
-        ways = [layers(scene, "--size", "64x64", "--light-points", 4, "--local-visibility", switch)[0]["total"] for switch in ("on", "off")]
+        ways = [layers(scene, "--size", "64x64", "--local-visibility", switch)[0]["total"] for switch in ("on", "off")]
         by = differences(ways[1], ways[0], 8)
         print(f"{scene:24s} without local visibility {100 * (ways[1].mean() / ways[0].mean() - 1):+.2f} %, blocks {100 * by.mean():.2f} %, worst "
               f"{100 * by.max():.1f} %", flush=True)
