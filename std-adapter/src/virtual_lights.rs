@@ -118,7 +118,7 @@ const MOST_CANDIDATES: u32 = 1 << 17;
 const MOST_CELLS: u32 = 128;
 
 /// Weight of a light's flux in its importance: what the few points do not see may still matter.
-const DEFENSIVE: f32 = 0.1;
+const DEFENSIVE: f32 = 0.3;
 
 /// `paths` paths' virtual lights, each for the flux of one path; in the order of paths.
 fn trace<M, S>(view: &View<'_, M, S>, paths: u32, seed: u64, pass: u32) -> Vec<VirtualLight>

@@ -164,13 +164,13 @@ pub fn radius_for(wanted: f32, extinction: f32, albedo: f32, most: f32) -> f32 {
 const LEFT: f32 = 0.25;
 
 /// The radius of [`usual_bound`] in thin media, as a part of the diagonal of what there is: surfaces lose light, too.
-const THIN: f32 = 0.1;
+const THIN: f32 = 0.09;
 
 /// Points along each side of the box at which a medium is looked at.
 const LOOKS: u32 = 24;
 
 /// A bound that works: within a radius at which a step of compensation leaves a quarter, `κ_B(σ̄, d) = 0.25`, so that two
-/// bring back nearly all; never beyond a tenth of the diagonal of `bounds`.
+/// bring back nearly all; never beyond 0.09 of the diagonal of `bounds`.
 ///
 /// Larger radii clamp more, and leave smoother light to the virtual lights; but more has to be brought back. `σ̄` is the
 /// extinction where light collides, `∫ σₜ² dV/∫ σₜ dV`, from a lattice of points in `bounds`. Engelhardt et
