@@ -2,9 +2,9 @@
 
 use fogbow::host::Medium;
 use fogbow::march;
-use fogbow::math::{Ray, Vec2};
+use fogbow::math::Ray;
 use fogbow::path::{self, InScattered, World as PathWorld};
-use fogbow::sampling::{Generator, uniform, uniform2};
+use fogbow::sampling::{Generator, uniform};
 use fogbow::spectrum::Spectrum;
 use fogbow_std::film::Film;
 use fogbow_std::stats::{CountingMedium, CountingScene};
@@ -38,8 +38,7 @@ impl WithMedium for MarchJob<'_> {
                 scene: &CountingScene { scene: shot.world, tally: sample.tally },
                 lights: shot.lights,
             };
-            let at = Vec2::new(sample.x as f32, sample.y as f32) + uniform2(rng);
-            let ray = shot.camera.ray(at / Vec2::new(width as f32, height as f32));
+            let ray = shot.eye_ray(sample, (width, height), rng);
             let mut count = 0_u32;
             let seen =
                 path::radiance_beyond(&ray, &world, &shot.paths, rng, |segment: &Ray, most, rng: &mut Generator| {

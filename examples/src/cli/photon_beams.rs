@@ -6,9 +6,8 @@ use clap::{Args, ValueEnum};
 use fogbow::beams::kernel;
 use fogbow::covariance::Radii;
 use fogbow::host::Medium;
-use fogbow::math::{Vec2, Vec3};
+use fogbow::math::Vec3;
 use fogbow::path;
-use fogbow::sampling::uniform2;
 use fogbow_std::film::Film;
 use fogbow_std::photon_beams::{self, Settings, View};
 use fogbow_std::tiles::Outcome;
@@ -112,10 +111,7 @@ impl WithMedium for BeamJob<'_> {
             &settings,
             shot.control,
             &view,
-            |sample, rng| {
-                let at = Vec2::new(sample.x as f32, sample.y as f32) + uniform2(rng);
-                shot.camera.ray(at / Vec2::new(width as f32, height as f32))
-            },
+            |sample, rng| shot.eye_ray(sample, (width, height), rng),
             |sample| shot.is_computed(sample, width),
             radius,
             write_layers,

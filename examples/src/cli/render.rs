@@ -19,6 +19,7 @@ use fogbow_std::image::write_film;
 use fogbow_std::image_sampling::Plan;
 use fogbow_std::progress::{Control, Progress};
 use fogbow_std::radiance_cache::{NAMES, RadianceCaches};
+use fogbow_std::seed::SampleRng;
 use fogbow_std::stats::{CountingMedium, CountingScene, Statistics};
 use fogbow_std::tiles::{self, Outcome, Reason, RenderError, Sample};
 
@@ -42,8 +43,8 @@ pub struct RenderArguments {
     /// How light is computed.
     #[arg(long, value_enum, default_value_t = Method::Path)]
     pub method: Method,
-    /// Samples per pixel, for photon beams rounded up to whole passes [default: what the scene says, for radiance
-    /// caching 64; with --time, as many as fit].
+    /// Samples per pixel, for photon beams and virtual lights rounded up to whole passes [default: what the scene says, for
+    /// radiance caching 64, for virtual lights one pass; with --time, as many as fit].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub spp: Option<u32>,
     /// Seconds to render for, on the wall clock.
@@ -425,6 +426,13 @@ pub(super) struct Shot<'a> {
 }
 
 impl Shot<'_> {
+    /// The eye ray of a sample, somewhere in its pixel, of a film of this size.
+    #[inline]
+    pub(super) fn eye_ray(&self, sample: &Sample<'_>, (width, height): (u32, u32), rng: &mut SampleRng) -> Ray {
+        let at = Vec2::new(sample.x as f32, sample.y as f32) + uniform2(rng);
+        self.camera.ray(at / Vec2::new(width as f32, height as f32))
+    }
+
     /// Whether the medium's light is wanted at a pixel, or filled in from others.
     #[inline]
     pub(super) fn is_computed(&self, sample: &Sample<'_>, width: u32) -> bool {
@@ -450,8 +458,7 @@ impl WithMedium for Job<'_> {
                 scene: &CountingScene { scene: shot.world, tally: sample.tally },
                 lights: shot.lights,
             };
-            let at = Vec2::new(sample.x as f32, sample.y as f32) + uniform2(rng);
-            let ray = shot.camera.ray(at / Vec2::new(width as f32, height as f32));
+            let ray = shot.eye_ray(sample, (width, height), rng);
             let seen = if shot.is_computed(sample, width) {
                 path::radiance(&ray, &world, &shot.paths, rng)
             } else {

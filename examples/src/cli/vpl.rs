@@ -5,9 +5,8 @@ use core::str::FromStr;
 
 use clap::{Args, ValueEnum};
 use fogbow::host::Medium;
-use fogbow::math::{Bounds, Vec2};
+use fogbow::math::Bounds;
 use fogbow::path;
-use fogbow::sampling::uniform2;
 use fogbow::spectrum::Spectrum;
 use fogbow::vpl::{self, Bound, Compensation, LEVELS, Seen};
 use fogbow_std::film::Film;
@@ -199,10 +198,7 @@ impl WithMedium for VplJob<'_> {
             &settings,
             shot.control,
             &view,
-            |sample, rng| {
-                let at = Vec2::new(sample.x as f32, sample.y as f32) + uniform2(rng);
-                shot.camera.ray(at / Vec2::new(width as f32, height as f32))
-            },
+            |sample, rng| shot.eye_ray(sample, (width, height), rng),
             |sample| shot.is_computed(sample, width),
             write,
         )?;
