@@ -64,7 +64,8 @@ fn worlds_without_light_or_medium_are_pictures() {
     std::fs::write(folder.0.join("dark.xml"), [&scene[..start], &scene[end..]].concat()).unwrap();
     let black = "<scene version=\"3.0.0\"><integrator type=\"volpath\"/><sensor type=\"perspective\">\
                  <float name=\"fov\" value=\"40\"/><film type=\"hdrfilm\">\
-                 <integer name=\"width\" value=\"8\"/><integer name=\"height\" value=\"8\"/></film></sensor></scene>";
+                 <integer name=\"width\" value=\"8\"/><integer name=\"height\" value=\"8\"/>\
+                 <rfilter type=\"box\"/></film></sensor></scene>";
     std::fs::write(folder.0.join("nothing.xml"), black).unwrap();
     for name in ["dark.xml", "nothing.xml"] {
         for way in ["none", "full", "abc"] {
