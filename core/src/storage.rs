@@ -1,6 +1,6 @@
 //! Layer 0: storage whose size nobody knows beforehand.
 //!
-//! Who knows the bound owns the memory. Where nobody does (cache records, virtual lights, beams),
+//! Who knows the bound owns the memory. Where nobody does (cache records, beams),
 //! a [`List`] takes either a slice lent by the host or, with feature `alloc`, a growing `Vec`.
 
 /// A sequence in lent memory, or in a growing `Vec` with feature `alloc`.

@@ -74,6 +74,8 @@ impl Compensation {
 /// w = (f̂ D/p(ω′)) T B̂/p(t),   at a surface at s:  (f̂ D/p(ω′)) T B̂/Prob(t ≥ s)
 /// ```
 ///
+/// The weight's unit: 1 from a medium to a medium and from a surface to a surface, m from a surface to a medium (whose light
+/// is per metre), m⁻¹ the other way. Unbiased, but for [`Flights::LocallyHomogeneous`] where extinction varies.
 /// `None` where the path ends. Engelhardt et al. 2012, Eq. 3–5 with the sheet's § 3.3 and 3.4: the paper leaves out the
 /// integral over distance and, in its pseudo-code, `σₛ(y)`.
 #[must_use]
@@ -152,7 +154,12 @@ pub fn next_vertex<M: Medium + ?Sized, S: Scene + ?Sized>(
         }
         (None, None) => return None,
     };
-    let weight = scattered * arriving * bound.missing(distance * distance, cosines);
+    let missing = bound.missing(distance * distance, cosines);
+    // At the very border of the ball nothing is missing, and nothing arrives there either: 0/0.
+    if missing <= 0.0 {
+        return None;
+    }
+    let weight = scattered * arriving * missing;
     (!weight.is_black()).then_some((next, weight))
 }
 

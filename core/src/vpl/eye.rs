@@ -199,7 +199,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Eye<'_, M, S> {
             }
             left -= wanted;
         }
-        // Without compensation lights share points as with it: pictures differ by what it adds alone.
+        // Without compensation each light has a point of its own.
         let per_point = self.gatherer.compensation.map_or(1, |c| c.lights_per_point.max(1)) as usize;
         let share = Spectrum::splat(self.share / rounds as f32);
         let lights = self.lights;

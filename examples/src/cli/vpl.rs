@@ -223,7 +223,8 @@ pub(crate) struct Audit {
     pub(crate) clamped: f64,
     /// What steps of compensation brought back.
     pub(crate) recovered: [f64; LEVELS],
-    /// What further steps would, if each went on to bring back as much of the one before as the last did.
+    /// What further steps would, if each went on to bring back as much of the one before as the last did; 0 after more steps
+    /// than are told apart, `None` where there are not two to compare.
     pub(crate) left: Option<f64>,
 }
 
