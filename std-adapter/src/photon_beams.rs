@@ -11,8 +11,8 @@ use fogbow::beams::{self, Beams, Piece, kernel};
 use fogbow::host::{Medium, Scene};
 use fogbow::math::{Bounds, Ray, Vec3};
 use fogbow::path::{self, InScattered, Radiance, World};
-use fogbow::sampling::Generator;
 use fogbow::sampling::uniform::mix;
+use fogbow::sampling::{Generator, uniform};
 use fogbow::spectrum::Spectrum;
 use fogbow::storage::Full;
 use rayon::iter::{IndexedParallelIterator, IntoParallelIterator, ParallelIterator};
@@ -109,7 +109,8 @@ impl From<Full> for BeamsError {
 /// Paths of one job: part of the result. More: threads wait for each other. Fewer: more lists to put together.
 const JOB: u32 = 64;
 
-/// The beams of pass number `pass`, blurred as `radius` says: see [`render`]. Uses the threads of the rayon pool it is called in.
+/// The beams of pass number `pass`, blurred as `radius` says: see [`render`]; what is wider than [`Settings::radius`] is thinned
+/// out ([`Piece::thinned`]). Uses the threads of the rayon pool it is called in.
 ///
 /// # Errors
 /// [`BeamsError::TooMany`].
@@ -151,8 +152,9 @@ where
             let mut pieces = Vec::new();
             for path in job * JOB..(job * JOB).saturating_add(JOB).min(settings.paths) {
                 let mut rng = independent(seed, u64::from(pass) << 32 | u64::from(job), path);
+                let mut thin = independent(mix(seed), u64::from(pass) << 32 | u64::from(job), path);
                 beams::shoot(&view.world, &view.bounds, &view.paths, settings.longest, &mut rng, &mut |piece| {
-                    piece.widened(&width, &mut |part| pieces.push(part));
+                    piece.widened(&width, &mut |part| pieces.extend(part.thinned(settings.radius, uniform(&mut thin))));
                 });
             }
             pieces

@@ -180,6 +180,14 @@ impl Passing {
     fn new(piece: &Piece, ray: &Ray) -> Option<Self> {
         let (d, b) = (ray.direction, piece.direction);
         let from = ray.origin - piece.origin;
+        // Most pieces of a leaf pass too far away, which the distance of both lines tells at once. Where they are nearly
+        // parallel it tells too little.
+        let normal = d.cross(b);
+        let (gap, scale) = (from.dot(normal), normal.length_squared());
+        let radius2 = piece.radius * piece.radius;
+        if scale > 1e-4 && gap * gap > 1.001 * radius2 * scale {
+            return None;
+        }
         let (cosine, along) = (d.dot(b), from.dot(b));
         // Components across the beam.
         let (slope, start) = (d - b * cosine, from - b * along);
@@ -187,7 +195,6 @@ impl Passing {
         let is_parallel = sine2 < PARALLEL;
         let centre = if is_parallel { 0.0 } else { -start.dot(slope) / sine2 };
         let distance2 = (start + slope * centre).length_squared();
-        let radius2 = piece.radius * piece.radius;
         if !(is_parallel || distance2 < radius2) {
             return None;
         }
@@ -247,10 +254,10 @@ impl Passing {
         }
         let along = (ray.origin - piece.origin).dot(piece.direction);
         let angle = deflection(-piece.direction, -ray.direction);
-        let parts = float::floor((far - near) / (PART * radius)).clamp(0.0, MAX_PARTS - 1.0) + 1.0;
-        let width = (far - near) / parts;
+        let parts = ((far - near) / (PART * radius)).min(MAX_PARTS - 1.0) as u32 + 1;
+        let width = (far - near) / parts as f32;
         let mut light = Spectrum::ZERO;
-        for i in 0..parts as u32 {
+        for i in 0..parts {
             let from = near + i as f32 * width;
             let to = from + width;
             let kernel = if rate > 0.0 {

@@ -67,6 +67,12 @@ impl Compensation {
         Self { lights_per_point: 4, lights_per_path: 4, flights: Flights::LocallyHomogeneous, ..Self::ONE_TO_ONE };
 }
 
+/// Radius, in that of the clamped ball, within which extinction is averaged for the way to the next vertex.
+///
+/// Engelhardt et al. 2012, § 4.2, take the whole ball. But vertices lie near its centre, and what lies before them
+/// is nearer still: where smoke is densest, the whole ball's mean is too thin.
+const MEAN_WITHIN: f32 = 0.5;
+
 /// The next vertex of a compensation path from `receiver`, and the weight of what is scattered there towards it.
 ///
 /// ```text
@@ -112,7 +118,7 @@ pub fn next_vertex<M: Medium + ?Sized, S: Scene + ?Sized>(
             None => (None, hit, flown.weight),
         }
     } else {
-        let mean = world.medium.mean_extinction(receiver.point, radius);
+        let mean = world.medium.mean_extinction(receiver.point, MEAN_WITHIN * radius);
         let rate = mean.mean();
         let sample = truncated_exponential(u_distance, rate, limit);
         let is_exact = compensation.flights == Flights::Truncated;

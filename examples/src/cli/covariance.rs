@@ -18,13 +18,19 @@ use super::{Failure, output};
 use crate::scene_file::fingerprint;
 use crate::world::{WithMedium, World};
 
+/// Photons that fill a grid.
+pub(crate) const PATHS: u64 = 100_000;
+
+/// Photons that fill a grid for kernels of photon beams: about a tenth of the paths of a picture (Belcour et al. 2014, § 6.5).
+pub(crate) const KERNEL_PATHS: u64 = 10_000;
+
 /// Options of covariance grids.
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Covariance grid")]
 pub struct CovarianceArguments {
-    /// Photons that fill the covariance grid.
-    #[arg(long, value_name = "N", default_value_t = 100_000, value_parser = clap::value_parser!(u64).range(1..=1 << 32))]
-    pub grid_paths: u64,
+    /// Photons that fill the covariance grid [default: 100000, for kernels of photon beams 10000].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=1 << 32))]
+    pub grid_paths: Option<u64>,
     /// Cells of the covariance grid along its longest side.
     #[arg(long, value_name = "N", default_value_t = 64, value_parser = clap::value_parser!(u32).range(1..=512))]
     pub grid_cells: u32,
@@ -77,6 +83,8 @@ pub enum Step {
 pub(crate) struct GridJob<'a> {
     pub(crate) arguments: &'a CovarianceArguments,
     pub(crate) scene: &'a Path,
+    /// Photons, if the arguments do not say how many.
+    pub(crate) usual_paths: u64,
     pub(crate) world: &'a World<'a>,
     pub(crate) lights: &'a [Light<'a>],
     pub(crate) paths: path::Settings,
@@ -102,7 +110,7 @@ impl WithMedium for GridJob<'_> {
         } else {
             let world = path::World { medium, scene: self.world, lights: self.lights };
             let settings = Settings {
-                paths: arguments.grid_paths,
+                paths: arguments.grid_paths.unwrap_or(self.usual_paths),
                 edge: arguments.grid_cells,
                 threads: self.threads,
                 seed: self.seed,

@@ -23,7 +23,7 @@ use fogbow_std::seed::SampleRng;
 use fogbow_std::stats::{CountingMedium, CountingScene, Statistics};
 use fogbow_std::tiles::{self, Outcome, Reason, RenderError, Sample};
 
-use super::covariance::{CovarianceArguments, GridJob, MarchArguments, Step};
+use super::covariance::{CovarianceArguments, GridJob, KERNEL_PATHS, MarchArguments, PATHS, Step};
 use super::image_sampling::{self, SamplingArguments};
 use super::march::MarchJob;
 use super::photon_beams::{BeamArguments, BeamJob, Kernel};
@@ -253,6 +253,7 @@ pub(crate) fn render(arguments: &RenderArguments) -> Result<Rendered, Failure> {
         Some(world.media().with(GridJob {
             arguments: &arguments.covariance,
             scene: &arguments.scene,
+            usual_paths: arguments.grid_paths(),
             world: &world,
             lights: &lights,
             paths,
@@ -339,6 +340,12 @@ impl RenderArguments {
     /// Whether virtual lights' layers are kept: pixels that are filled in have none.
     fn is_audited(&self) -> bool {
         (self.aov || self.stats.is_some()) && self.sampling.is_uniform()
+    }
+
+    /// Photons that usually fill the grid.
+    fn grid_paths(&self) -> u64 {
+        let is_for_kernels = self.method == Method::PhotonBeams && self.sampling.is_uniform();
+        if is_for_kernels { KERNEL_PATHS } else { PATHS }
     }
 
     /// Whether anything asked for takes a covariance grid.

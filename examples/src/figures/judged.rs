@@ -85,16 +85,27 @@ impl Judges {
     }
 
     fn over(&self, image: &Image, is_counted: impl Fn(usize) -> bool) -> f64 {
+        self.product([image, image], is_counted).max(0.0)
+    }
+
+    /// What two pictures of the same kind, with random numbers of their own, are both off by, squared: without
+    /// their noise. Below 0 by chance.
+    pub(super) fn common(&self, pictures: [&Image; 2]) -> f64 {
+        self.product(pictures, |_| true)
+    }
+
+    /// Mean of `(p − a)(q − b)` over the pixels that count, relative.
+    fn product(&self, [p, q]: [&Image; 2], is_counted: impl Fn(usize) -> bool) -> f64 {
         let [a, b] = &self.pictures;
         let (mut sum, mut count) = (0.0, 0);
-        for i in (0..image.pixels.len()).filter(|i| is_counted(*i)) {
+        for i in (0..p.pixels.len()).filter(|i| is_counted(*i)) {
             for c in 0..3 {
-                let [p, a, b] = [image, a, b].map(|of| f64::from(of.pixels[i][c]));
-                sum += (p - a) * (p - b) * self.weights[i][c];
+                let [p, q, a, b] = [p, q, a, b].map(|of| f64::from(of.pixels[i][c]));
+                sum += (p - a) * (q - b) * self.weights[i][c];
                 count += 1;
             }
         }
-        (sum / f64::from(count.max(1))).max(0.0)
+        sum / f64::from(count.max(1))
     }
 }
 

@@ -49,11 +49,12 @@ fn fill(plan: &Plan, edge: u32, paths: u64, seed: u64) -> Result<Filled, Failure
     let scene = SceneFile::read(&file)?;
     let mut storage = Storage::new(&scene);
     let world = World::new(&scene, &mut storage)?;
-    let arguments = CovarianceArguments { grid_paths: paths, grid_cells: edge, grid_in: None, grid_out: None };
+    let arguments = CovarianceArguments { grid_paths: Some(paths), grid_cells: edge, grid_in: None, grid_out: None };
     let mut statistics = Statistics::default();
     let grid = world.media().with(GridJob {
         arguments: &arguments,
         scene: &file,
+        usual_paths: paths,
         world: &world,
         lights: &world.lights(),
         paths: path_settings(&scene, Some(2)),
