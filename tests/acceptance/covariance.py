@@ -4,6 +4,7 @@
     python3 tests/acceptance/covariance.py steps [--spp N] [--paths N]
     python3 tests/acceptance/covariance.py image [--spp N] [--paths N]
     python3 tests/acceptance/covariance.py beams [SCENE...] [--passes N]
+    python3 tests/acceptance/covariance.py bias [SCENE...]
     python3 tests/acceptance/covariance.py determinism
 
 Needs target/release/fogbow, numpy and OpenEXR; scenes are those of examples/scenes at 128x128. Errors are measured against
@@ -15,8 +16,11 @@ steps        nave, light scattered once by the medium: samples and CPU seconds o
 image        lantern, light scattered by the medium, --method march: 43 % of the pixels at most, half the error at most of all pixels with as
              many samples each, less CPU time with the grid's filling, and over 8 seeds a mean off by 1 % at most.
 beams        lantern, caustic, nave: relMSE of --kernel covariance over that of progressive beams after equal passes, in the half of
-             the picture where the predicted density of samples is below its median (at most 0.5) and in the other (at most 1.1),
-             and at equal CPU time (below 1), where progressive beams' error is taken to fall with time as measured from half as many passes.
+             the picture where the predicted density of samples is below its median (at most 0.5), in the other and in the tenth
+             where it is highest, which holds the borders of shafts (at most 1.1), and at equal CPU time (below 1), where progressive beams' error is taken to fall with time as measured from half as many passes.
+bias         caustic: mean |relative difference| of blocks of 8x8 pixels in the smooth half of a mean of 8 seeds of --kernel covariance, whose
+             pass radius does not narrow, to progressive beams of the same radius, at bounds of 0.32, 0.08, 0.02, 0.005: within the bound and
+             two standard errors, and falling with it.
 determinism  the same bytes with 1, 2 and 7 threads of every way that uses covariances.
 
 Exit status 1 when a line fails.
@@ -138,13 +142,41 @@ def beams(options):
         new = render(scene, f"{scene}-new", *method, "--spp", spp, "--kernel", "covariance")
         of = lambda rendered, where: max(squared(light(rendered[0]), halves, where), 1e-9)
         times = [sum(rendered[1].values()) for rendered in (old, new)]
-        for name, where, bound in (("smooth half", smooth, 0.5), ("other half", ~smooth, 1.1)):
+        borders = density >= np.quantile(density, 0.9)
+        for name, where, bound in (("smooth half", smooth, 0.5), ("other half", ~smooth, 1.1), ("borders", borders, 1.1)):
             ratio = of(new, where) / of(old, where)
             power = np.log(of(early, where) / of(old, where)) / np.log(2)
             equal = ratio * (times[1] / times[0]) ** power
             passed = ratio <= bound and (equal < 1 or where is not smooth)
             failures += report(f"{scene} {name}", passed, f"relMSE {of(new, where):.4f} instead of {of(old, where):.4f}: ratio {ratio:.2f}, at equal "
                                f"CPU time {equal:.2f} ({times[1]:.1f} s, {times[0]:.1f} s)")
+    return failures
+
+
+def bias(options):
+    failures = 0
+    for scene in options.scenes or ("caustic",):
+        method, seeds = ("--method", "photon-beams", "--alpha", 1, "--spp", 64), range(1, 9)
+        density = render(scene, f"{scene}-plan", "--spp", 1, "--image-sampling", "covariance")[0]("density").mean(-1)
+        blocks = lambda image: image.reshape(16, 8, 16, 8).mean((1, 3))
+        smooth = blocks(density) <= np.median(blocks(density))
+
+        def mean(name, *ways):
+            found = np.array([blocks(light(render(scene, name, *method, *ways, "--seed", seed)[0])) for seed in seeds])
+            return found.mean(0), found.std(0, ddof=1) / len(seeds) ** 0.5
+
+        truth, own = mean("old")
+        scale = truth + 0.05 * truth.mean()
+        last = np.inf
+        for bound in (0.32, 0.08, 0.02, 0.005):
+            image, spread = mean("new", "--kernel", "covariance", "--bias", bound)
+            found = np.abs(image - truth)[smooth] / scale[smooth]
+            # Mean of |noise| were there no bias: √(2/π) standard errors.
+            noise = 0.8 * (np.hypot(spread, own) / scale)[smooth].mean()
+            passed = found.mean() <= bound + 2 * noise and found.mean() <= last + noise
+            failures += report(f"{scene}, bound {bound}", passed, f"off by {100 * found.mean():.2f} % in the mean of smooth blocks, of which about "
+                               f"{100 * noise:.2f} % is noise")
+            last = found.mean()
     return failures
 
 
@@ -166,7 +198,7 @@ def determinism(_):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("what", choices=("steps", "image", "beams", "determinism"))
+    parser.add_argument("what", choices=("steps", "image", "beams", "bias", "determinism"))
     parser.add_argument("scenes", nargs="*")
     parser.add_argument("--spp", type=int, help="samples per pixel [default: steps 4, image 16]")
     parser.add_argument("--paths", type=int, help="photons of the grid [default: steps 1000000, image what the program takes]")

@@ -2,7 +2,6 @@
 """Holds virtual lights against references, path tracing and each other: long runs, not part of CI.
 
     FOGBOW_REFERENCE=FOLDER python3 tests/acceptance/vpl.py unbiased [SCENE...] [--seeds N]
-    FOGBOW_REFERENCE=FOLDER python3 tests/acceptance/vpl.py strategies [--seeds N]
     FOGBOW_REFERENCE=FOLDER python3 tests/acceptance/vpl.py quality [SCENE...] [--seeds N]
     FOGBOW_REFERENCE=FOLDER python3 tests/acceptance/vpl.py cost | visibility | statues | methods | scale | determinism
 
@@ -10,9 +9,6 @@ FOLDER holds compare.py and public/ with scenes and their references. Needs targ
 
 unbiased    full compensation, exact transmittance, 64x64, mean of N seeds (16): |bias| <= 0.5 %, no block of 8x8 pixels
             beyond 5 standard errors, which come from the seeds' spread. Point scenes: bias only.
-strategies  cornell-hetero-iso, the same lights, what compensation adds for them alone, against converged 1-to-N, mean of N runs (10):
-            errors over CPU time. At the time where 1-to-N has 10 % error, abc <= 1-to-1 <= n-to-1 <= 1-to-N; the best needs
-            at most a fifth of the time that 1-to-N needs for its error.
 quality     the usual bound at 1000 lights: 99.9th percentile of the clamped layer at most twice the converged one's, at least 10 %
             lost; against full compensation with the same lights, mean |relative block difference| <= 1.5 % and none above 5 %
             with 2 steps, <= 4 % with 1. 1-to-1 beside abc tells what the assumption of local homogeneity costs.
@@ -23,6 +19,8 @@ methods     relRMSE_c of all methods at equal time on one thread.
 scale       10^3 to 10^5 lights: time over lights, bytes.
 determinism the same bytes with 1, 2 and 7 threads.
 
+Strategies of compensation at equal time are compared by `fogbow figures engelhardt --only 6`.
+
 Exit status 1 when a line fails.
 """
 import argparse, hashlib
@@ -32,7 +30,6 @@ from common import ROOT, compare, cpu, every_scene, verdict
 import common, os, tempfile
 
 VPL = ("--method", "vpl")
-COMPENSATED = [f"compensated_{n}" for n in ("1", "2", "3", "rest")]
 
 
 def layers(scene, *options):
@@ -78,56 +75,6 @@ def unbiased(scenes, options):
         failures += not passes
         print(f"{scene:24s} {verdict(passes)} bias {100 * bias:+.3f} +- {100 * sigma:.3f} %  worst block {worst:.2f} s.e.", flush=True)
     return failures
-
-
-def strategies(_, options):
-    scene, common_options = "cornell-hetero-iso", ("--size", "32x32", "--lights", 64, "--pass-samples", 2, "--spp", 2)
-    ways = {
-        "1-to-N": ("--compensation", "full"),
-        "n-to-1": ("--compensation", "n-to-1", "--steps", 8),
-        "1-to-1": ("--compensation", "1-to-1", "--steps", 8),
-        "abc": ("--compensation", "abc", "--steps", 8),
-        "abc, single": ("--compensation", "abc", "--steps", 8, "--share", 1),
-    }
-    # What the lights' own connections add; light straight from the lamps is the same path for all strategies.
-    added = lambda seen: sum(seen[name] for name in COMPENSATED) - seen["compensated_straight"]
-    truth, base = {}, {}
-    for seed in range(1, options.seeds + 1):
-        seen, _, _ = layers(scene, *common_options, *ways["1-to-N"], "--seed", seed, "--light-points", 192)
-        truth[seed] = added(seen)
-        base[seed] = layers(scene, *common_options, "--compensation", "none", "--seed", seed)[1]
-    curves = {}
-    for name, way in ways.items():
-        curve = []
-        for points in (1, 3, 9, 27) if name == "1-to-N" else (1, 3, 9):
-            squares, seconds = [], []
-            for seed in truth:
-                seen, spent, _ = layers(scene, *common_options, *way, "--seed", seed, "--light-points", points)
-                scale = truth[seed].mean()
-                squares.append(np.mean((added(seen) - truth[seed]) ** 2) / scale**2)
-                seconds.append(spent)
-            curve.append((np.mean(seconds), np.sqrt(np.mean(squares))))
-            print(f"  {name:12s} {points:3d} points: {curve[-1][0]:.3f} CPU s, error {100 * curve[-1][1]:.2f} %", flush=True)
-        curves[name] = np.array(curve)
-
-    def at(name, time):
-        logs = np.log(curves[name])
-        # Beyond the ends, as 1/sqrt(t).
-        if np.log(time) < logs[0, 0] or np.log(time) > logs[-1, 0]:
-            end = logs[0] if np.log(time) < logs[0, 0] else logs[-1]
-            return np.exp(end[1] - 0.5 * (np.log(time) - end[0]))
-        return np.exp(np.interp(np.log(time), logs[:, 0], logs[:, 1]))
-
-    reference = curves["1-to-N"]
-    time = reference[-1][0] * (reference[-1][1] / 0.1) ** 2
-    found = {name: at(name, time) for name in curves}
-    order = [found["abc"], found["1-to-1"], found["n-to-1"], found["1-to-N"]]
-    best = min(found.values())
-    ratio = (best / found["1-to-N"]) ** 2
-    passes = order == sorted(order) and ratio <= 0.2
-    print(f"{scene} {verdict(passes)} at {time:.2f} CPU s, where 1-to-N has 10 %: "
-          + ", ".join(f"{name} {100 * error:.2f} %" for name, error in found.items()) + f"; the best needs {ratio:.3f} of the time", flush=True)
-    return not passes
 
 
 def quality(scenes, options):
@@ -247,11 +194,11 @@ def determinism(scenes, options):
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    ways = {f.__name__: f for f in (unbiased, strategies, quality, cost, visibility, statues, methods, scale, determinism)}
+    ways = {f.__name__: f for f in (unbiased, quality, cost, visibility, statues, methods, scale, determinism)}
     parser.add_argument("what", choices=ways)
     parser.add_argument("scenes", nargs="*")
     parser.add_argument("--seeds", type=int)
     parser.add_argument("--more", nargs="*", default=[], help="further options of the program")
     options = parser.parse_args()
-    options.seeds = options.seeds or {"unbiased": 16, "strategies": 10, "quality": 4, "statues": 4}.get(options.what, 1)
+    options.seeds = options.seeds or {"unbiased": 16, "quality": 4, "statues": 4}.get(options.what, 1)
     raise SystemExit(bool(ways[options.what](options.scenes, options)))

@@ -3,7 +3,7 @@
 use core::num::NonZero;
 
 use fogbow::beams::{Beams, Piece, kernel, pieces, shoot};
-use fogbow::host::{Empty, Hit, Medium, Scene};
+use fogbow::host::{Empty, Hit, Medium, Rng, Scene};
 use fogbow::light::{Light, PointLight, QuadLight};
 use fogbow::math::{Bounds, Ray, Vec3, float::PI};
 use fogbow::medium::Homogeneous;
@@ -404,6 +404,32 @@ fn pictures_by_beams_are_those_of_the_path_tracer() {
         let paths = path::Settings { max_scatterings, ..path::Settings::default() };
         assert_same_pictures(&format!("{max_scatterings} scatterings"), &room, paths);
     }
+}
+
+#[test]
+fn wide_beams_are_fewer_and_keep_their_light() {
+    let (room, lights) = (foggy_room(), lamp());
+    let world = World { medium: &room, scene: &Room, lights: &lights };
+    let view = View { world, bounds: BOUNDS, paths: path::Settings::default() };
+    let (narrow, wide) = (0.05_f32, 0.2_f32);
+    let (mut all, mut kept) = (0, 0);
+    // Of the same paths, so that only what thinning does is left.
+    let difference = estimate(200, |rng| {
+        let seed = rng.next_u64();
+        let [every, some] = [wide, narrow].map(|radius| {
+            let settings = Settings { paths: 64, radius, longest: 0.4, ..Settings::new(&BOUNDS) };
+            photon_beams::shoot(&view, &settings, |_, _| wide, 0, seed).unwrap()
+        });
+        all += every.pieces().len();
+        kept += some.pieces().len();
+        assert!(every.pieces().iter().chain(some.pieces()).all(|piece| piece.radius == wide));
+        let ray = eye_ray(4.0, 7.0);
+        let [every, some] = [every, some].map(|beams| beams.gather(&ray, &room, u32::MAX, rng).light);
+        some.single + some.multiple - every.single - every.multiple
+    });
+    difference.assert_is([0.0; 3], 0.0, "what thinning adds");
+    let share = kept as f64 / all as f64;
+    assert!((share - 0.5).abs() < 0.01, "{share} of the pieces kept instead of √(0.05/0.2)");
 }
 
 #[test]
