@@ -15,7 +15,7 @@ quality     the usual bound at 1000 lights: 99.9th percentile of the clamped lay
 cost        CPU time of a step of compensation over that of a clamped gather: at most 1.3.
 visibility  what leaving local visibility out changes.
 statues     three phase functions, 2 steps, against the references: mean |relative block difference| <= 2 %, |bias| <= 1 %.
-methods     relRMSE_c of all methods at equal time on one thread.
+methods     relRMSE_c of all methods at about equal CPU time, that of radiance caching with usual settings.
 scale       10^3 to 10^5 lights: time over lights, bytes.
 determinism the same bytes with 1, 2 and 7 threads.
 
@@ -158,7 +158,11 @@ def methods(scenes, options):
         _, first = common.render(scene, "--method", "radiance-cache", "--threads", 1)
         budget = cpu(first)
         for name in ("path", "photon-beams", "vpl", "radiance-cache"):
-            limit = () if name == "radiance-cache" else ("--time", budget)
+            limit = ()
+            if name != "radiance-cache":
+                # By samples, not by --time: what else runs on the machine must not count.
+                _, pilot = common.render(scene, "--method", name, "--threads", 1, "--spp", 64)
+                limit = ("--spp", 64 * max(1, round(budget / cpu(pilot))))
             image, statistics = common.render(scene, "--method", name, "--threads", 1, *limit)
             line.append(f"{name} {100 * compare.stats(image, mean, error)['relRMSE_c']:.2f} % ({cpu(statistics):.0f} s)")
         print(f"{scene:24s} {', '.join(line)}", flush=True)

@@ -30,7 +30,7 @@ use super::photon_beams::{BeamArguments, BeamJob, Kernel};
 use super::radiance_cache::{CacheArguments, CacheJob, check_depth};
 use super::report::{Bar, Report};
 use super::vpl::{self, Audit, VplArguments, VplJob};
-use super::{Ending, Failure, output};
+use super::{Ending, Failure, ellipsoids, output};
 use crate::camera::Camera;
 use crate::scene_file::SceneFile;
 use crate::world::{Storage, WithMedium, World};
@@ -71,7 +71,7 @@ pub struct RenderArguments {
     /// Stops by which PNG images are brightened.
     #[arg(long, value_name = "STOPS", default_value_t = 0.0, allow_negative_numbers = true)]
     pub exposure: f32,
-    /// Also writes the components of light, as layers of .exr files.
+    /// Also writes the components of light, as layers of .exr files; where a covariance grid is used, a layer draws its ellipsoids.
     #[arg(long)]
     pub aov: bool,
     /// Writes times and counts.
@@ -312,6 +312,9 @@ pub(crate) fn render(arguments: &RenderArguments) -> Result<Rendered, Failure> {
     bar.finish();
     if let Some(plan) = &plan {
         film = statistics.time("fill in", || image_sampling::finished(&film, plan, arguments.aov))?;
+    }
+    if let Some(grid) = grid.as_ref().filter(|_| arguments.aov) {
+        film = statistics.time("draw ellipsoids", || ellipsoids::drawn(&film, grid, &camera, &world))?;
     }
     if let Some(cached) = &cached {
         for (i, name) in NAMES.iter().enumerate() {
