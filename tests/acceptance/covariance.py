@@ -17,7 +17,8 @@ image        lantern, light scattered by the medium, --method march: 43 % of the
              many samples each, less CPU time with the grid's filling, and over 8 seeds a mean off by 1 % at most.
 beams        lantern, caustic, nave: relMSE of --kernel covariance over that of progressive beams after equal passes, in the half of
              the picture where the predicted density of samples is below its median (at most 0.5), in the other and in the tenth
-             where it is highest, which holds the borders of shafts (at most 1.1), and at equal CPU time (below 1), where progressive beams' error is taken to fall with time as measured from half as many passes.
+             where it is highest, which holds the borders of shafts (at most 1.1), and at equal CPU time (below 1), where progressive
+             beams' error is taken to fall with time as measured from half as many passes.
 bias         caustic: mean |relative difference| of blocks of 8x8 pixels in the smooth half of a mean of 8 seeds of --kernel covariance, whose
              pass radius does not narrow, to progressive beams of the same radius, at bounds of 0.32, 0.08, 0.02, 0.005: within the bound and
              two standard errors, and falling with it.
@@ -136,13 +137,12 @@ def beams(options):
         halves = [light(render(scene, f"{scene}-truth-{s}", *truth, "--seed", s)[0]) for s in (101, 102)]
         plan = render(scene, f"{scene}-plan", "--spp", 1, "--image-sampling", "covariance")[0]
         density = plan("density").mean(-1)
-        smooth = density <= np.median(density)
+        smooth, borders = density <= np.median(density), density >= np.quantile(density, 0.9)
         early = render(scene, f"{scene}-early", *method, "--spp", spp // 2)
         old = render(scene, f"{scene}-old", *method, "--spp", spp)
         new = render(scene, f"{scene}-new", *method, "--spp", spp, "--kernel", "covariance")
         of = lambda rendered, where: max(squared(light(rendered[0]), halves, where), 1e-9)
         times = [sum(rendered[1].values()) for rendered in (old, new)]
-        borders = density >= np.quantile(density, 0.9)
         for name, where, bound in (("smooth half", smooth, 0.5), ("other half", ~smooth, 1.1), ("borders", borders, 1.1)):
             ratio = of(new, where) / of(old, where)
             power = np.log(of(early, where) / of(old, where)) / np.log(2)

@@ -180,14 +180,6 @@ impl Passing {
     fn new(piece: &Piece, ray: &Ray) -> Option<Self> {
         let (d, b) = (ray.direction, piece.direction);
         let from = ray.origin - piece.origin;
-        // Most pieces of a leaf pass too far away, which the distance of both lines tells at once. Where they are nearly
-        // parallel it tells too little.
-        let normal = d.cross(b);
-        let (gap, scale) = (from.dot(normal), normal.length_squared());
-        let radius2 = piece.radius * piece.radius;
-        if scale > 1e-4 && gap * gap > 1.001 * radius2 * scale {
-            return None;
-        }
         let (cosine, along) = (d.dot(b), from.dot(b));
         // Components across the beam.
         let (slope, start) = (d - b * cosine, from - b * along);
@@ -195,6 +187,7 @@ impl Passing {
         let is_parallel = sine2 < PARALLEL;
         let centre = if is_parallel { 0.0 } else { -start.dot(slope) / sine2 };
         let distance2 = (start + slope * centre).length_squared();
+        let radius2 = piece.radius * piece.radius;
         if !(is_parallel || distance2 < radius2) {
             return None;
         }

@@ -64,11 +64,15 @@ impl Piece {
         self.widened_between(ends, radius, keep);
     }
 
-    /// Keeps a piece that is wider than `radius` (m) with probability `√(radius/own)`, and then with as much more power.
-    /// `u` is a uniform number in [0, 1).
+    /// Keeps a piece that is wider than `radius` (m) with a probability `q`, and its power over `q` then: roulette, by
+    /// which the expected light stays exactly the same. `u` is a uniform number in [0, 1).
     ///
-    /// As many more pieces cross an eye ray as they are wider, and each costs the same; but many are of one path, and
-    /// their light varies together. Half of the wealth, in orders of magnitude, gives less noise for the time.
+    /// ```text
+    /// q = √(radius / r),    r the piece's own radius
+    /// ```
+    ///
+    /// A piece crosses eye rays in proportion to `r`, and each crossing costs the same. Many crossings are of one path,
+    /// whose light varies together: fewer of them are hardly noisier. The root is fogbow's own choice, by measurement.
     ///
     /// ```
     /// # use fogbow::{beams::Piece, spectrum::Spectrum};

@@ -20,8 +20,8 @@ const LEAST_SURVIVAL: f32 = 0.25;
 pub enum Flights {
     /// Woodcock tracking: unbiased; many flights leave the ball in which anything is missing.
     Woodcock,
-    /// The truncated exponential of the mean extinction around the receiver (Engelhardt et al. 2012, Eq. 4–5), with
-    /// the transmittance that is really there: unbiased, and all flights end within the ball.
+    /// The truncated exponential of the mean extinction around the receiver (Engelhardt et al. 2012, Eq. 4–5), taken within
+    /// half of the ball's radius, with the transmittance that is really there: unbiased, and all flights end within the ball.
     Truncated,
     /// The same, and the transmittance is that of the mean extinction, too: cheaper, and biased where extinction
     /// varies within the ball.

@@ -159,28 +159,29 @@ pub(super) fn section(plan: &Plan) -> Result<String, Failure> {
     });
     let judges: Vec<Judges> = judges.collect::<Result<_, Failure>>()?;
     let first = judges.first().ok_or("no runs")?;
+    let share = 1.0 / runs as f64;
     let mut all = Vec::new();
     for (name, colour, compensation) in STRATEGIES {
         plan.say(&format!("figure 6, {name}"));
         let mut points = Vec::new();
         for samples in counts {
-            let (first_image, cpu) = render(compensation, 0, *samples, 1)?;
-            let mut point = Point { samples: *samples, cpu, squared: first.rel_mse(&first_image), image: first_image };
-            for (run, judges) in (0..).zip(&judges).skip(1) {
-                let (image, cpu) = render(compensation, run, *samples, 1)?;
-                point.cpu += cpu;
-                point.squared += judges.rel_mse(&image);
+            let (mut cpu, mut squared, mut images) = (0.0, 0.0, Vec::new());
+            for (run, judges) in (0..).zip(&judges) {
+                let (image, spent) = render(compensation, run, *samples, 1)?;
+                cpu += spent * share;
+                squared += judges.rel_mse(&image) * share;
+                images.push(image);
             }
-            let share = 1.0 / runs as f64;
-            points.push(Point { cpu: point.cpu * share, squared: point.squared * share, ..point });
+            points.push(Point { samples: *samples, cpu, squared, image: images.swap_remove(0) });
         }
-        // All others converge to the same.
-        let is_biased = compensation.flights == Flights::LocallyHomogeneous;
         let (mut floor, mut brighter) = (0.0, 0.0);
-        for (run, judges) in (0..).zip(&judges).take_while(|_| is_biased) {
-            let long = [render(compensation, run, judging, 201)?.0, render(compensation, run, judging, 202)?.0];
-            floor += judges.common([&long[0], &long[1]]) / runs as f64;
-            brighter += long.iter().map(|image| 0.5 * judges.bias(image)).sum::<f64>() / runs as f64;
+        // All others converge to the same.
+        if compensation.flights == Flights::LocallyHomogeneous {
+            for (run, judges) in (0..).zip(&judges) {
+                let long = [render(compensation, run, judging, 201)?.0, render(compensation, run, judging, 202)?.0];
+                floor += judges.common([&long[0], &long[1]]) * share;
+                brighter += long.iter().map(|image| 0.5 * judges.bias(image)).sum::<f64>() * share;
+            }
         }
         let law = Law::fitted(&points, floor.max(0.0));
         all.push(Strategy { name, colour, points, law, brighter });
@@ -241,7 +242,8 @@ pub(super) fn section(plan: &Plan) -> Result<String, Failure> {
          each, of the same virtual lights, which stand in for the truth such that their noise cancels. Each sample here sees all lights; \
          the program deals them out to the samples of a pass. Clamped light is gathered at the same points and is in the \
          times. Errors are means of {runs} {}, each with virtual lights of its own.\n\n{table}\nTimes and errors that were not measured \
-         follow from `error² = floor² + noise/t` through those that were; 1-to-N has {} after {reached:.0} s.\n\n![error by \
+         follow from `error² = floor² + noise/t` through those that were; 1-to-N has {} after {reached:.0} s. Floors are estimated from two \
+         pictures of {judging} samples in each run, and rough where there is one run.\n\n![error by \
          time](fig-07-errors.svg)\n\nrelRMSE by processor time, with {} samples per pixel. The mean of the truth is {:.3} \
          W·m⁻²·sr⁻¹.\n\n",
         if runs == 1 { "run" } else { "runs" },
