@@ -40,7 +40,9 @@ impl Spectrum {
     #[inline]
     #[must_use]
     pub fn map(self, f: impl Fn(f32) -> f32) -> Self {
-        Self(self.0.map(f))
+        // Written out: without link-time optimisation an array's own `map` stays a call.
+        let Self([r, g, b]) = self;
+        Self([f(r), f(g), f(b)])
     }
 
     /// `f` of every pair of channels.
@@ -260,10 +262,20 @@ impl Gradient {
         self.x * direction.x + self.y * direction.y + self.z * direction.z
     }
 
-    /// Euclidean norm per channel. Scaled by the largest component, so that energies around 1e−30
-    /// keep their norm although their squares underflow.
+    /// Euclidean norm per channel. Scaled by the largest component where squares leave the range of `f32`:
+    /// energies around 1e−30 keep their norm.
+    #[inline]
     #[must_use]
     pub fn norm(&self) -> Spectrum {
+        let squares = self.x * self.x + self.y * self.y + self.z * self.z;
+        if squares.min_element() > 1e-30 && squares.max_element() < f32::INFINITY {
+            return squares.map(float::sqrt);
+        }
+        self.scaled_norm()
+    }
+
+    #[cold]
+    fn scaled_norm(&self) -> Spectrum {
         let largest = self.x.map(f32::abs).max(self.y.map(f32::abs)).max(self.z.map(f32::abs));
         let (x, y, z) = (self.x.ratio(largest), self.y.ratio(largest), self.z.ratio(largest));
         largest * (x * x + y * y + z * z).map(float::sqrt)

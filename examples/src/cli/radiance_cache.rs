@@ -221,12 +221,12 @@ impl CacheJob<'_> {
             Single::Cached => true,
         };
         // Expansions change faster than the mean over directions, from which radii come.
-        let breadth = 1.0 - f64::from(phase.mean_cosine().map(f32::abs).max_element());
+        let breadth = (1.0 - f64::from(phase.mean_cosine().map(f32::abs).max_element())).max(0.1);
         cache::Settings {
             single: if cached { effort(Kind::Single, 0.2, 16.0, degree(1, 0.0), 0.1) } else { None },
             surface: effort(Kind::Surface, 2.0, 256.0, degree(1, 1.5), 0.1),
-            multiple: effort(Kind::Multiple, breadth.max(0.1), 512.0, degree(2, 0.0), 0.1),
-            irradiance: effort(Kind::Irradiance, 0.35, 256.0, 0, 0.1),
+            multiple: effort(Kind::Multiple, breadth, 512.0, degree(2, 0.0), 0.1),
+            irradiance: effort(Kind::Irradiance, 0.35, 512.0, 0, 0.1),
             rays: 16384,
             extrapolation: arguments.extrapolation.map_or_else(Extrapolation::default, Into::into),
             margin: 0.15,

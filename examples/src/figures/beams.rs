@@ -10,7 +10,9 @@ use crate::cli::Failure;
 
 const SCENES: [&str; 3] = ["lantern", "caustic", "nave"];
 /// Cells along the longest side of the grids that are compared, in the first scene.
-const EDGES: [&str; 3] = ["16", "32", "64"];
+const EDGES: [&str; 3] = ["16", "32", CELLS];
+/// Of the grids with which kernels are compared.
+const CELLS: &str = "64";
 
 /// How much is done.
 #[derive(Clone, Copy)]
@@ -62,7 +64,7 @@ pub(super) fn section(plan: &Plan) -> Result<String, Failure> {
     let effort = if plan.quick {
         Effort { size: [64, 64], passes: "8", judging: "56", paths: "20000" }
     } else {
-        Effort { size: [160, 160], passes: "32", judging: "256", paths: "200000" }
+        Effort { size: [160, 160], passes: "16", judging: "128", paths: "200000" }
     };
     let (mut rows, mut table, mut gains, mut grids) = (Vec::new(), HEAD.to_owned(), String::new(), HEAD.to_owned());
     for scene in SCENES {
@@ -76,7 +78,7 @@ pub(super) fn section(plan: &Plan) -> Result<String, Failure> {
             let options: Vec<&str> = kernel.into_iter().chain([cells]).collect();
             blurred(plan, scene, &effort, &judges, &options)
         };
-        let ours = of("32")?;
+        let ours = of(CELLS)?;
         line(&mut table, scene, "progressive", &usual);
         // As much time as with covariances and their grid.
         let passes = effort.passes.parse::<f64>().unwrap_or(1.0) * (ours.cpu + ours.fill) / usual.cpu.max(1e-9);
@@ -89,7 +91,7 @@ pub(super) fn section(plan: &Plan) -> Result<String, Failure> {
         let _ = write!(gains, "{comma}{scene} {smooth:.2} in the smooth half, {overall:.2} overall");
         if scene == SCENES[0] {
             for cells in EDGES {
-                let one = if cells == "32" { &ours } else { &of(cells)? };
+                let one = if cells == CELLS { &ours } else { &of(cells)? };
                 line(&mut grids, &format!("{scene}, {cells} cells"), "covariance", one);
             }
         }
@@ -103,7 +105,7 @@ pub(super) fn section(plan: &Plan) -> Result<String, Failure> {
     let Effort { size: [edge, _], passes, judging, paths } = effort;
     Ok(format!(
         "## Figs 18 to 21: photon beams\n\n![beams](fig-18-beams.png)\n\nLight of the medium after {passes} passes of one sample per \
-         pixel, {edge} × {edge} pixels: left `--kernel progressive`, in the middle `--kernel covariance` with 32 cells along \
+         pixel, {edge} × {edge} pixels: left `--kernel progressive`, in the middle `--kernel covariance` with {CELLS} cells along \
          the longest side of its grid and {paths} photons to fill it, right the mean of two progressive renders of {judging} passes with radii that \
          start at half, which stand in for the truth. From above: lantern, caustic, nave.\n\n{table}\n\
          Progressive over covariance, relMSE after equal passes: {gains}. The lines with more passes take about as much time as \

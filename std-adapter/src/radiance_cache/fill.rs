@@ -5,10 +5,11 @@
 //! one of the same round now covers. In this order:
 //!
 //! 1. coarse irradiance on all surfaces, light of surfaces in the medium, coarse multiple scattering: from
-//!    few whole walks;
+//!    whole walks;
 //! 2. the same records again, twice, from all that they know of each other;
-//! 3. final multiple scattering and final irradiance where eye rays come: places and radii from few
-//!    samples, then values from many, so that noise in one does not steer the other.
+//! 3. final multiple scattering and final irradiance where eye rays come: places and radii from some
+//!    samples, then values from as many others, so that noise in one does not steer the other. Fewer for the
+//!    first are no saving: radii that noise has made too large stay, and what they cover stays wrong.
 
 use core::fmt;
 
@@ -59,12 +60,6 @@ impl fmt::Display for FillError {
 }
 
 impl core::error::Error for FillError {}
-
-/// By how much fewer walks the very first records are made of.
-const FIRST_WALKS: u32 = 4;
-
-/// By how much fewer samples decide the radii of final records: their values come from samples of their own.
-const FIRST_LOOK: u32 = 3;
 
 /// Rays of the first batch; each next one has twice as many, up to [`LAST_BATCH`].
 const FIRST_BATCH: u32 = 64;
@@ -295,15 +290,14 @@ where
         let counts = caches.all_counts();
         let mut guides: [Vec<Guide>; 5] =
             core::array::from_fn(|i| vec![Guide::default(); counts[i].saturating_sub(before[i])]);
-        // What lights everything else: coarse, because whoever asks sees many records at once. Made by
-        // whole walks, and few, because it is revised with what those have told.
+        // What lights everything else: coarse, because whoever asks sees many records at once.
         if let (Some(cache), Some(effort)) = (&mut caches.coarse_irradiance, settings.coarse_irradiance()) {
             let clock = Stopwatch::start();
             outcome.computed[3] +=
                 self.rounds(cache, &effort, 4, &all, everywhere, &mut guides[0], |cache, place, learnt, rng| {
                     let surfaces = Some((cache, settings.reading(&effort)));
                     let estimator = Estimator { surfaces, ..*self.estimator };
-                    irradiance(&estimator, looks((effort.samples / FIRST_WALKS).max(16), learnt), place, rng)
+                    irradiance(&estimator, looks(effort.samples, learnt), place, rng)
                 });
             outcome.seconds[3] = clock.elapsed();
         }
@@ -312,14 +306,7 @@ where
             let clock = Stopwatch::start();
             outcome.computed[1] +=
                 self.rounds(cache, &effort, 1, &all, in_medium, &mut guides[1], |cache, place, learnt, rng| {
-                    scattered(
-                        cache,
-                        &estimator,
-                        looks((effort.samples / FIRST_WALKS).max(16), learnt),
-                        place,
-                        rng,
-                        Part::Surface,
-                    )
+                    scattered(cache, &estimator, looks(effort.samples, learnt), place, rng, Part::Surface)
                 });
             outcome.seconds[1] = clock.elapsed();
         }
@@ -330,14 +317,7 @@ where
                 self.rounds(cache, &effort, 5, &all, in_medium, &mut guides[2], |cache, place, learnt, rng| {
                     let scattered_light = surface.map(|surface| [surface, (cache, settings.reading(&effort))]);
                     let estimator = Estimator { scattered: scattered_light, ..estimator };
-                    scattered(
-                        cache,
-                        &estimator,
-                        looks((effort.samples / FIRST_WALKS).max(16), learnt),
-                        place,
-                        rng,
-                        Part::Multiple,
-                    )
+                    scattered(cache, &estimator, looks(effort.samples, learnt), place, rng, Part::Multiple)
                 });
             outcome.seconds[2] = clock.elapsed();
         }
@@ -362,14 +342,7 @@ where
             let estimator = Estimator { scattered: known, ..estimator };
             outcome.computed[2] +=
                 self.rounds(cache, &effort, 2, &all, in_medium, &mut guides[3], |cache, place, learnt, rng| {
-                    scattered(
-                        cache,
-                        &estimator,
-                        looks((effort.samples / FIRST_LOOK).max(1), learnt),
-                        place,
-                        rng,
-                        Part::Multiple,
-                    )
+                    scattered(cache, &estimator, looks(effort.samples, learnt), place, rng, Part::Multiple)
                 });
             outcome.seconds[2] = outcome.seconds[2] + clock.elapsed();
         }
@@ -395,7 +368,7 @@ where
             if let Some(cache) = &mut caches.irradiance {
                 outcome.computed[3] +=
                     self.rounds(cache, &effort, 3, &all, in_sight, &mut guides[4], |_, place, learnt, rng| {
-                        irradiance(&estimator, looks((effort.samples / FIRST_LOOK).max(1), learnt), place, rng)
+                        irradiance(&estimator, looks(effort.samples, learnt), place, rng)
                     });
             }
             let revised = self.revised(
