@@ -211,7 +211,8 @@ where
 /// `ray` is the eye ray of a sample; `is_gathered` says whether light of the medium is wanted at its pixel (`|_| true`
 /// everywhere; see [`crate::image_sampling`]); `radius` is told a point (m) and the pass's radius (m) and says how wide
 /// the kernel is there: `|_, pass| pass` for progressive photon beams, `|point, pass| pass.max(…)` where
-/// something is known of how fast light changes. Pieces wider than [`Settings::radius`] are thinned out ([`Piece::thinned`]). `write` puts what was seen into the film's layers.
+/// something is known of how fast light changes. Pieces wider than [`Settings::radius`] are thinned out
+/// ([`Piece::thinned`]). `write` puts what was seen into the film's layers.
 ///
 /// # Errors
 /// See [`BeamsError`].

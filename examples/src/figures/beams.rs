@@ -9,10 +9,10 @@ use super::{Plan, montage, percent, rendered};
 use crate::cli::Failure;
 
 const SCENES: [&str; 3] = ["lantern", "caustic", "nave"];
-/// Cells along the longest side of the grids that are compared, in the first scene.
-const EDGES: [&str; 3] = ["16", "32", CELLS];
-/// Of the grids with which kernels are compared.
+/// Cells along the longest side of the grid that serves all scenes.
 const CELLS: &str = "64";
+/// The same of the grids that are compared with each other, in the first scene.
+const EDGES: [&str; 3] = ["16", "32", CELLS];
 
 /// How much is done.
 #[derive(Clone, Copy)]
