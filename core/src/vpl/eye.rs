@@ -11,8 +11,9 @@ use crate::sampling::{Generator, uniform};
 use crate::spectrum::Spectrum;
 use crate::transmittance::thickness::{Marching, optical_thickness};
 
-/// Points on a segment of an eye ray that are held at once; lights beyond as many get points of their own.
-const POINTS: usize = 32;
+/// Points on a segment of an eye ray that are held at once, some 30 KB of stack; lights beyond half as many get points of
+/// their own, by another march along the segment.
+const POINTS: usize = 256;
 
 /// How eye rays see virtual lights.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
