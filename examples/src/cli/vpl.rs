@@ -18,16 +18,22 @@ use super::Failure;
 use super::render::{LAYERS, Shot, write_layers};
 use crate::world::WithMedium;
 
+/// Default of `--lights`.
+const LIGHTS: u32 = 1000;
+
+/// Default of `--candidates`.
+const CANDIDATES: u32 = 16;
+
 /// Options of `--method vpl`.
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Virtual lights")]
 pub struct VplArguments {
     /// Virtual lights of each pass.
-    #[arg(long, value_name = "N", default_value_t = 1000, value_parser = clap::value_parser!(u32).range(1..=1 << 24))]
+    #[arg(long, value_name = "N", default_value_t = LIGHTS, value_parser = clap::value_parser!(u32).range(1..=1 << 24))]
     pub lights: u32,
     /// How many times as many are made; those are kept that matter most for the picture. 1 keeps all; no more
     /// than 131072 are made, or as many as lights.
-    #[arg(long, value_name = "N", default_value_t = 16, value_parser = clap::value_parser!(u32).range(1..=256))]
+    #[arg(long, value_name = "N", default_value_t = CANDIDATES, value_parser = clap::value_parser!(u32).range(1..=256))]
     pub candidates: u32,
     /// Bound of geometry terms, by which near virtual lights are clamped, in the scene's unit of length to the power of
     /// -2; `auto` finds one that two steps of compensation nearly bring back, `off` leaves bright splotches.
@@ -130,8 +136,8 @@ impl VplArguments {
             || self.steps.is_some()
             || self.local_visibility.is_some()
             || self.share.is_some()
-            || self.lights != 1000
-            || self.candidates != 16
+            || self.lights != LIGHTS
+            || self.candidates != CANDIDATES
             || self.light_points != 1
     }
 
