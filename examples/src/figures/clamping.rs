@@ -17,7 +17,7 @@ const SCALE: f32 = 8.0;
 
 /// Figs 2, 4 and 5.
 pub(super) fn smoke(plan: &Plan) -> Result<String, Failure> {
-    let (edge, lights, judging, by) = if plan.quick { (96, "500", "512", 2) } else { (256, "2000", "4096", 1) };
+    let (edge, lights, judging, by) = if plan.quick { (96, "500", "512", 2) } else { (192, "1000", "2048", 1) };
     let base = format!("--lights {lights} --candidates 1 ");
     let shot = |options: &str| seen(plan, "smoke", [edge, edge], &format!("{base}{options}"));
     let unclamped = shot("--clamp off --compensation none")?;
@@ -121,7 +121,7 @@ fn even_media(plan: &Plan, by: u32, exact: &rendered::Shot, even: &rendered::Sho
 /// Fig. 11: a room, and the light it lost.
 pub(super) fn room(plan: &Plan) -> Result<String, Failure> {
     let (size, lights, samples, reference, by) =
-        if plan.quick { ([128, 96], "300", "128", "192", 2) } else { ([384, 288], "2000", "512", "1024", 1) };
+        if plan.quick { ([128, 96], "300", "128", "192", 2) } else { ([192, 144], "600", "256", "384", 2) };
     let shot = |options: &str| seen(plan, "room-plume", size, &format!("--lights {lights} {options}"));
     let full = shot(&format!("--compensation full --pass-samples {reference}"))?;
     let abc = shot(&format!("--pass-samples {samples}"))?;
@@ -168,7 +168,7 @@ pub(super) fn room(plan: &Plan) -> Result<String, Failure> {
 /// Fig. 13: phase functions.
 pub(super) fn statues(plan: &Plan) -> Result<String, Failure> {
     let (size, lights, judging, by) =
-        if plan.quick { ([112, 84], "600", "1024", 2) } else { ([320, 240], "2000", "8192", 1) };
+        if plan.quick { ([112, 84], "600", "1024", 2) } else { ([160, 120], "1000", "2048", 2) };
     let (mut above, mut below, mut gain) = (Vec::new(), Vec::new(), None);
     let mut table =
         "| scatters | g | clamped | 1 step | 2 steps | processor time |\n|---|---|---|---|---|---|\n".to_owned();

@@ -8,7 +8,7 @@ const SCENES: [(&str, &str); 2] = [("statue-isotropic", "even"), ("room-plume", 
 
 /// The section of the page.
 pub(super) fn section(plan: &Plan) -> Result<String, Failure> {
-    let (edge, lights) = if plan.quick { (64_u32, 512_u32) } else { (160, 2048) };
+    let (edge, lights) = if plan.quick { (64_u32, 512_u32) } else { (96, 1024) };
     let mut table = "| scene | medium | compensation | all but virtual lights | clamped light | 1st step | 2nd step | steps, of all |\n\
                      |---|---|---|---|---|---|---|---|\n"
         .to_owned();

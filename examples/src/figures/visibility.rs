@@ -11,7 +11,7 @@ const SCALE: f32 = 16.0;
 
 /// The section of the page.
 pub(super) fn section(plan: &Plan) -> Result<String, Failure> {
-    let (edge, lights, by) = if plan.quick { (96, "256", 2) } else { (256, "1000", 1) };
+    let (edge, lights, by) = if plan.quick { (96, "256", 2) } else { (192, "500", 1) };
     let (mut rows, mut table) = (Vec::new(), TABLE.to_owned());
     for (scene, size) in [("thin-wall", [edge, edge]), ("room-plume", [edge, edge * 3 / 4])] {
         let shot = |visibility: &str| {
