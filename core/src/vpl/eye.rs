@@ -11,7 +11,7 @@ use crate::sampling::{Generator, uniform};
 use crate::spectrum::Spectrum;
 use crate::transmittance::thickness::{Marching, optical_thickness};
 
-/// Points on a segment of an eye ray that are held at once, some 30 KB of stack; lights beyond half as many get points of
+/// Points on a segment of an eye ray that are held at once, 40 KB of stack; lights beyond half as many get points of
 /// their own, by another march along the segment.
 const POINTS: usize = 256;
 
