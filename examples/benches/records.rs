@@ -74,7 +74,8 @@ const REACH: f32 = 0.1;
 
 fn filled<M: Medium + Sync>(estimator: &Estimator<'_, M, World<'_>>, camera: &Camera, most: f32) -> RadianceCaches {
     let effort = |tolerance| {
-        Some(Effort { tolerance, samples: SAMPLES, degree: 0, limits: Limits { min: 0.01 * most, max: most } })
+        let limits = Limits { min: 0.01 * most, max: most };
+        Some(Effort { tolerance, samples: SAMPLES, degree: 0, limits, clearance: f32::INFINITY })
     };
     let mut caches = RadianceCaches::new(Settings {
         single: None,

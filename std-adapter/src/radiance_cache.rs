@@ -26,6 +26,11 @@ pub struct Effort {
     pub degree: usize,
     /// Bounds of radii in the world (m).
     pub limits: Limits,
+    /// Greatest radius as a multiple of the distance to the nearest surface ([`clearance`]); infinite
+    /// for no such bound.
+    ///
+    /// [`clearance`]: fogbow::cache::clearance
+    pub clearance: f32,
 }
 
 impl Effort {
@@ -93,9 +98,11 @@ impl Settings {
         self.irradiance.map(|effort| effort.coarser(3.0, 2))
     }
 
-    /// Of the records at which random walks of the final ones end.
+    /// Of the records at which random walks of the final ones end: as fine, with half the samples. What they get wrong
+    /// is what all walks bring along, more of it with every scattering, and in corners most: so none reaches past a
+    /// surface. Final ones gain nothing by that.
     fn coarse_multiple(&self) -> Option<Effort> {
-        self.multiple.map(|effort| effort.coarser(1.5, 2))
+        self.multiple.map(|effort| Effort { clearance: effort.clearance.min(1.0), ..effort.coarser(1.0, 2) })
     }
 }
 

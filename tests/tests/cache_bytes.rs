@@ -281,7 +281,8 @@ impl Drop for Folder {
 }
 
 fn settings() -> Settings {
-    let effort = Effort { tolerance: 0.5, samples: 64, degree: 1, limits: Limits { min: 0.01, max: 1.0 } };
+    let limits = Limits { min: 0.01, max: 1.0 };
+    let effort = Effort { tolerance: 0.5, samples: 64, degree: 1, limits, clearance: 0.5 };
     let flat = Effort { degree: 0, ..effort };
     Settings {
         single: None,

@@ -1,7 +1,7 @@
 //! What the radiance cache is filled with, where the light is known.
 
 use fogbow::cache::{
-    Cache, Caches, Estimator, Extrapolation, EyeSettings, Reader, Reading, Record, VolumeCache, radiance,
+    Cache, Caches, Estimator, Extrapolation, EyeSettings, Reader, Reading, Record, VolumeCache, clearance, radiance,
 };
 use fogbow::host::{Empty, Medium, Scene};
 use fogbow::light::{Light, PointLight};
@@ -30,6 +30,24 @@ fn estimator<'a, M: Medium, S: Scene>(medium: &'a M, scene: &'a S, lights: &'a [
         light_samples: 4,
         finest: 1e-6,
     }
+}
+
+#[test]
+fn the_nearest_surface_is_found_within_a_few_degrees() {
+    let room = Ball { centre: Vec3::X, radius: 2.0, surface: Surface::Lambert { reflectance: Spectrum::ONE } };
+    for (from_centre, nearest) in [(0.0, 2.0), (1.0, 1.0), (1.9, 0.1)] {
+        for axis in [Vec3::X, Vec3::NEG_Z, Vec3::new(0.48, 0.6, 0.64)] {
+            let found = clearance(Vec3::X + axis * from_centre, None, &room);
+            // 96 directions leave no gap of more than 14 degrees; the wall seen at an angle is farther by a secant.
+            assert!(found > nearest * 0.999 && found < nearest * 1.04, "{found} at {from_centre} along {axis}");
+        }
+    }
+    // From its wall a round room is seen along chords of 2 R cos(theta), and no direction with a cosine below 0.1
+    // is looked in; the next of 96 has one below 0.15.
+    let floor = clearance(Vec3::X + Vec3::NEG_Y * 2.0, Some(Vec3::Y), &room);
+    assert!((0.4..0.6).contains(&floor), "{floor}");
+    let outside = clearance(Vec3::X + Vec3::Y * 3.0, Some(Vec3::Y), &room);
+    assert_eq!(outside, f32::INFINITY, "nothing above");
 }
 
 fn fog(absorption: f32, scattering: f32, phase: impl Into<Phase>) -> Homogeneous {

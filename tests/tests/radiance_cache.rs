@@ -2,7 +2,9 @@
 
 use core::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
-use fogbow::cache::{Estimator, Extrapolation, EyeSettings, Limits, Place, Reading, places, radiance};
+use fogbow::cache::{
+    Estimator, Extrapolation, EyeSettings, Limits, Place, Reading, Record, VolumeCache, clearance, places, radiance,
+};
 use fogbow::host::{Gradients, Medium, Properties, Stretch};
 use fogbow::light::{Light, PointLight};
 use fogbow::math::{Ray, Vec2, Vec3};
@@ -49,7 +51,8 @@ fn eye_ray(film: [f32; 2]) -> Ray {
 
 fn settings() -> Settings {
     let limits = Limits { min: 0.02, max: 0.8 };
-    let effort = |tolerance: f32, degree: usize| Some(Effort { tolerance, samples: 32, degree, limits });
+    let clearance = f32::INFINITY;
+    let effort = |tolerance: f32, degree: usize| Some(Effort { tolerance, samples: 32, degree, limits, clearance });
     Settings {
         single: effort(0.5, 3),
         surface: effort(1.5, 2),
@@ -159,6 +162,25 @@ fn what_is_filled_answers_every_question_of_the_image() {
     assert!(!outcome.cancelled);
     let (_, lookups, misses) = picture(&caches, 2);
     assert!(lookups > 10_000 && misses == 0, "{misses} of {lookups}");
+}
+
+#[test]
+fn records_reach_no_farther_than_surfaces_let_them() {
+    let beyond = |caches: &RadianceCaches, share: f32| {
+        let bound = |record: &Record| share * clearance(record.position, None, &room());
+        let is_beyond = |record: &&Record| record.radius > bound(record).max(0.02) * 1.000_001;
+        let count =
+            |cache: &Option<VolumeCache<'_>>| cache.as_ref().unwrap().records().iter().filter(is_beyond).count();
+        [count(&caches.surface), count(&caches.multiple), count(&caches.coarse_multiple)]
+    };
+    let near = |effort: Option<Effort>| effort.map(|e| Effort { clearance: 0.5, ..e });
+    let few = settings();
+    let (bounded, _) = filled(Settings { surface: near(few.surface), multiple: near(few.multiple), ..few });
+    assert_eq!(beyond(&bounded, 0.5), [0; 3]);
+    // Unbounded ones do reach farther, but for those at which walks end.
+    let (unbounded, _) = filled(few);
+    let [surface, multiple, coarse] = beyond(&unbounded, 1.0);
+    assert!(surface > 0 && multiple > 0 && coarse == 0, "{surface}, {multiple}, {coarse}");
 }
 
 /// Share of places of fresh eye rays that no record of a cache of multiple scattering reaches.

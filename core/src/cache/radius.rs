@@ -1,8 +1,12 @@
 //! How far a record may be used: Jarosz et al. 2008, Eq. 31–34; sheet § 1.9.
 
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 
-use crate::single_scatter::Sums;
+use crate::host::Scene;
+use crate::math::Ray;
+use crate::path::trace::leave;
+use crate::sampling::warp;
+use crate::single_scatter::{Sums, lattice, nearest_surface};
 use crate::spectrum::{Gradient, Spectrum};
 
 /// Bounds of radii (m), in the world.
@@ -31,6 +35,12 @@ impl Limits {
         let footprint = pixel * distance;
         let max = (most * footprint).clamp(self.min, self.max);
         Self { min: (least * footprint).clamp(self.min, max), max }
+    }
+
+    /// Narrowed to at most `reach` (m). The least radius wins.
+    #[must_use]
+    pub fn within(self, reach: f32) -> Self {
+        Self { max: self.max.min(reach).max(self.min), ..self }
     }
 
     /// A radius within the bounds; the greatest where none is defined.
@@ -69,6 +79,33 @@ pub fn valid_radius(sums: &Sums, tolerance: f32) -> Option<f32> {
         }
     }
     least
+}
+
+/// Directions that look for surfaces.
+const DIRECTIONS: u32 = 96;
+
+/// Less than this above a surface's plane, directions meet the surface itself where it is curved.
+const GRAZING: f32 = 0.1;
+
+/// Distance (m) from `point` to the nearest surface, as far as evenly spread directions tell: all around
+/// in the medium, above the plane for a point on a surface with `normal`. Infinite where none is met.
+///
+/// Light falls off towards a wall or into a corner in ways that gradients farther away do not foretell,
+/// and whose sphere reaches there leaves no room for a record that would know: so radii are limited by it.
+/// Source: as the harmonic mean distance of Ward et al. 1988, *A Ray Tracing Solution for Diffuse
+/// Interreflection*, but the least one.
+#[must_use]
+pub fn clearance(point: Vec3, normal: Option<Vec3>, scene: &(impl Scene + ?Sized)) -> f32 {
+    let distance = |j| {
+        let direction = warp::uniform_sphere(lattice(j, DIRECTIONS, Vec2::ZERO));
+        let origin = match normal {
+            Some(normal) if normal.dot(direction) < GRAZING => return f32::INFINITY,
+            Some(normal) => leave(point, normal, direction, 0.0),
+            None => point,
+        };
+        nearest_surface(&Ray::new(origin, direction), scene).map_or(f32::INFINITY, |hit| hit.distance)
+    };
+    (0..DIRECTIONS).map(distance).fold(f32::INFINITY, f32::min)
 }
 
 /// The radius that the plain logarithmic gradient would give, `ε L/‖∇L‖` (m): infinite at saddle

@@ -211,6 +211,11 @@ impl CacheJob<'_> {
                 samples: ((samples * scale) as u32).max(1),
                 degree: arguments.degree.map_or(degree, |d| d as usize),
                 limits: Limits { min: 1e-3 * size, max: most * size },
+                clearance: match kind {
+                    Kind::Irradiance => 0.3,
+                    Kind::Surface => 1.0,
+                    Kind::Single | Kind::Multiple => f32::INFINITY,
+                },
             };
             (!arguments.uncached.contains(&kind) && self.paths.max_scatterings > 1).then_some(effort)
         };

@@ -11,9 +11,9 @@
 //! | 20 | 4 | 1 if a fill was cancelled and its records are still to be estimated anew, else 0 |
 //! | 24 | 8 | tag: what the caches were made for |
 //! | 32 | 8 | CRC-64 of bytes 0 to 32 and of both tables below |
-//! | 40 | 32 p | a part each: number of the cache, degree, tolerance (`f32`), samples per record, least and greatest radius (`f32`), length in bytes (8) |
-//! | 40 + 32 p | 8 v | [`RadianceCaches::views`] |
-//! | 40 + 32 p + 8 v | … | the parts, one after the other |
+//! | 40 | 36 p | a part each: number of the cache, degree, tolerance (`f32`), samples per record, least and greatest radius, clearance (`f32`), length in bytes (8) |
+//! | 40 + 36 p | 8 v | [`RadianceCaches::views`] |
+//! | 40 + 36 p + 8 v | … | the parts, one after the other |
 
 use core::fmt;
 use std::io;
@@ -30,11 +30,11 @@ use crate::files;
 const MAGIC: [u8; 8] = *b"\x89FOGSET\n";
 
 /// Of the layout above.
-const VERSION: u32 = 2;
+const VERSION: u32 = 3;
 
 /// Length of the header, of a part's row and of a view's (bytes).
 const HEADER: usize = 40;
-const ROW: usize = 32;
+const ROW: usize = 36;
 const VIEW: usize = 8;
 
 /// Names of the parts, in the order of their numbers.
@@ -173,7 +173,8 @@ pub fn save(file: impl AsRef<Path>, caches: &RadianceCaches, tag: u64) -> Result
 /// ```
 /// use fogbow::cache::Limits;
 /// use fogbow_std::radiance_cache::{Effort, RadianceCaches, Settings, load, save};
-/// let effort = Effort { tolerance: 0.5, samples: 64, degree: 2, limits: Limits { min: 0.01, max: 1.0 } };
+/// let limits = Limits { min: 0.01, max: 1.0 };
+/// let effort = Effort { tolerance: 0.5, samples: 64, degree: 2, limits, clearance: 1.0 };
 /// let settings = Settings { multiple: Some(effort), ..Settings::default() };
 ///
 /// let file = std::env::temp_dir().join("fogbow-std-caches.fog");
@@ -227,9 +228,9 @@ pub fn encode(caches: &RadianceCaches, tag: u64) -> Vec<u8> {
         let (Some(part), Some(effort)) = (part, effort) else { continue };
         count += 1;
         let Limits { min, max } = effort.limits;
-        let words =
-            [number, effort.degree as u32, effort.tolerance.to_bits(), effort.samples, min.to_bits(), max.to_bits()];
-        words.iter().for_each(|word| tables.extend(word.to_le_bytes()));
+        let words = [number, effort.degree as u32, effort.tolerance.to_bits(), effort.samples];
+        let bounds = [min, max, effort.clearance].map(f32::to_bits);
+        words.iter().chain(&bounds).for_each(|word| tables.extend(word.to_le_bytes()));
         tables.extend((part.len() as u64).to_le_bytes());
     }
     caches.views.iter().for_each(|view| tables.extend(view.to_le_bytes()));
@@ -327,7 +328,7 @@ fn rows(file: &[u8], tag: u64) -> Result<([Option<Row<'_>>; 6], Vec<u64>), Probl
         return Err(Problem::Checksum);
     }
     let (table, views) = tables.split_at(parts as usize * ROW);
-    let lengths = table.chunks_exact(ROW).map(|row| long(row, 24));
+    let lengths = table.chunks_exact(ROW).map(|row| long(row, 28));
     let before = (HEADER + tables.len()) as u64;
     let due = lengths.fold(before, u64::saturating_add);
     if due != file.len() as u64 {
@@ -342,9 +343,10 @@ fn rows(file: &[u8], tag: u64) -> Result<([Option<Row<'_>>; 6], Vec<u64>), Probl
             tolerance: number(8),
             samples: word(row, 12),
             limits: Limits { min: number(16), max: number(20) },
+            clearance: number(24),
         };
         // Their sum is the length of the rest.
-        let (bytes, others) = rest.split_at_checked(long(row, 24) as usize).ok_or(Problem::Parts)?;
+        let (bytes, others) = rest.split_at_checked(long(row, 28) as usize).ok_or(Problem::Parts)?;
         (*slot, rest) = (Some(Row { effort, bytes }), others);
     }
     if long(header, 24) != tag {

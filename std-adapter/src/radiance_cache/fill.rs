@@ -16,7 +16,7 @@ use core::fmt;
 use fogbow::bytes::Crc;
 use fogbow::cache::{
     Cache, Estimator, EyeSettings, Facing, Guide, Guided, Looks, Place, Reading, Record, SurfaceCache, VolumeCache,
-    clamp_gradient, places,
+    clamp_gradient, clearance, places,
 };
 use fogbow::host::{Medium, Scene};
 use fogbow::math::{Ray, Vec3};
@@ -574,7 +574,10 @@ where
                         let mut learnt = Guide::default();
                         let (sums, attached) = compute(frozen, place, &mut learnt, &mut Generator::new(seed));
                         let (least, most) = self.settings.pixels;
-                        let limits = effort.limits.on_screen(least, most, self.pixel, *distance);
+                        let limits = effort
+                            .limits
+                            .on_screen(least, most, self.pixel, *distance)
+                            .within(self.reach(effort, place));
                         (*place, Record::new(place.point, &sums, effort.tolerance, limits), attached, learnt)
                     })
                     .collect();
@@ -596,6 +599,15 @@ where
         }
         cache.finish();
         computed
+    }
+
+    /// How far a record may reach because of surfaces near it.
+    fn reach(&self, effort: &Effort, place: &Place) -> f32 {
+        if effort.clearance == f32::INFINITY {
+            return f32::INFINITY;
+        }
+        let distance = clearance(place.point, place.normal, self.estimator.world.scene);
+        (effort.clearance * distance).max(self.estimator.finest)
     }
 
     /// The places of one round: the first open ones that are not too close to each other.
