@@ -211,6 +211,7 @@ impl CacheJob<'_> {
                 samples: ((samples * scale) as u32).max(1),
                 degree: arguments.degree.map_or(degree, |d| d as usize),
                 limits: Limits { min: 1e-3 * size, max: most * size },
+                // Farther, and dark corners turn out too bright; nearer, and records cost more than they mend.
                 clearance: match kind {
                     Kind::Irradiance => 0.3,
                     Kind::Surface => 1.0,
