@@ -26,10 +26,11 @@ pub struct Effort {
     pub degree: usize,
     /// Bounds of radii in the world (m).
     pub limits: Limits,
-    /// Greatest radius as a multiple of the distance to the nearest surface ([`clearance`]); infinite
-    /// for no such bound.
+    /// Greatest radius as a multiple of the distance to the nearest surface ([`clearance`]), wherever that is more
+    /// than [`Estimator::finest`] and [`Effort::limits`] allow it; infinite for no such bound.
     ///
     /// [`clearance`]: fogbow::cache::clearance
+    /// [`Estimator::finest`]: fogbow::cache::Estimator::finest
     pub clearance: f32,
 }
 

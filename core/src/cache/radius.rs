@@ -88,7 +88,10 @@ const DIRECTIONS: u32 = 96;
 const GRAZING: f32 = 0.1;
 
 /// Distance (m) from `point` to the nearest surface, as far as evenly spread directions tell: all around
-/// in the medium, above the plane for a point on a surface with `normal`. Infinite where none is met.
+/// in the medium, above the plane for a point on a surface with `normal` (unit). Infinite where none is met.
+///
+/// Never too small; for a plane wall too large by 5 % at most, as no direction is more than 17° from one that is
+/// looked in, and by 14 % for a wall upright on the surface. What is smaller than such a gap may be missed.
 ///
 /// Light falls off towards a wall or into a corner in ways that gradients farther away do not foretell,
 /// and whose sphere reaches there leaves no room for a record that would know: so radii are limited by it.
