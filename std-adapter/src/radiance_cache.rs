@@ -3,11 +3,13 @@
 //! | file | holds |
 //! |---|---|
 //! | this one | [`Settings`], [`RadianceCaches`] |
-//! | `fill` | [`fill`]: where records are needed, and in which order they are made |
+//! | `fill` | [`fill`]: in which order the caches are made, and what each is made of |
+//! | `rounds` | where records are needed, rounds of new ones, better estimates for old ones |
 //! | `file` | [`save`], [`load`] |
 
 mod file;
 mod fill;
+mod rounds;
 
 use fogbow::cache::{Cache, Caches, Extrapolation, Limits, Reader, Reading, SurfaceCache, VolumeCache};
 use fogbow::sh::coefficient_count;
@@ -20,7 +22,8 @@ pub use fill::{FillError, Outcome, fill};
 pub struct Effort {
     /// `ε` of J's Eq. 34: larger is coarser.
     pub tolerance: f32,
-    /// Directions or random walks per record.
+    /// Directions or random walks of each of the two estimates of a record; fewer where it reaches less far than
+    /// others do.
     pub samples: u32,
     /// Degree of the expansions; 0 in isotropic media and on surfaces.
     pub degree: usize,
@@ -96,14 +99,15 @@ impl Settings {
 
     /// Of the records on surfaces that light all other records.
     fn coarse_irradiance(&self) -> Option<Effort> {
-        self.irradiance.map(|effort| effort.coarser(3.0, 2))
+        self.irradiance.map(|effort| effort.coarser(3.0, 4))
     }
 
-    /// Of the records at which random walks of the final ones end: as fine, with half the samples. What they get wrong
+    /// Of the records at which random walks of the final ones end: as fine, with a quarter of
+    /// the samples. What they get wrong
     /// is what all walks bring along, more of it with every scattering, and in corners most: so none reaches past a
     /// surface. Final ones gain nothing by that.
     fn coarse_multiple(&self) -> Option<Effort> {
-        self.multiple.map(|effort| Effort { clearance: effort.clearance.min(1.0), ..effort.coarser(1.0, 2) })
+        self.multiple.map(|effort| Effort { clearance: effort.clearance.min(1.0), ..effort.coarser(1.0, 4) })
     }
 }
 
