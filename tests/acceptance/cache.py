@@ -44,8 +44,10 @@ CORNELL = [f"cornell-{medium}-{phase}" for medium in ("homog", "hetero") for pha
 LADDER = [
     (None, 128, 16),
     (None, 256, 16),
-    (None, 512, 16),
+    (None, 320, 32),
+    (None, 384, 32),
     (None, 512, 32),
+    (None, 640, 32),
     (None, 768, 32),
     (None, 1024, 32),
     (None, 2048, 32),
