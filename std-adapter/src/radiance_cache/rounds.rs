@@ -297,7 +297,7 @@ where
                             .limits
                             .on_screen(least, most, self.pixel, *distance)
                             .within(self.reach(effort, place));
-                        let is_first = COARSE.contains(&stream) && number.wrapping_sub(start) < FIRST.0;
+                        let is_first = COARSE.contains(&stream) && start == 0 && *number < FIRST.0;
                         let count = samples(effort, limits.max, usual) * if is_first { FIRST.1 } else { 1 };
                         let mut learnt = Guide::default();
                         let looks = Looks { count, guide: None, learnt: Some(&mut learnt) };
