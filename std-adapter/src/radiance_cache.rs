@@ -102,9 +102,8 @@ impl Settings {
         self.irradiance.map(|effort| effort.coarser(3.0, 4))
     }
 
-    /// Of the records at which random walks of the final ones end: as fine, with a quarter of
-    /// the samples. What they get wrong
-    /// is what all walks bring along, more of it with every scattering, and in corners most: so none reaches past a
+    /// Of the records at which random walks of the final ones end: as fine, with a quarter of the samples. What they
+    /// get wrong is what all walks bring along, more of it with every scattering, and in corners most: so none reaches past a
     /// surface. Final ones gain nothing by that.
     fn coarse_multiple(&self) -> Option<Effort> {
         self.multiple.map(|effort| Effort { clearance: effort.clearance.min(1.0), ..effort.coarser(1.0, 4) })

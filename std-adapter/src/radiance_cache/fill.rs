@@ -58,7 +58,7 @@ impl core::error::Error for FillError {}
 
 /// Adds records to `caches` until every place that the eye rays ask for is covered.
 ///
-/// `eye_ray(number, [u, v])` is the camera's ray for a point of the film; `pixel` the angular width of a
+/// `eye_ray([u, v])` is the camera's ray for a point of the film; `pixel` the angular width of a
 /// pixel (rad). `estimator` brings the world; its surface cache is replaced by the one being filled.
 ///
 /// # Errors
@@ -92,8 +92,8 @@ fn lighting<'a>(
 /// enough: 3.6 instead of 2.6 % of error where scattering is forward.
 const REVISIONS: u64 = 2;
 
-/// Share of the second estimate in a final record. The first, blind one is noisier; that radii come from it has not shown
-/// in pictures at this share.
+/// Share of the second estimate in a final record. The first, blind one is noisier, and the radius comes from it; to keep
+/// a third of it takes the error of `cornell-homog-iso` from 2.04 to 1.87 %, and leaves its bias within 0.1 %.
 const SECOND: f32 = 0.67;
 
 /// What light a record in the medium holds.

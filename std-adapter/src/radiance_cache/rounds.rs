@@ -10,7 +10,7 @@ use fogbow::sampling::Generator;
 use fogbow::sampling::uniform::mix;
 use fogbow::sh::Coefficient;
 use fogbow::single_scatter::Sums;
-use fogbow::spectrum::Gradient;
+use fogbow::spectrum::{Gradient, Spectrum};
 use rayon::iter::{IntoParallelIterator, IntoParallelRefIterator, ParallelIterator};
 
 use super::{Effort, RadianceCaches, Settings};
@@ -51,8 +51,11 @@ pub(super) trait Fill: Sync {
     fn record(&self, number: usize) -> (Place, f32);
     /// Calls `visit(number, weight)` for the records that reach `point`.
     fn visit_near(&self, point: Vec3, visit: impl FnMut(usize, f32));
-    /// Mixes the share `new` of an estimate into a record.
-    fn blend(&mut self, number: usize, sums: &Sums, gradient: &Gradient, attached: Self::Attached, new: f32);
+    /// Value and gradient of a record.
+    fn light(&self, number: usize) -> (Spectrum, Gradient);
+    /// Mixes what a record has besides into `new`, of which the share `share` stays.
+    fn mix_into(&self, number: usize, new: &mut Self::Attached, share: f32);
+    fn replace(&mut self, number: usize, value: Spectrum, gradient: &Gradient, attached: &Self::Attached);
 }
 
 impl Fill for VolumeCache<'_> {
@@ -80,15 +83,17 @@ impl Fill for VolumeCache<'_> {
     fn visit_near(&self, point: Vec3, mut visit: impl FnMut(usize, f32)) {
         self.visit(point, |number, _, share| visit(number as usize, 1.0 - share));
     }
-    fn blend(&mut self, number: usize, sums: &Sums, gradient: &Gradient, mut higher: Vec<Coefficient>, new: f32) {
-        let old = self.records()[number];
-        for (coefficient, old) in higher.iter_mut().zip(self.attached(number as u32)) {
-            coefficient.value = coefficient.value * new + old.value * (1.0 - new);
-            coefficient.gradient = coefficient.gradient * new + old.gradient * (1.0 - new);
+    fn light(&self, number: usize) -> (Spectrum, Gradient) {
+        (self.records()[number].value, self.records()[number].gradient)
+    }
+    fn mix_into(&self, number: usize, new: &mut Vec<Coefficient>, share: f32) {
+        for (new, old) in new.iter_mut().zip(self.attached(number as u32)) {
+            new.value = new.value * share + old.value * (1.0 - share);
+            new.gradient = new.gradient * share + old.gradient * (1.0 - share);
         }
-        let (value, gradient) =
-            (sums.value * new + old.value * (1.0 - new), *gradient * new + old.gradient * (1.0 - new));
-        self.revise(number as u32, value, &gradient, &higher);
+    }
+    fn replace(&mut self, number: usize, value: Spectrum, gradient: &Gradient, higher: &Vec<Coefficient>) {
+        self.revise(number as u32, value, gradient, higher);
     }
 }
 
@@ -117,14 +122,16 @@ impl Fill for SurfaceCache<'_> {
     fn visit_near(&self, point: Vec3, mut visit: impl FnMut(usize, f32)) {
         self.visit(point, |number, _, share| visit(number as usize, 1.0 - share));
     }
-    fn blend(&mut self, number: usize, sums: &Sums, gradient: &Gradient, mut facing: Facing, new: f32) {
-        let old = self.records()[number];
+    fn light(&self, number: usize) -> (Spectrum, Gradient) {
+        (self.records()[number].value, self.records()[number].gradient)
+    }
+    fn mix_into(&self, number: usize, new: &mut Facing, share: f32) {
         if let Some(old) = self.attached(number as u32).first() {
-            facing.turn = facing.turn * new + old.turn * (1.0 - new);
+            new.turn = new.turn * share + old.turn * (1.0 - share);
         }
-        let (value, gradient) =
-            (sums.value * new + old.value * (1.0 - new), *gradient * new + old.gradient * (1.0 - new));
-        self.revise(number as u32, value, &gradient, &[facing]);
+    }
+    fn replace(&mut self, number: usize, value: Spectrum, gradient: &Gradient, facing: &Facing) {
+        self.revise(number as u32, value, gradient, &[*facing]);
     }
 }
 
@@ -135,22 +142,31 @@ pub(super) struct Estimate<A> {
     learnt: Guide,
 }
 
-/// Mixes the share `new` of new estimates into the records from a number on, and adds to what was learnt; how many.
+/// Mixes new estimates, of which the share `share` stays, into the records from a number on, and adds to what was
+/// learnt; how many.
 pub(super) fn blend<C: Fill>(
     cache: &mut Option<C>,
     effort: Option<Effort>,
     from: usize,
     estimates: Vec<Estimate<C::Attached>>,
     guides: &mut [Guide],
-    new: f32,
+    share: f32,
 ) -> u64 {
     let (Some(cache), Some(effort)) = (cache, effort) else { return 0 };
     let count = estimates.len() as u64;
-    for (i, Estimate { sums, attached, learnt }) in estimates.into_iter().enumerate() {
+    for (i, Estimate { sums, mut attached, learnt }) in estimates.into_iter().enumerate() {
         // Within its radius a record changes by a factor of e to the tolerance at most.
         let number = from + i;
         let reach = cache.record(number).1 / effort.tolerance;
-        cache.blend(number, &sums, &clamp_gradient(&sums.gradient, sums.value, reach), attached, new);
+        let (value, gradient) = cache.light(number);
+        let new = clamp_gradient(&sums.gradient, sums.value, reach);
+        cache.mix_into(number, &mut attached, share);
+        cache.replace(
+            number,
+            sums.value * share + value * (1.0 - share),
+            &(new * share + gradient * (1.0 - share)),
+            &attached,
+        );
         if let Some(guide) = guides.get_mut(i) {
             guide.merge(&learnt, 1.0);
         }
@@ -161,7 +177,7 @@ pub(super) fn blend<C: Fill>(
 /// Streams of random numbers of the caches that all others stand on.
 pub(super) const COARSE: [u64; 2] = [4, 5];
 
-/// Of those, the first records get so many times the samples: what they have wrong nothing averages out.
+/// Of those, so many first records get so many times the samples: what they have wrong nothing averages out.
 const FIRST: (u64, u32) = (100, 8);
 
 /// Records of which nothing usual can be said.
@@ -177,8 +193,9 @@ fn usual_radius<C: Fill>(cache: &C) -> f32 {
     squares / sum
 }
 
-/// Samples for a record that reaches `radius` (m): what reaches less far than others lights fewer pixels, and noise of the
-/// picture per second is least where samples go as radii. No fewer than a quarter, as noise makes dark corners too bright.
+/// Samples for a record that reaches `radius` (m): what reaches less far than `usual` lights fewer pixels. If one sample is
+/// as noisy everywhere, the noise of a picture whose records light areas `R²` is least, for a given sum of samples, where
+/// these go as `R`. No fewer than a quarter, because dark corners are where that is not so.
 fn samples(effort: &Effort, radius: f32, usual: f32) -> u32 {
     let share = if radius < usual { (radius / usual).max(0.25) } else { 1.0 };
     ((effort.samples as f32 * share) as u32).max(16)
@@ -284,7 +301,7 @@ where
                     break;
                 }
                 let chosen = self.choose(frozen, effort, &open);
-                // Radii turn out to be about half of what bounds them.
+                // Of a new record only the bound of its radius is known: twice as strict with it as with radii.
                 let usual = 3.0 * usual_radius(frozen);
                 let numbered: Vec<(u64, Wanted)> =
                     chosen.into_iter().enumerate().map(|(i, w)| (start.wrapping_add(computed + i as u64), w)).collect();
