@@ -99,14 +99,14 @@ impl Settings {
 
     /// Of the records on surfaces that light all other records.
     fn coarse_irradiance(&self) -> Option<Effort> {
-        self.irradiance.map(|effort| effort.coarser(3.0, 4))
+        self.irradiance.map(|effort| effort.coarser(3.0, 8))
     }
 
-    /// Of the records at which random walks of the final ones end: as fine, with a quarter of the samples. What they
+    /// Of the records at which random walks of the final ones end: as fine, with an eighth of the samples. What they
     /// get wrong is what all walks bring along, more of it with every scattering, and in corners most: so none reaches past a
     /// surface. Final ones gain nothing by that.
     fn coarse_multiple(&self) -> Option<Effort> {
-        self.multiple.map(|effort| Effort { clearance: effort.clearance.min(1.0), ..effort.coarser(1.0, 4) })
+        self.multiple.map(|effort| Effort { clearance: effort.clearance.min(1.0), ..effort.coarser(1.0, 8) })
     }
 }
 

@@ -42,16 +42,16 @@ CORNELL = [f"cornell-{medium}-{phase}" for medium in ("homog", "hetero") for pha
 
 # --tolerance (of all caches; None: defaults), --paths, --spp; the cheapest first.
 LADDER = [
-    (None, 128, 16),
     (None, 256, 16),
-    (None, 320, 32),
-    (None, 384, 32),
+    (None, 384, 16),
+    (None, 512, 16),
     (None, 512, 32),
     (None, 640, 32),
     (None, 768, 32),
     (None, 1024, 32),
+    (None, 1536, 32),
     (None, 2048, 32),
-    (0.5, 2048, 64),
+    (0.5, 4096, 64),
 ]
 
 
@@ -180,7 +180,7 @@ def reuse(_, arguments):
 def determinism(scenes, _):
     failures = 0
     for scene in scenes or ["cornell-hetero-hg06", "spot-shafts", "room-plume"]:
-        few = (*CACHED, "--size", "64x64", "--spp", 4, "--paths", 64)
+        few = (*CACHED, "--size", "64x64", "--spp", 4, "--paths", 128)
         with tempfile.TemporaryDirectory() as folder:
             cache = os.path.join(folder, "scene.cache")
             runs = {f"{threads} threads": ("--threads", threads) for threads in (1, 2, 7)}

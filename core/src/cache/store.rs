@@ -29,7 +29,7 @@ pub struct Cache<'s, E> {
     stride: usize,
 }
 
-/// By how much spheres are widened for points that none contains.
+/// By how much spheres are widened: in the medium for points that none contains, on surfaces against noise.
 const WIDE: f32 = 2.0;
 
 /// In-scattered radiance in a medium.
@@ -40,7 +40,7 @@ pub type SurfaceCache<'s> = Cache<'s, Facing>;
 
 impl<'s, E: Pod> Cache<'s, E> {
     /// An empty cache in lent or growing storage, with `stride` attachments per record. `wide` is the
-    /// index that [`Cache::finish`] makes for gaps; it needs two to three times the room of `index`.
+    /// index that [`Cache::finish`] makes of spheres twice as large; it needs two to three times the room of `index`.
     #[must_use]
     pub fn new(
         records: impl Into<List<'s, Record>>,
@@ -159,8 +159,8 @@ impl<'s, E: Pod> Cache<'s, E> {
         attached.into_iter().try_for_each(|element| self.attached.push(element))
     }
 
-    /// After filling, before many look-ups: brings all records into the index, and prepares for points in
-    /// the gaps between them. Until then those are misses.
+    /// After filling, before many look-ups: brings all records into the index, and makes the one of wider spheres. Until
+    /// then points in the gaps between them are misses.
     ///
     /// # Errors
     /// [`Full`] when an index's lent storage has no room left.
@@ -170,12 +170,17 @@ impl<'s, E: Pod> Cache<'s, E> {
         self.wide.rebuild(records.len() as u32, |i| (records[i as usize].position, WIDE * records[i as usize].radius))
     }
 
+    /// Whether nothing was inserted since [`Cache::finish`].
+    pub(super) fn is_finished(&self) -> bool {
+        self.wide.len() as usize == self.len()
+    }
+
     fn rebuild(&mut self) -> Result<(), Full> {
         let records = self.records.as_slice();
         self.index.rebuild(records.len() as u32, |i| (records[i as usize].position, records[i as usize].radius))
     }
 
-    /// As [`Cache::visit`], with every sphere twice as large: for points that no sphere contains.
+    /// As [`Cache::visit`], with every sphere twice as large; of the records there were at [`Cache::finish`].
     #[inline]
     pub fn visit_wide(&self, point: Vec3, mut visit: impl FnMut(u32, &Record, f32)) {
         let records = self.records();

@@ -39,7 +39,7 @@ pub struct CacheArguments {
     #[arg(long, value_name = "CACHE=E", value_parser = named)]
     pub tolerance_of: Vec<(Kind, f64)>,
     /// Random walks of each of the two estimates of a record of multiple scattering, fewer where it reaches less far
-    /// than others; the other caches in proportion [default: 1024].
+    /// than others; the other caches in proportion [default: 2048].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     pub paths: Option<u32>,
     /// Degree of expansions in anisotropic media [default: from the phase function].
@@ -163,7 +163,7 @@ pub(super) fn check_depth(paths: &path::Settings) -> Result<(), String> {
 }
 
 /// Random walks per record of multiple scattering, unless the user says otherwise.
-const PATHS: u32 = 1024;
+const PATHS: u32 = 2048;
 
 /// Samples of all lights with extent together, for a record of single scattering.
 const LIGHT_SAMPLES: u32 = 128;
@@ -204,7 +204,7 @@ impl CacheJob<'_> {
     fn efforts(&self, phase: &Phase) -> cache::Settings {
         let size = self.world.bounds().size().max_element();
         let arguments = self.arguments;
-        let scale = f64::from(arguments.paths.unwrap_or(PATHS)) / 512.0;
+        let scale = f64::from(arguments.paths.unwrap_or(PATHS)) / 1024.0;
         let effort = |kind: Kind, tolerance: f64, samples: f64, degree: usize, most: f32| {
             let named = arguments.tolerance_of.iter().rev().find(|(k, _)| *k == kind).map(|(_, e)| *e);
             let effort = Effort {
@@ -232,7 +232,7 @@ impl CacheJob<'_> {
         cache::Settings {
             single: if cached { effort(Kind::Single, 0.2, 16.0, degree(1, 0.0), 0.1) } else { None },
             surface: effort(Kind::Surface, 2.0, 256.0, degree(1, 1.5), 0.1),
-            multiple: effort(Kind::Multiple, breadth, 512.0, degree(2, 0.0), 0.1),
+            multiple: effort(Kind::Multiple, breadth, 1024.0, degree(2, 0.0), 0.1),
             irradiance: effort(Kind::Irradiance, 0.35, 512.0, 0, 0.1),
             rays: 16384,
             extrapolation: arguments.extrapolation.map_or_else(Extrapolation::default, Into::into),

@@ -83,7 +83,7 @@ fn pair(plan: &Plan, scene: &Path, size: [u32; 2], options: &[&str]) -> Result<P
     let samples = if plan.quick { "8" } else { "32" };
     let mut words = vec!["--method", "radiance-cache", "--spp", samples];
     if plan.quick {
-        words.extend(["--paths", "32", "--tolerance-of", "multiple=2", "--tolerance-of", "surface=3"]);
+        words.extend(["--paths", "64", "--tolerance-of", "multiple=2", "--tolerance-of", "surface=3"]);
         words.extend(["--tolerance-of", "irradiance=1", "--tolerance-of", "single=0.5"]);
     }
     words.extend(options);

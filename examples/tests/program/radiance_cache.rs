@@ -83,7 +83,7 @@ fn mean(image: &Image) -> f64 {
 fn means(name: &str, world: &World, samples: &str, options: &[&str]) -> [f64; 2] {
     let folder = Folder::new(&format!("edge-{name}"));
     std::fs::write(folder.0.join("scene.xml"), world.text()).unwrap();
-    let cached = picture(&folder, "radiance-cache", &[&["--paths", "512", "--seed", "3"], options].concat());
+    let cached = picture(&folder, "radiance-cache", &[&["--paths", "1024", "--seed", "3"], options].concat());
     let traced = picture(&folder, "path", &[&["--spp", samples], options].concat());
     [mean(&cached), mean(&traced)]
 }
@@ -198,7 +198,7 @@ fn a_camera_in_the_medium_and_single_pixels_look_as_path_traced() {
     let world = World::of(&[FOG, CONTAINER, WALLS, LAMP]);
     let folder = Folder::new("edge-pixel");
     std::fs::write(folder.0.join("scene.xml"), world.text()).unwrap();
-    let cached = mean(&picture(&folder, "radiance-cache", &[&pixel[..], &["--spp", "512", "--paths", "64"]].concat()));
+    let cached = mean(&picture(&folder, "radiance-cache", &[&pixel[..], &["--spp", "512", "--paths", "128"]].concat()));
     let traced = mean(&picture(&folder, "path", &[&pixel[..], &["--spp", "100000"]].concat()));
     assert!((cached - traced).abs() <= FEW_PER_CENT * traced, "{cached} by caching, {traced} by paths");
 }
