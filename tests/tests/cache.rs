@@ -5,6 +5,7 @@ use fogbow::cache::{
     clamp_gradient, exponent_limit, log_gradient_radius, neighbour_clamped, valid_radius, weight,
 };
 use fogbow::math::Vec3;
+use fogbow::sampling::{Generator, uniform};
 use fogbow::sh::Coefficient;
 use fogbow::single_scatter::{Contribution, Sums};
 use fogbow::spectrum::{Gradient, Spectrum};
@@ -520,8 +521,8 @@ fn scattered(count: usize, stride: usize) -> VolumeCache<'static> {
 
 /// Numbers in [0, 1).
 fn random() -> impl FnMut() -> f32 {
-    let mut rng = fogbow::sampling::Generator::new(5);
-    move || fogbow::sampling::uniform(&mut rng)
+    let mut rng = Generator::new(5);
+    move || uniform(&mut rng)
 }
 
 #[test]
@@ -603,6 +604,43 @@ fn floor() -> SurfaceCache<'static> {
     let facing = Facing { normal: Vec3::Y, turn: Gradient::outer(Spectrum::splat(0.8), Vec3::X) };
     cache.insert(Record { gradient, ..record(Vec3::ZERO, 1.0) }, &[facing]).unwrap();
     cache
+}
+
+/// Once filling is done, more records speak for a point: noise that differs from record to record is averaged over
+/// them, and light that changes evenly stays as it is.
+#[test]
+fn finished_irradiance_averages_noise_and_keeps_slopes() {
+    let slope = Gradient::outer(Spectrum::splat(0.5), Vec3::X);
+    let facing = Facing { normal: Vec3::Y, turn: Gradient::ZERO };
+    let truth = |point: Vec3| 10.0 + 0.5 * point.x;
+    let filled = |noise: f32| {
+        let mut cache: SurfaceCache<'static> = Cache::growing(1);
+        let mut rng = Generator::new(7);
+        for i in 0..400 {
+            let at = Vec3::new((i % 20) as f32, 0.0, (i / 20) as f32) * 0.8;
+            let value = Spectrum::splat(truth(at) + noise * (uniform(&mut rng) - 0.5));
+            cache.insert(Record { value, gradient: slope, ..record(at, 1.0) }, &[facing]).unwrap();
+        }
+        cache
+    };
+    let reading = Reading::new(0.35);
+    let error = |cache: &SurfaceCache<'_>| {
+        let mut rng = Generator::new(8);
+        let squares = (0..500).map(|_| {
+            let [x, z] = [uniform(&mut rng), uniform(&mut rng)].map(|u| 3.0 + 9.0 * u);
+            let point = Vec3::new(x, 0.0, z);
+            (cache.lookup(point, Vec3::Y, &reading).unwrap()[0] - truth(point)).powi(2)
+        });
+        (squares.sum::<f32>() / 500.0).sqrt()
+    };
+    let mut cache = filled(1.0);
+    let before = error(&cache);
+    cache.finish().unwrap();
+    let after = error(&cache);
+    assert!(after < 0.6 * before, "{before} before, {after} after");
+    let mut exact = filled(0.0);
+    exact.finish().unwrap();
+    assert!(error(&exact) < 1e-4, "{}", error(&exact));
 }
 
 #[test]
