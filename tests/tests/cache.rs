@@ -402,8 +402,8 @@ proptest! {
         prop_assume!(to_eye.length() > 0.1);
         let to_eye = to_eye.normalize();
         let mut cache: VolumeCache<'_> = Cache::growing((degree + 1) * (degree + 1) - 1);
-        let mut rng = fogbow::sampling::Generator::new(seed);
-        let mut unit = || fogbow::sampling::uniform(&mut rng);
+        let mut rng = Generator::new(seed);
+        let mut unit = || uniform(&mut rng);
         for _ in 0..5 {
             let position = Vec3::new(unit(), unit(), unit()) - 0.5;
             let higher: Vec<_> = (0..cache.stride())
