@@ -4,7 +4,7 @@ use glam::Vec3;
 
 use super::extrapolate::{Blend, Extrapolation, exponent_limit, weight};
 use super::record::{Facing, Record};
-use super::store::{SurfaceCache, VolumeCache};
+use super::store::{SurfaceCache, VolumeCache, WIDE};
 use crate::math::float;
 use crate::sh::{self, Coefficient, MAX_COEFFICIENTS};
 use crate::single_scatter::Contribution;
@@ -15,6 +15,10 @@ const TURN: f32 = 2.0;
 
 /// How sharply they stop off their plane: at `1/OFFSET` of their radius.
 const OFFSET: f32 = 40.0;
+
+/// By how much spheres of irradiance are widened against noise, at most [`WIDE`]: twice is better where light comes
+/// from fog, worse where it has sharp borders.
+const READ_AT: f32 = 1.5;
 
 /// How a cache is read.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -206,13 +210,15 @@ impl SurfaceCache<'_> {
     ///
     /// A record counts less the farther it is, the more its normal differs and the more the point
     /// lies off its plane; its value changes with position and with the normal (vector irradiance). From
-    /// [`Cache::finish`](super::Cache::finish) on, records reach twice as far: noise is averaged over four times as many.
+    /// [`Cache::finish`](super::Cache::finish) on, records reach half as far again: noise is averaged over twice as many.
     #[inline]
     #[must_use]
     pub fn lookup(&self, point: Vec3, normal: Vec3, reading: &Reading) -> Option<Spectrum> {
         let mut blend = reading.blend();
-        let add = |i, record: &Record, share| {
-            self.facing(i, record, share, (point, normal), reading.margin, |facing, d| {
+        let is_finished = self.is_finished();
+        let scale = if is_finished { WIDE / READ_AT } else { 1.0 };
+        let add = |i, record: &Record, share: f32| {
+            self.facing(i, record, share * scale, (point, normal), reading.margin, |facing, d| {
                 let turned = facing.turn.along(normal - facing.normal);
                 blend.add(weight(d), record.value + turned, &record.gradient, point - record.position);
             });

@@ -30,7 +30,7 @@ pub struct Cache<'s, E> {
 }
 
 /// By how much spheres are widened: in the medium for points that none contains, on surfaces against noise.
-const WIDE: f32 = 2.0;
+pub(super) const WIDE: f32 = 2.0;
 
 /// In-scattered radiance in a medium.
 pub type VolumeCache<'s> = Cache<'s, Coefficient>;
