@@ -587,6 +587,14 @@ fn gaps_are_filled_by_the_nearest_once_filling_is_done() {
     cache.finish().unwrap();
     assert!(at(&cache, 1.5).is_some() && !cache.covers(Vec3::X * 1.5, &reading));
     assert_eq!(at(&cache, 2.5), None);
+
+    let (mut floor, reading) = (floor(), Reading::new(0.5));
+    let at = |floor: &SurfaceCache<'_>, x: f32| floor.lookup(Vec3::X * x, Vec3::Y, &reading);
+    assert_eq!(at(&floor, 1.1), None);
+    floor.finish().unwrap();
+    // Beyond what is read for the sake of noise, too.
+    assert!(at(&floor, 1.4).is_some() && at(&floor, 1.9).is_some());
+    assert_eq!(at(&floor, 2.1), None);
 }
 
 #[test]

@@ -210,25 +210,32 @@ impl SurfaceCache<'_> {
     ///
     /// A record counts less the farther it is, the more its normal differs and the more the point
     /// lies off its plane; its value changes with position and with the normal (vector irradiance). From
-    /// [`Cache::finish`](super::Cache::finish) on, records reach half as far again: noise is averaged over twice as many.
+    /// [`Cache::finish`](super::Cache::finish) on, records reach half as far again, and in gaps twice as far: noise is
+    /// averaged over twice as many.
     #[inline]
     #[must_use]
     pub fn lookup(&self, point: Vec3, normal: Vec3, reading: &Reading) -> Option<Spectrum> {
+        let at = |width: f32| self.mixed(point, normal, reading, width);
+        let light = if self.is_finished() { at(READ_AT).or_else(|| at(WIDE)) } else { at(1.0) };
+        light.map(|light| light.max(Spectrum::ZERO))
+    }
+
+    /// The mixture of all records whose spheres, as many times as wide as `width` (1, or up to [`WIDE`]) says, reach a point.
+    #[inline]
+    fn mixed(&self, point: Vec3, normal: Vec3, reading: &Reading, width: f32) -> Option<Spectrum> {
         let mut blend = reading.blend();
-        let is_finished = self.is_finished();
-        let scale = if is_finished { WIDE / READ_AT } else { 1.0 };
-        let add = |i, record: &Record, share: f32| {
-            self.facing(i, record, share * scale, (point, normal), reading.margin, |facing, d| {
+        let mut add = |i, record: &Record, share| {
+            self.facing(i, record, share, (point, normal), reading.margin, |facing, d| {
                 let turned = facing.turn.along(normal - facing.normal);
                 blend.add(weight(d), record.value + turned, &record.gradient, point - record.position);
             });
         };
-        if self.is_finished() {
-            self.visit_wide(point, add)
+        if width > 1.0 {
+            self.visit_wide(point, |i, record, share| add(i, record, share * (WIDE / width)));
         } else {
-            self.visit(point, add)
+            self.visit(point, add);
         }
-        blend.value().map(|light| light.max(Spectrum::ZERO))
+        blend.value()
     }
 
     /// Whether a record reaches `point` on a surface with `normal`.
