@@ -109,9 +109,20 @@ pub trait Medium {
     /// nothing follows it is infinite.
     fn stretch(&self, ray: &Ray, from: f32) -> Stretch;
 
+    /// As [`Medium::stretch`], for marching: bounds that differ may be loose, so where extinction changes the answer
+    /// should reach as far as it does.
+    fn run(&self, ray: &Ray, from: f32) -> Stretch {
+        self.stretch(ray, from)
+    }
+
     /// Extinction alone (m⁻¹), where a cheaper answer exists.
     fn extinction(&self, point: Vec3) -> Spectrum {
         self.properties(point).extinction()
+    }
+
+    /// Extinction (m⁻¹) and its gradient (m⁻²), as [`Medium::gradients`] has it, where both together are cheaper.
+    fn extinction_with_gradient(&self, point: Vec3) -> (Spectrum, Gradient) {
+        (self.extinction(point), self.gradients(point).extinction)
     }
 
     /// Length (m) over which coefficients vary: the step of the default's differences and of ray
@@ -184,8 +195,14 @@ impl<M: Medium + ?Sized> Medium for &M {
     fn stretch(&self, ray: &Ray, from: f32) -> Stretch {
         (**self).stretch(ray, from)
     }
+    fn run(&self, ray: &Ray, from: f32) -> Stretch {
+        (**self).run(ray, from)
+    }
     fn extinction(&self, point: Vec3) -> Spectrum {
         (**self).extinction(point)
+    }
+    fn extinction_with_gradient(&self, point: Vec3) -> (Spectrum, Gradient) {
+        (**self).extinction_with_gradient(point)
     }
     fn resolution(&self) -> f32 {
         (**self).resolution()

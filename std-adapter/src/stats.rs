@@ -7,7 +7,7 @@ use std::time::Instant;
 use fogbow::glam::Vec3;
 use fogbow::host::{Face, Gradients, Hit, Medium, Properties, Scene, Stretch};
 use fogbow::math::{Ray, Symmetric3};
-use fogbow::spectrum::{Hessian, Spectrum};
+use fogbow::spectrum::{Gradient, Hessian, Spectrum};
 
 /// How often the world was asked.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -166,9 +166,19 @@ impl<M: Medium> Medium for CountingMedium<'_, M> {
         self.medium.stretch(ray, from)
     }
     #[inline]
+    fn run(&self, ray: &Ray, from: f32) -> Stretch {
+        raise(&self.tally.stretches);
+        self.medium.run(ray, from)
+    }
+    #[inline]
     fn extinction(&self, point: Vec3) -> Spectrum {
         raise(&self.tally.lookups);
         self.medium.extinction(point)
+    }
+    #[inline]
+    fn extinction_with_gradient(&self, point: Vec3) -> (Spectrum, Gradient) {
+        raise(&self.tally.lookups);
+        self.medium.extinction_with_gradient(point)
     }
     #[inline]
     fn resolution(&self) -> f32 {

@@ -10,7 +10,7 @@ use super::store::{SurfaceCache, VolumeCache};
 use crate::host::{Hit, Medium, Properties, Rng, Scene};
 use crate::light::Light;
 use crate::math::{Frame, Ray, float};
-use crate::multiple_scatter::{self, Cones, Incoming, Walk};
+use crate::multiple_scatter::{Collision, self, Cones, Incoming, Walk};
 use crate::path::trace::leave;
 use crate::path::{self, World};
 use crate::phase::Phase;
@@ -179,7 +179,8 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
                 let ray = Ray::new(point, to_light);
                 let end = nearest_surface(&ray, self.world.scene);
                 let u = third + THIRD * j as f32;
-                let incoming = self.walked(&walk, ray, end.as_ref(), pdf, u - libm::floorf(u), rng) * share;
+                let flown = walk.first(&ray, end.as_ref(), u - libm::floorf(u), false, rng);
+                let incoming = self.walked(&walk, ray, end.as_ref(), pdf, flown.collision, rng) * share;
                 if let Some(learnt) = &mut learnt {
                     learnt.add(to_light, incoming.irradiance.mean() * count as f32, pdf, count);
                 }
@@ -201,7 +202,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
         ray: Ray,
         end: Option<&Hit>,
         pdf: f32,
-        u: f32,
+        first: Option<Collision>,
         rng: &mut impl Rng,
     ) -> Incoming {
         let mut child = Generator::child(rng);
@@ -214,7 +215,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
             light += more;
             Some((light, turned + turned_more))
         };
-        self.steadied(walk.along(ray, end, pdf, u, outgoing, known, rng))
+        self.steadied(walk.along(ray, end, pdf, first, outgoing, known, rng))
     }
 
     /// An arrival whose gradient is no larger than [`Estimator::finest`] lets it be.
@@ -258,22 +259,23 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
             }
             let weight = share * cosine / pdf;
             let ray = Ray::new(leave(point, normal, to_light, 0.0), to_light);
-            let marching = Marching { steps: self.walk.steps, offset: uniform(rng) };
             let mut total = Contribution::ZERO;
             let end = nearest_surface(&ray, self.world.scene);
+            let u = third + THIRD * j as f32;
+            let flown = walk.first(&ray, end.as_ref(), u - libm::floorf(u), end.is_some(), rng);
             // How the cosine changes as what is seen stays.
             let tilt = (to_light * cosine - normal) / cosine.max(MIN_COSINE);
             if let Some(hit) = &end {
                 let radiance = self.outgoing(&ray, hit, &mut child);
-                let arrival = Arrival::from_surface(&ray, hit, radiance, 1.0, self.world.medium, marching);
+                let through = || flown.whole.unwrap_or_default().transmittance();
+                let arrival = Arrival::from_surface_through(&ray, hit, radiance, 1.0, through);
                 if let Some(arrival) = arrival {
                     let light = tilted(&self.steadied(arrival), tilt) * weight;
                     sums.add(&light, true);
                     total += light;
                 }
             }
-            let u = third + THIRD * j as f32;
-            let light = self.walked(&walk, ray, end.as_ref(), 1.0, u - libm::floorf(u), rng);
+            let light = self.walked(&walk, ray, end.as_ref(), 1.0, flown.collision, rng);
             let light = tilted(&light, tilt) * weight;
             scattered.add(to_light, &light);
             total += light;

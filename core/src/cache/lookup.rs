@@ -6,7 +6,7 @@ use super::extrapolate::{Blend, Extrapolation, exponent_limit, weight};
 use super::record::{Facing, Record};
 use super::store::{SurfaceCache, VolumeCache, WIDE};
 use crate::math::float;
-use crate::sh::{self, Coefficient, MAX_COEFFICIENTS};
+use crate::sh::{self, MAX_COEFFICIENTS};
 use crate::single_scatter::Contribution;
 use crate::spectrum::{Gradient, Spectrum};
 
@@ -100,9 +100,9 @@ impl TurningBasis {
     }
 
     /// How an expansion changes as the direction turns.
-    fn turned(&self, higher: &[Coefficient]) -> Gradient {
+    fn turned(&self, higher: &[Spectrum]) -> Gradient {
         let slopes = self.slopes.get(1..self.basis.count).unwrap_or(&[]);
-        higher.iter().zip(slopes).fold(Gradient::ZERO, |sum, (c, slope)| sum + Gradient::outer(c.value, *slope))
+        higher.iter().zip(slopes).fold(Gradient::ZERO, |sum, (&c, slope)| sum + Gradient::outer(c, *slope))
     }
 }
 
@@ -165,7 +165,7 @@ impl VolumeCache<'_> {
         reading: &Reading,
     ) -> Option<(Contribution, Gradient)> {
         let mut blend = reading.blend();
-        let (mut slope, mut turned) = (Gradient::ZERO, Gradient::ZERO);
+        let (mut slope, mut mixed) = (Gradient::ZERO, [Spectrum::ZERO; TURNING_COEFFICIENTS]);
         let higher = basis.basis.higher();
         self.visit(point, |i, record, share| {
             let d = 1.0 - share - reading.margin;
@@ -176,11 +176,11 @@ impl VolumeCache<'_> {
             let weight = weight(d);
             blend.add(weight, value, &gradient, point - record.position);
             slope += gradient * weight;
-            turned += basis.turned(self.attached(i)) * weight;
+            mixed.iter_mut().zip(self.attached(i)).for_each(|(sum, c)| *sum += c.value * weight);
         });
         let radiance = blend.value()?;
         let share = 1.0 / blend.weight();
-        Some((Contribution { radiance, gradient: slope * share }, turned * share))
+        Some((Contribution { radiance, gradient: slope * share }, basis.turned(&mixed) * share))
     }
 
     /// Whether a record reaches `point`.

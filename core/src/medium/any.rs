@@ -6,7 +6,7 @@ use super::{Grid, Homogeneous, Noise};
 use crate::host::{Face, Gradients, Medium, Properties, Stretch};
 use crate::math::Ray;
 use crate::phase::Phase;
-use crate::spectrum::{Hessian, Spectrum};
+use crate::spectrum::{Gradient, Hessian, Spectrum};
 
 /// A medium of any of the kinds made here.
 ///
@@ -57,8 +57,16 @@ impl Medium for AnyMedium<'_> {
         each!(self, medium => medium.stretch(ray, from))
     }
     #[inline]
+    fn run(&self, ray: &Ray, from: f32) -> Stretch {
+        each!(self, medium => medium.run(ray, from))
+    }
+    #[inline]
     fn extinction(&self, point: Vec3) -> Spectrum {
         each!(self, medium => medium.extinction(point))
+    }
+    #[inline]
+    fn extinction_with_gradient(&self, point: Vec3) -> (Spectrum, Gradient) {
+        each!(self, medium => medium.extinction_with_gradient(point))
     }
     fn resolution(&self) -> f32 {
         each!(self, medium => medium.resolution())

@@ -105,23 +105,40 @@ impl Cell {
     #[inline]
     pub(super) fn value(&self, density: &Density<'_>) -> f32 {
         let (v, unit) = self.corner_values(density);
-        let f = self.fraction;
-        // `a + (b − a) f` returns a constant unchanged, which weights that sum to 1 would not.
-        let (y0, y1) = (lerp(v[0], v[1], f.x), lerp(v[2], v[3], f.x));
-        let (y2, y3) = (lerp(v[4], v[5], f.x), lerp(v[6], v[7], f.x));
-        lerp(lerp(y0, y1, f.y), lerp(y2, y3, f.y), f.z) * unit
+        self.value_of(&v) * unit
     }
 
     /// Gradient of density, per cell, in cell coordinates.
     #[inline]
     pub(super) fn gradient(&self, density: &Density<'_>) -> Vec3 {
         let (v, unit) = self.corner_values(density);
+        self.gradient_of(&v) * unit
+    }
+
+    /// Both, from the same corners.
+    #[inline]
+    pub(super) fn value_and_gradient(&self, density: &Density<'_>) -> (f32, Vec3) {
+        let (v, unit) = self.corner_values(density);
+        (self.value_of(&v) * unit, self.gradient_of(&v) * unit)
+    }
+
+    #[inline]
+    fn value_of(&self, v: &[f32; 8]) -> f32 {
+        let f = self.fraction;
+        // `a + (b − a) f` returns a constant unchanged, which weights that sum to 1 would not.
+        let (y0, y1) = (lerp(v[0], v[1], f.x), lerp(v[2], v[3], f.x));
+        let (y2, y3) = (lerp(v[4], v[5], f.x), lerp(v[6], v[7], f.x));
+        lerp(lerp(y0, y1, f.y), lerp(y2, y3, f.y), f.z)
+    }
+
+    #[inline]
+    fn gradient_of(&self, v: &[f32; 8]) -> Vec3 {
         let f = self.fraction;
         let bilinear = |a: f32, b: f32, c: f32, d: f32, s: f32, t: f32| lerp(lerp(a, b, s), lerp(c, d, s), t);
         let x = bilinear(v[1] - v[0], v[3] - v[2], v[5] - v[4], v[7] - v[6], f.y, f.z);
         let y = bilinear(v[2] - v[0], v[3] - v[1], v[6] - v[4], v[7] - v[5], f.x, f.z);
         let z = bilinear(v[4] - v[0], v[5] - v[1], v[6] - v[2], v[7] - v[3], f.x, f.y);
-        Vec3::new(x, y, z) * unit
+        Vec3::new(x, y, z)
     }
 }
 

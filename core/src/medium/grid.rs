@@ -3,6 +3,7 @@
 use glam::{Affine3, Mat3, Vec3};
 
 use super::density::{Cell, Density, cell_count};
+use super::grid_stretch::Joining;
 use super::majorant::{Field, MinMax, Reach, blocks_along};
 use super::region::BoxRegion;
 use super::{MediumError, ball};
@@ -250,12 +251,36 @@ impl Medium for Grid<'_> {
     /// for all costs less than asking again.
     #[inline]
     fn stretch(&self, ray: &Ray, from: f32) -> Stretch {
-        self.joined_stretch(ray, from)
+        self.joined_stretch(ray, from, Joining::Tight)
+    }
+
+    #[inline]
+    fn run(&self, ray: &Ray, from: f32) -> Stretch {
+        self.joined_stretch(ray, from, Joining::Loose)
     }
 
     #[inline]
     fn extinction(&self, point: Vec3) -> Spectrum {
         self.cell(point).map_or(Spectrum::ZERO, |cell| self.extinction_in(&cell))
+    }
+
+    #[inline]
+    fn extinction_with_gradient(&self, point: Vec3) -> (Spectrum, Gradient) {
+        let Some(cell) = self.cell(point) else { return (Spectrum::ZERO, Gradient::ZERO) };
+        let (density, slope) = cell.value_and_gradient(&self.density.density);
+        let slope = self.gradient_to_world(slope);
+        match &self.absorption_density {
+            None => {
+                let extinction = self.absorption + self.scattering;
+                (extinction * density, Gradient::outer(extinction, slope))
+            }
+            Some(field) => {
+                let (absorbing, steep) = cell.value_and_gradient(&field.density);
+                let value = self.scattering * density + self.absorption * absorbing;
+                let absorption = Gradient::outer(self.absorption, self.gradient_to_world(steep));
+                (value, Gradient::outer(self.scattering, slope) + absorption)
+            }
+        }
     }
 
     /// The shortest edge of a cell (m).

@@ -15,6 +15,18 @@ const WASTE: f32 = 1.0;
 /// Majorant thickness of a stretch at which no more is joined: a walk has most likely ended by then.
 const ENOUGH: f32 = 2.0;
 
+/// Constant blocks that a ray crosses on fewer cells than this are marched with those around them.
+const SHORT: f32 = 4.0;
+
+/// What bounds are for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Joining {
+    /// Tracking: no looser than asking again is dear.
+    Tight,
+    /// Marching: only where it ends counts.
+    Loose,
+}
+
 /// Bounds of the densities of a grid; those without a field repeat the first.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct FieldBounds {
@@ -45,9 +57,9 @@ impl FieldBounds {
 }
 
 impl Grid<'_> {
-    /// See [`Medium::stretch`](crate::host::Medium::stretch) of a grid.
+    /// See [`Medium::stretch`](crate::host::Medium::stretch) and [`Medium::run`](crate::host::Medium::run) of a grid.
     #[inline]
-    pub(super) fn joined_stretch(&self, ray: &Ray, from: f32) -> Stretch {
+    pub(super) fn joined_stretch(&self, ray: &Ray, from: f32, joining: Joining) -> Stretch {
         let line = LocalLine::new(&self.cells_from_world, ray);
         let origin = ray.origin.abs().max_element();
         let mut walk = match Walk::enter(&line, self.size, from, origin, &self.reach) {
@@ -71,7 +83,7 @@ impl Grid<'_> {
         };
         let is_constant = run.is_constant();
         let mut thickness = self.thickest(&run) * (until - from);
-        while until < ray.length && (is_constant || thickness < ENOUGH) {
+        while until < ray.length && (is_constant || joining == Joining::Loose || thickness < ENOUGH) {
             let Some(segment) = walk.next() else { break };
             let bounds = self.bounds(Some(segment.block));
             let joined = run.union(&bounds);
@@ -79,6 +91,11 @@ impl Grid<'_> {
                 if joined != run {
                     break;
                 }
+            } else if joining == Joining::Loose {
+                if bounds.is_constant() && segment.end - segment.begin > SHORT * self.resolution {
+                    break;
+                }
+                run = joined;
             } else {
                 let higher = self.thickest(&joined);
                 thickness += self.thickest(&bounds) * (segment.end - until);

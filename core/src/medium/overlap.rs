@@ -6,7 +6,7 @@ use super::MediumError;
 use crate::host::{Face, Gradients, Medium, Properties, Stretch};
 use crate::math::Ray;
 use crate::phase::Phase;
-use crate::spectrum::{Hessian, Spectrum};
+use crate::spectrum::{Gradient, Hessian, Spectrum};
 
 /// Media in the same space: coefficients and emission add, the phase function is the mixture
 /// weighted by scattering. No media at all are vacuum.
@@ -46,6 +46,29 @@ impl<'a, M: Medium> Overlap<'a, M> {
     }
 }
 
+impl<M> Overlap<'_, M> {
+    /// Bounds of the sum of all media.
+    fn joined(&self, ask: impl Fn(&M) -> Stretch) -> Stretch {
+        if let [only] = self.0 {
+            return ask(only);
+        }
+        let mut sum = Stretch::vacuum(f32::INFINITY);
+        let mut is_constant = true;
+        for stretch in self.0.iter().map(ask) {
+            is_constant &= stretch.is_constant();
+            sum.until = sum.until.min(stretch.until);
+            sum.minorant += stretch.minorant;
+            sum.majorant += stretch.majorant;
+        }
+        if !is_constant {
+            // Sums round; and a thin cloud in thick fog may leave no trace in them.
+            sum.minorant *= 1.0 - 8.0 * f32::EPSILON;
+            sum.majorant = sum.majorant.map(|c| c.max(f32::MIN_POSITIVE) * (1.0 + 8.0 * f32::EPSILON));
+        }
+        sum
+    }
+}
+
 impl<M: Medium> Medium for Overlap<'_, M> {
     /// Should the mixture have too many lobes after all (the constructor was told otherwise), the
     /// phase function of the medium that scatters most stands for all.
@@ -73,27 +96,20 @@ impl<M: Medium> Medium for Overlap<'_, M> {
     }
 
     fn stretch(&self, ray: &Ray, from: f32) -> Stretch {
-        if let [only] = self.0 {
-            return only.stretch(ray, from);
-        }
-        let mut sum = Stretch::vacuum(f32::INFINITY);
-        let mut is_constant = true;
-        for stretch in self.0.iter().map(|m| m.stretch(ray, from)) {
-            is_constant &= stretch.is_constant();
-            sum.until = sum.until.min(stretch.until);
-            sum.minorant += stretch.minorant;
-            sum.majorant += stretch.majorant;
-        }
-        if !is_constant {
-            // Sums round; and a thin cloud in thick fog may leave no trace in them.
-            sum.minorant *= 1.0 - 8.0 * f32::EPSILON;
-            sum.majorant = sum.majorant.map(|c| c.max(f32::MIN_POSITIVE) * (1.0 + 8.0 * f32::EPSILON));
-        }
-        sum
+        self.joined(|medium| medium.stretch(ray, from))
+    }
+
+    fn run(&self, ray: &Ray, from: f32) -> Stretch {
+        self.joined(|medium| medium.run(ray, from))
     }
 
     fn extinction(&self, point: Vec3) -> Spectrum {
         self.0.iter().map(|m| m.extinction(point)).sum()
+    }
+
+    fn extinction_with_gradient(&self, point: Vec3) -> (Spectrum, Gradient) {
+        let sum = |a: (Spectrum, Gradient), b: (Spectrum, Gradient)| (a.0 + b.0, a.1 + b.1);
+        self.0.iter().map(|m| m.extinction_with_gradient(point)).fold((Spectrum::ZERO, Gradient::ZERO), sum)
     }
 
     /// The finest of all; 1 m without media.

@@ -5,7 +5,7 @@ use glam::Vec3;
 use super::{Crossing, Region, ball};
 use crate::host::{Face, Gradients, Medium, Properties, Stretch};
 use crate::math::Ray;
-use crate::spectrum::{Hessian, Spectrum};
+use crate::spectrum::{Gradient, Hessian, Spectrum};
 
 /// A medium that fills a region, except for holes; elsewhere is vacuum.
 ///
@@ -75,6 +75,30 @@ impl<M> Placed<'_, M> {
 }
 
 impl<M: Medium> Placed<'_, M> {
+    /// A stretch of the medium itself, cut at the faces of the region and its holes; vacuum outside.
+    #[inline]
+    fn within(&self, ray: &Ray, from: f32, ask: impl FnOnce(&M) -> Stretch) -> Stretch {
+        let Some((entry, exit)) = self.region.interval(ray) else { return Stretch::vacuum(f32::INFINITY) };
+        if from >= exit {
+            return Stretch::vacuum(f32::INFINITY);
+        }
+        if from < entry {
+            return Stretch::vacuum(entry);
+        }
+        let mut end = exit;
+        for (entry, exit) in self.holes.iter().filter_map(|hole| hole.interval(ray)) {
+            if from >= exit {
+                continue;
+            }
+            if from >= entry {
+                return Stretch::vacuum(exit);
+            }
+            end = end.min(entry);
+        }
+        let stretch = ask(&self.medium);
+        Stretch { until: stretch.until.min(end), ..stretch }
+    }
+
     /// Reports the faces of one region: the outer one, or of the hole with index `hole`.
     fn own_faces(&self, ray: &Ray, region: &Region, hole: Option<usize>, visit: &mut dyn FnMut(Face)) {
         let crossings = region.crossings(ray).into_iter().flatten();
@@ -101,30 +125,26 @@ impl<M: Medium> Medium for Placed<'_, M> {
 
     #[inline]
     fn stretch(&self, ray: &Ray, from: f32) -> Stretch {
-        let Some((entry, exit)) = self.region.interval(ray) else { return Stretch::vacuum(f32::INFINITY) };
-        if from >= exit {
-            return Stretch::vacuum(f32::INFINITY);
-        }
-        if from < entry {
-            return Stretch::vacuum(entry);
-        }
-        let mut end = exit;
-        for (entry, exit) in self.holes.iter().filter_map(|hole| hole.interval(ray)) {
-            if from >= exit {
-                continue;
-            }
-            if from >= entry {
-                return Stretch::vacuum(exit);
-            }
-            end = end.min(entry);
-        }
-        let stretch = self.medium.stretch(ray, from);
-        Stretch { until: stretch.until.min(end), ..stretch }
+        self.within(ray, from, |medium| medium.stretch(ray, from))
+    }
+
+    #[inline]
+    fn run(&self, ray: &Ray, from: f32) -> Stretch {
+        self.within(ray, from, |medium| medium.run(ray, from))
     }
 
     #[inline]
     fn extinction(&self, point: Vec3) -> Spectrum {
         if self.contains(point) { self.medium.extinction(point) } else { Spectrum::ZERO }
+    }
+
+    #[inline]
+    fn extinction_with_gradient(&self, point: Vec3) -> (Spectrum, Gradient) {
+        if self.contains(point) {
+            self.medium.extinction_with_gradient(point)
+        } else {
+            (Spectrum::ZERO, Gradient::ZERO)
+        }
     }
 
     fn resolution(&self) -> f32 {

@@ -8,7 +8,7 @@ use super::MediumError;
 use super::density::cell_count;
 use crate::host::{Face, Gradients, Medium, Properties, Stretch};
 use crate::math::{Bounds, Ray, float};
-use crate::spectrum::{Hessian, Spectrum};
+use crate::spectrum::{Gradient, Hessian, Spectrum};
 
 /// A medium whose [`Medium::mean_extinction`] is a look-up at a cost that depends on neither medium nor
 /// radius; everything else is the medium's own.
@@ -342,8 +342,16 @@ impl<M: Medium> Medium for Pyramid<'_, M> {
         self.medium.stretch(ray, from)
     }
     #[inline]
+    fn run(&self, ray: &Ray, from: f32) -> Stretch {
+        self.medium.run(ray, from)
+    }
+    #[inline]
     fn extinction(&self, point: Vec3) -> Spectrum {
         self.medium.extinction(point)
+    }
+    #[inline]
+    fn extinction_with_gradient(&self, point: Vec3) -> (Spectrum, Gradient) {
+        self.medium.extinction_with_gradient(point)
     }
     fn resolution(&self) -> f32 {
         self.medium.resolution()

@@ -4,7 +4,8 @@ use crate::host::{Medium, Properties, Rng};
 use crate::math::{Ray, float};
 use crate::sampling::{Generator, distance::exponential};
 use crate::spectrum::Spectrum;
-use crate::transmittance::thickness::{Marching, transmittance};
+use crate::transmittance::marched::march;
+use crate::transmittance::thickness::{Marching, Thickness, optical_thickness_with_gradients};
 use crate::transmittance::tracking;
 
 /// How the lengths of a walk's segments are drawn.
@@ -12,6 +13,9 @@ use crate::transmittance::tracking;
 pub enum Lengths {
     /// Delta tracking: in proportion to transmittance times extinction, whatever the medium.
     Tracking,
+    /// Drawn from the thickness that is marched for gradients anyway: every length follows from one number, and
+    /// there is no bias but that of marching. Where extinction is coloured, as [`Lengths::Tracking`].
+    Marched,
     /// `σ̂ e^{−σ̂ r}` with the mean extinction at the start of the segment, and at least `floor` times
     /// the majorant there (J, Eq. 29; sheet § 1.7). Its weights grow where the medium thins out:
     /// relative variance above 10 per bounce. For comparison, and for homogeneous media.
@@ -23,16 +27,28 @@ pub enum Lengths {
 
 /// A collision.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Collision {
+pub struct Collision {
     /// Where on the ray (m).
     pub distance: f32,
     /// Properties there.
     pub properties: Properties,
     /// Transmittance over the density of the distance (m).
     pub factor: Spectrum,
+    /// Thickness up to it, with gradients.
+    pub thickness: Thickness,
 }
 
-/// The next collision on `ray`, decided by `u`; `None` if light gets through. `throughput` weighs the channels.
+/// The flight along a segment.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Flown {
+    /// Where it ended; `None` if light gets through.
+    pub collision: Option<Collision>,
+    /// Thickness of the whole segment, if asked for.
+    pub whole: Option<Thickness>,
+}
+
+/// The next collision on `ray`, decided by `u`. `throughput` weighs the channels; `to_end` asks for the thickness of
+/// the whole ray.
 #[inline]
 pub(super) fn fly(
     ray: &Ray,
@@ -41,8 +57,21 @@ pub(super) fn fly(
     throughput: Spectrum,
     marching: Marching,
     u: f32,
+    to_end: bool,
     rng: &mut Generator,
-) -> Option<Collision> {
+) -> Flown {
+    if lengths == Lengths::Marched && medium.is_grey() {
+        let marched = march(ray, medium, marching, u, to_end);
+        let collision = marched.collision.map(|drawn| Collision {
+            distance: drawn.distance,
+            properties: medium.properties(ray.at(drawn.distance)),
+            factor: Spectrum::splat(drawn.factor),
+            thickness: drawn.thickness,
+        });
+        return Flown { collision, whole: marched.whole };
+    }
+    let whole = to_end.then(|| optical_thickness_with_gradients(ray, medium, marching));
+    let thickness = |distance| optical_thickness_with_gradients(&ray.with_length(distance), medium, marching);
     if let Lengths::Exponential { floor } = lengths {
         let bound = medium.stretch(ray, 0.0).majorant.max_element();
         let rate = medium.extinction(ray.origin).mean().max(floor * bound);
@@ -50,17 +79,24 @@ pub(super) fn fly(
         if rate > 0.0 {
             let distance = exponential(u, rate);
             if !(distance < ray.length) {
-                return None;
+                return Flown { collision: None, whole };
             }
             let pdf = rate * float::exp(-rate * distance);
-            let factor = transmittance(&ray.with_length(distance), medium, marching) / pdf;
+            let thickness = thickness(distance);
+            let factor = thickness.value.transmitted() / pdf;
             let properties = medium.properties(ray.at(distance));
-            return factor.is_finite().then_some(Collision { distance, properties, factor });
+            let collision = Collision { distance, properties, factor, thickness };
+            return Flown { collision: factor.is_finite().then_some(collision), whole };
         }
     }
     let flown = tracking::flight(medium, ray, throughput, u, rng);
-    let properties = flown.collision?;
-    Some(Collision { distance: flown.distance, properties, factor: flown.weight.ratio(properties.extinction()) })
+    let collision = flown.collision.map(|properties| Collision {
+        distance: flown.distance,
+        properties,
+        factor: flown.weight.ratio(properties.extinction()),
+        thickness: thickness(flown.distance),
+    });
+    Flown { collision, whole }
 }
 
 /// A generator of the walk's own: its length is unknown, and the host's sequence keeps its alignment.

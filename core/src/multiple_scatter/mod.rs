@@ -28,7 +28,7 @@
 //! | file | holds |
 //! |---|---|
 //! | `weight` | [`Weight`]: a path's weight and its gradient, in forward mode; [`Shift`]: how vertices move |
-//! | `flight` | the distance to the next collision: delta tracking, or J's Eq. 29 |
+//! | `flight` | the distance to the next collision: marched, by delta tracking, or by J's Eq. 29 |
 //! | `walk` | [`Walk`]: one path; [`Incoming`]: the light it brings |
 //! | `estimate` | [`sample`], [`sample_directional`]: sums over paths |
 
@@ -39,6 +39,6 @@ mod weight;
 
 pub(crate) use estimate::Cones;
 pub use estimate::{sample, sample_directional};
-pub use flight::Lengths;
+pub use flight::{Collision, Flown, Lengths};
 pub use walk::{Incoming, Settings, Walk};
 pub use weight::{Shift, Weight};

@@ -2,7 +2,7 @@
 
 use glam::{Vec2, Vec3};
 
-use super::flight::{Collision, Lengths, fly, own};
+use super::flight::{Collision, Flown, Lengths, fly, own};
 use super::weight::{Shift, Weight};
 use crate::host::{Hit, Medium, Properties, Rng, Scene};
 use crate::light::{Falloff, Light};
@@ -87,12 +87,29 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Walk<'_, M, S> {
         let ray = Ray::new(point, to_light);
         let end = nearest_surface(&ray, self.scene);
         let u = uniform(rng);
-        self.along(ray, end.as_ref(), warp::uniform_sphere_pdf(), u, outgoing, |_, _, _| None, rng)
+        let flown = self.first(&ray, end.as_ref(), u, false, rng);
+        self.along(ray, end.as_ref(), warp::uniform_sphere_pdf(), flown.collision, outgoing, |_, _, _| None, rng)
+    }
+
+    /// The flight on the first segment, on `ray` up to its `end`, decided by `u` in [0, 1); with the thickness of the
+    /// whole segment where light comes to its `end`, too (`to_end`).
+    pub fn first(
+        &self,
+        ray: &Ray,
+        end: Option<&Hit>,
+        u: f32,
+        to_end: bool,
+        rng: &mut (impl Rng + ?Sized),
+    ) -> Flown {
+        let rng = &mut own(rng);
+        let ray = ray.with_length(end.map_or(f32::INFINITY, |hit| hit.distance));
+        let marching = self.marching(rng);
+        fly(&ray, self.medium, self.settings.lengths, Spectrum::ONE, marching, u, to_end, rng)
     }
 
     /// Light scattered on a path whose first segment lies on `ray`, up to its `end`, the nearest surface, over
     /// the density `pdf` (sr⁻¹) of its direction: radiance at the ray's origin over `pdf`, and how it
-    /// changes as the origin moves and the vertices with it ([`Shift`]). `u`, in [0, 1), decides the first length.
+    /// changes as the origin moves and the vertices with it ([`Shift`]). `first` is where [`Walk::first`] ended.
     ///
     /// `known(point, to_eye, properties)` may answer for all light but that straight from the lights
     /// that is scattered towards `to_eye` at a collision (W·m⁻²·sr⁻¹), with its gradients as the point moves
@@ -102,7 +119,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Walk<'_, M, S> {
         mut ray: Ray,
         end: Option<&Hit>,
         pdf: f32,
-        mut u: f32,
+        first: Option<Collision>,
         mut outgoing: impl FnMut(&Ray, &Hit) -> Spectrum,
         mut known: impl FnMut(Vec3, Vec3, &Properties) -> Option<(Contribution, Gradient)>,
         rng: &mut (impl Rng + ?Sized),
@@ -120,18 +137,20 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Walk<'_, M, S> {
         // The last vertex's direction to the eye and phase function, if that depends on directions.
         let mut bend = None;
         ray.length = end.map_or(f32::INFINITY, |hit| hit.distance);
+        let mut collision = first;
         for vertex in 1..=self.settings.max_vertices {
             let reach = self.reach(ray.origin);
             self.near_lights(&ray, end.as_ref(), reach, &weight, bend.as_ref(), kappa, &mut total, rng);
-            let marching = self.marching(rng);
-            let hit = fly(&ray, self.medium, self.settings.lengths, weight.value * kappa, marching, u, rng);
-            let Some(Collision { distance, properties, factor }) = hit else { break };
-            let (segment, at) = (ray.with_length(distance), ray.at(distance));
+            if vertex > 1 {
+                let (lengths, marching, u) = (self.settings.lengths, self.marching(rng), uniform(rng));
+                collision = fly(&ray, self.medium, lengths, weight.value * kappa, marching, u, false, rng).collision;
+            }
+            let Some(Collision { distance, properties, factor, thickness }) = collision else { break };
+            let at = ray.at(distance);
             let step = kappa * factor * properties.scattering;
             if step.is_black() || !step.is_finite() {
                 break;
             }
-            let thickness = optical_thickness_with_gradients(&segment, self.medium, marching);
             let next = self.medium.gradients(at).scattering;
             let shift = Shift::new(&ray, end.as_ref(), reach, distance);
             weight = bent(&weight, bend.as_ref(), &ray, &shift).advance_by(
@@ -156,7 +175,6 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Walk<'_, M, S> {
                 break;
             }
 
-            u = uniform(rng);
             let turn = properties.phase.sample(to_eye, uniform2(rng));
             kappa = turn.weight;
             bend = (!properties.phase.is_isotropic()).then_some((to_eye, properties.phase));

@@ -8,7 +8,7 @@ use crate::math::Ray;
 use crate::phase::{self, Phase, deflection_gradient};
 use crate::sh::{self, Coefficient, MAX_DEGREE};
 use crate::spectrum::{Gradient, Spectrum};
-use crate::transmittance::thickness::{self, Marching};
+use crate::transmittance::thickness::{self, Marching, Transmittance};
 
 /// Smallest cosine in the gradient of a surface hit: `1/c` at grazing hits has a variance that
 /// grows without bound near silhouettes (sheet § 1.5).
@@ -110,7 +110,8 @@ impl Arrival {
         if irradiance.is_black() && slope == Gradient::ZERO {
             return None;
         }
-        Self::through(&ray, medium, irradiance, slope, marching)
+        let through = thickness::transmittance_with_gradients(&ray, medium, marching);
+        Self::through(&ray, irradiance, slope, &through)
     }
 
     /// Light from a surface that a ray from its origin has hit, the ray's direction being drawn with
@@ -131,6 +132,20 @@ impl Arrival {
         medium: &(impl Medium + ?Sized),
         marching: Marching,
     ) -> Option<Self> {
+        let segment = ray.with_length(hit.distance);
+        let through = || thickness::transmittance_with_gradients(&segment, medium, marching);
+        Self::from_surface_through(ray, hit, outgoing, pdf, through)
+    }
+
+    /// [`Arrival::from_surface`] where transmittance is known, or is asked for if needed.
+    #[must_use]
+    pub fn from_surface_through(
+        ray: &Ray,
+        hit: &Hit,
+        outgoing: Spectrum,
+        pdf: f32,
+        through: impl FnOnce() -> Transmittance,
+    ) -> Option<Self> {
         if outgoing.is_black() || !(hit.distance > 0.0 && pdf > 0.0) {
             return None;
         }
@@ -142,21 +157,14 @@ impl Arrival {
         let irradiance = outgoing / pdf;
         let slope = (normal - u * (3.0 * cosine)) / cosine.max(MIN_HIT_COSINE) / hit.distance;
         let slope = Gradient::outer(irradiance, slope);
-        Self::through(&ray.with_length(hit.distance), medium, irradiance, slope, marching)
+        Self::through(&ray.with_length(hit.distance), irradiance, slope, &through())
     }
 
     /// `None` where the light or its slope leaves the range of `f32`, within about 10⁻¹² m of a strong
     /// source: as at the source itself.
-    fn through(
-        ray: &Ray,
-        medium: &(impl Medium + ?Sized),
-        irradiance: Spectrum,
-        slope: Gradient,
-        marching: Marching,
-    ) -> Option<Self> {
+    fn through(ray: &Ray, irradiance: Spectrum, slope: Gradient, t: &Transmittance) -> Option<Self> {
         // Room for the slopes of the basis functions, which come on top.
         const MOST: f32 = 1e-6 * f32::MAX;
-        let t = thickness::transmittance_with_gradients(ray, medium, marching);
         let irradiance_here = irradiance * t.value;
         let gradient = slope * t.value + t.gradient_fixed * irradiance;
         let steepest = gradient.norm().max_element().max(irradiance_here.max_element() / ray.length);

@@ -3,10 +3,12 @@
 //! | file | holds |
 //! |---|---|
 //! | [`tracking`] | flights to the next collision (delta tracking), transmittance (ratio tracking) |
+//! | [`marched`] | collisions drawn from a marched ray, with the thickness up to them |
 //! | [`thickness`] | optical thickness by closed forms and marching, with both gradients |
 //!
 //! Closed forms wherever a [`Stretch`](crate::host::Stretch) says that the medium is constant.
 
+pub mod marched;
 pub mod thickness;
 pub mod tracking;
 

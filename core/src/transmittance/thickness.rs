@@ -71,7 +71,7 @@ impl Marching {
 
     /// Calls `visit(distance, weight)` for the samples of a run; the weights sum to its length.
     #[inline]
-    fn samples(&self, from: f32, until: f32, mut visit: impl FnMut(f32, f32)) {
+    pub(super) fn samples(&self, from: f32, until: f32, mut visit: impl FnMut(f32, f32)) {
         let run = until - from;
         let count = match self.steps {
             // A length that is not positive gives NaN or ∞; both end at the maximum or at 1.
@@ -132,8 +132,8 @@ impl Thickness {
 }
 
 /// A part of a ray on which the medium is either constant or to be marched.
-enum Part {
-    /// Extinction (m⁻¹) times length.
+pub(super) enum Part {
+    /// Extinction (m⁻¹) from one distance (m) to another.
     Constant {
         extinction: Spectrum,
         from: f32,
@@ -146,14 +146,15 @@ enum Part {
     /// Extinction without end: channels that are not 0 are opaque.
     Endless {
         extinction: Spectrum,
+        from: f32,
     },
 }
 
 /// Splits a ray at the medium's constant stretches; what lies between two of them is one run, or
-/// several where it is long. On endless and very long rays stops as soon as `visit` says that nothing is seen
-/// beyond; what lies behind the most stretches a walk may visit counts as vacuum.
+/// several where it is long. Stops as soon as `visit(part, is_endless)` says so: on endless and very long rays, where nothing
+/// is seen beyond. What lies behind the most stretches a walk may visit counts as vacuum.
 #[inline]
-fn for_each_part(ray: &Ray, medium: &(impl Medium + ?Sized), mut visit: impl FnMut(Part) -> bool) {
+pub(super) fn for_each_part(ray: &Ray, medium: &(impl Medium + ?Sized), mut visit: impl FnMut(Part, bool) -> bool) {
     let (mut at, mut run_from, mut run_count) = (0.0_f32, None, 0);
     for visited in 0..most_stretches(ray) {
         let is_endless = ray.length.is_infinite() || visited > 16 * MAX_RUN;
@@ -161,48 +162,46 @@ fn for_each_part(ray: &Ray, medium: &(impl Medium + ?Sized), mut visit: impl FnM
         if !(at < ray.length) {
             break;
         }
-        let stretch = medium.stretch(ray, at);
+        let stretch = medium.run(ray, at);
         // A host that does not advance must not hang us.
         let until = if stretch.until > at { stretch.until } else { at + medium.resolution().max(at * 1e-6) };
         let until = until.min(ray.length);
         let is_changing = until.is_finite() && !stretch.is_constant();
         if !is_changing || run_count >= MAX_RUN {
             if let Some(from) = run_from.take()
-                && visit(Part::Changing { from, until: at })
-                && is_endless
+                && visit(Part::Changing { from, until: at }, is_endless)
             {
                 return;
             }
             run_count = 0;
         }
         if until.is_infinite() {
-            visit(Part::Endless { extinction: stretch.majorant });
+            visit(Part::Endless { extinction: stretch.majorant, from: at }, true);
             return;
         }
         if is_changing {
             run_from = run_from.or(Some(at));
             run_count += 1;
         } else if !stretch.majorant.is_black()
-            && visit(Part::Constant { extinction: stretch.majorant, from: at, until })
-            && is_endless
+            && visit(Part::Constant { extinction: stretch.majorant, from: at, until }, is_endless)
         {
             return;
         }
         at = until;
     }
     if let Some(from) = run_from {
-        visit(Part::Changing { from, until: at });
+        visit(Part::Changing { from, until: at }, false);
     }
 }
 
 /// Whether nothing is seen through a thickness.
 #[inline]
-fn is_opaque(thickness: Spectrum) -> bool {
+pub(super) fn is_opaque(thickness: Spectrum) -> bool {
     thickness.min_element() > float::OPAQUE
 }
 
 #[inline]
-fn endless(extinction: Spectrum) -> Spectrum {
+pub(super) fn endless(extinction: Spectrum) -> Spectrum {
     extinction.map(|c| if c > 0.0 { f32::INFINITY } else { 0.0 })
 }
 
@@ -228,15 +227,15 @@ fn endless(extinction: Spectrum) -> Spectrum {
 #[must_use]
 pub fn optical_thickness(ray: &Ray, medium: &(impl Medium + ?Sized), marching: Marching) -> Spectrum {
     let mut value = Spectrum::ZERO;
-    for_each_part(ray, medium, |part| {
+    for_each_part(ray, medium, |part, is_endless| {
         match part {
             Part::Constant { extinction, from, until } => value += extinction * (until - from),
             Part::Changing { from, until } => {
                 marching.samples(from, until, |t, weight| value += medium.extinction(ray.at(t)) * weight);
             }
-            Part::Endless { extinction } => value += endless(extinction),
+            Part::Endless { extinction, .. } => value += endless(extinction),
         }
-        is_opaque(value)
+        is_endless && is_opaque(value)
     });
     value
 }
@@ -270,19 +269,19 @@ pub fn optical_thickness_with_gradients(ray: &Ray, medium: &(impl Medium + ?Size
     }
     // 0 for an infinite ray: then the far end moves along, as it were.
     let inverse = 1.0 / ray.length;
-    for_each_part(ray, medium, |part| {
+    for_each_part(ray, medium, |part, is_endless| {
         match part {
             Part::Constant { extinction, from, until } => sum.value += extinction * (until - from),
             Part::Changing { from, until } => marching.samples(from, until, |t, weight| {
-                let point = ray.at(t);
-                sum.value += medium.extinction(point) * weight;
-                let slope = medium.gradients(point).extinction * weight;
+                let (extinction, gradient) = medium.extinction_with_gradient(ray.at(t));
+                sum.value += extinction * weight;
+                let slope = gradient * weight;
                 sum.gradient_joint += slope;
                 sum.gradient_fixed += slope * (1.0 - t * inverse);
             }),
-            Part::Endless { extinction } => sum.value += endless(extinction),
+            Part::Endless { extinction, .. } => sum.value += endless(extinction),
         }
-        is_opaque(sum.value)
+        is_endless && is_opaque(sum.value)
     });
     if inverse > 0.0 {
         // Scaled before the product, so that tiny lengths do not lose it.
@@ -298,7 +297,7 @@ pub fn optical_thickness_with_gradients(ray: &Ray, medium: &(impl Medium + ?Size
 
 /// `Δσ m / |m·u|`: how much thickness a face brings per metre that the segment moves.
 #[inline]
-fn face_term(direction: Vec3, normal: Vec3, jump: Spectrum) -> Gradient {
+pub(super) fn face_term(direction: Vec3, normal: Vec3, jump: Spectrum) -> Gradient {
     Gradient::outer(jump, normal / normal.dot(direction).abs().max(MIN_FACE_COSINE))
 }
 

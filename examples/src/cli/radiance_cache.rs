@@ -8,7 +8,7 @@ use fogbow::cache::{Estimator, Extrapolation, EyeSettings, Limits, Seen, radianc
 use fogbow::host::Medium;
 use fogbow::light::Light;
 use fogbow::math::{Ray, Vec2};
-use fogbow::multiple_scatter;
+use fogbow::multiple_scatter::{self, Lengths};
 use fogbow::path::{self, World as PathWorld};
 use fogbow::phase::Phase;
 use fogbow::sampling::uniform2;
@@ -286,6 +286,7 @@ impl WithMedium for CacheJob<'_> {
             scattered: None,
             walk: multiple_scatter::Settings {
                 one_light: self.lights.len() > 1,
+                lengths: Lengths::Marched,
                 ..multiple_scatter::Settings::new(steps)
             },
             paths: self.paths,
