@@ -10,7 +10,7 @@ use super::store::{SurfaceCache, VolumeCache};
 use crate::host::{Hit, Medium, Properties, Rng, Scene};
 use crate::light::Light;
 use crate::math::{Frame, Ray, float};
-use crate::multiple_scatter::{Collision, self, Cones, Incoming, Walk};
+use crate::multiple_scatter::{self, Collision, Cones, Incoming, Walk};
 use crate::path::trace::leave;
 use crate::path::{self, World};
 use crate::phase::Phase;

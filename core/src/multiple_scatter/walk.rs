@@ -93,14 +93,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Walk<'_, M, S> {
 
     /// The flight on the first segment, on `ray` up to its `end`, decided by `u` in [0, 1); with the thickness of the
     /// whole segment where light comes to its `end`, too (`to_end`).
-    pub fn first(
-        &self,
-        ray: &Ray,
-        end: Option<&Hit>,
-        u: f32,
-        to_end: bool,
-        rng: &mut (impl Rng + ?Sized),
-    ) -> Flown {
+    pub fn first(&self, ray: &Ray, end: Option<&Hit>, u: f32, to_end: bool, rng: &mut (impl Rng + ?Sized)) -> Flown {
         let rng = &mut own(rng);
         let ray = ray.with_length(end.map_or(f32::INFINITY, |hit| hit.distance));
         let marching = self.marching(rng);

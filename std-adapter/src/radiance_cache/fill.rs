@@ -304,41 +304,56 @@ where
     ) {
         let settings = self.settings;
         let (on_surfaces, light, coarse) = (settings.coarse_irradiance(), settings.surface, settings.coarse_multiple());
-        let surface = caches.surface.as_ref().zip(light).map(|(c, e)| (c, settings.reading(&e)));
-        let multiple = caches.coarse_multiple.as_ref().zip(coarse).map(|(c, e)| (c, settings.reading(&e)));
-        let known = surface.zip(multiple).map(|(surface, multiple)| [surface, multiple]);
-        let estimator =
-            Estimator { surfaces: lighting(&caches.coarse_irradiance, settings), scattered: known, ..*self.estimator };
-        let mut clock = Stopwatch::start();
-        let new_irradiance = self.estimates(
+        let [guides_of_irradiance, guides_of_surface, guides_of_multiple, ..] = guides;
+        // Each from those before it, already revised: what a first record had far too bright must not stay in others.
+        let clock = Stopwatch::start();
+        let estimator = self.all_known(caches);
+        let new = self.estimates(
             &caches.coarse_irradiance,
             on_surfaces,
             from[0],
             3 * pass,
-            &guides[0],
+            guides_of_irradiance,
             |_, looks, place, rng| irradiance(&estimator, looks, place, rng),
         );
+        outcome.computed[3] +=
+            blend(&mut caches.coarse_irradiance, on_surfaces, from[0], new, guides_of_irradiance, 1.0);
         outcome.seconds[3] = outcome.seconds[3] + clock.elapsed();
-        clock = Stopwatch::start();
-        let new_surface =
-            self.estimates(&caches.surface, light, from[1], 3 * pass + 1, &guides[1], |cache, looks, place, rng| {
-                scattered(cache, &estimator, looks, place, rng, Part::Surface)
-            });
+
+        let clock = Stopwatch::start();
+        let estimator = self.all_known(caches);
+        let new = self.estimates(
+            &caches.surface,
+            light,
+            from[1],
+            3 * pass + 1,
+            guides_of_surface,
+            |cache, looks, place, rng| scattered(cache, &estimator, looks, place, rng, Part::Surface),
+        );
+        outcome.computed[1] += blend(&mut caches.surface, light, from[1], new, guides_of_surface, 1.0);
         outcome.seconds[1] = outcome.seconds[1] + clock.elapsed();
-        clock = Stopwatch::start();
-        let new_multiple = self.estimates(
+
+        let clock = Stopwatch::start();
+        let estimator = self.all_known(caches);
+        let new = self.estimates(
             &caches.coarse_multiple,
             coarse,
             from[2],
             3 * pass + 2,
-            &guides[2],
+            guides_of_multiple,
             |cache, looks, place, rng| scattered(cache, &estimator, looks, place, rng, Part::Multiple),
         );
+        outcome.computed[2] += blend(&mut caches.coarse_multiple, coarse, from[2], new, guides_of_multiple, 1.0);
         outcome.seconds[2] = outcome.seconds[2] + clock.elapsed();
-        let [on_surface, of_surface, of_medium, ..] = guides;
-        outcome.computed[3] +=
-            blend(&mut caches.coarse_irradiance, on_surfaces, from[0], new_irradiance, on_surface, 1.0);
-        outcome.computed[1] += blend(&mut caches.surface, light, from[1], new_surface, of_surface, 1.0);
-        outcome.computed[2] += blend(&mut caches.coarse_multiple, coarse, from[2], new_multiple, of_medium, 1.0);
+    }
+
+    /// The world lit by all first records.
+    fn all_known<'c>(&'c self, caches: &'c RadianceCaches) -> Estimator<'c, M, S> {
+        let settings = self.settings;
+        let surface = caches.surface.as_ref().zip(settings.surface).map(|(c, e)| (c, settings.reading(&e)));
+        let coarse = caches.coarse_multiple.as_ref().zip(settings.coarse_multiple());
+        let multiple = coarse.map(|(c, e)| (c, settings.reading(&e)));
+        let scattered = surface.zip(multiple).map(|(surface, multiple)| [surface, multiple]);
+        Estimator { surfaces: lighting(&caches.coarse_irradiance, settings), scattered, ..*self.estimator }
     }
 }
