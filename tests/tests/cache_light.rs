@@ -213,11 +213,17 @@ fn multiple_scattering_in_an_endless_medium_is_that_of_the_transport_equation() 
 /// Records of multiple scattering on shells around the lamp.
 fn radial_cache<M: Medium, S: Scene>(make: &Estimator<'_, M, S>) -> VolumeCache<'static> {
     let mut cache: VolumeCache<'static> = Cache::growing(0);
-    for shell in 0..26 {
-        let r = 0.3 * 1.12_f32.powi(shell);
+    for shell in 0..26_u64 {
+        let r = 0.3 * 1.12_f32.powi(shell as i32);
         let mut all = Sums::default();
         for k in 0..8 {
-            all.merge(&make.multiple(Vec3::X * r, &Phase::ISOTROPIC, 512, &mut [], &mut Generator::new(k)));
+            all.merge(&make.multiple(
+                Vec3::X * r,
+                &Phase::ISOTROPIC,
+                2048,
+                &mut [],
+                &mut Generator::new(8 * shell + k),
+            ));
         }
         let (value, slope) = (all.value / 8.0, Spectrum::splat(all.gradient.x[0] / 8.0));
         for k in 0..320 {

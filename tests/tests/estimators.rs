@@ -42,14 +42,16 @@ fn single_and_multiple_scattering_add_up_to_one_in_a_white_furnace() {
         (Field::Gaussian { a: 0.2, k: 3.0, c: Vec3::new(0.3, 0.0, 0.0), s: 0.4 }, -0.3),
     ] {
         let medium = Complaining::new(ball_of(field, 1.0, g, 1.0));
-        let settings = Settings { max_vertices: 1000, ..Settings::new(STEPS) };
-        let walk = Walk { medium: &medium, scene: &Empty, lights: &lights, settings };
-        let phase = medium.inner.medium.phase;
-        assert_mean("white furnace", 400, 1.0, |rng| {
-            let once = single_scatter::sample(x, Vec3::Z, &phase, &medium, &Empty, &lights, 16, STEPS, rng);
-            let more = multiple_scatter::sample(&walk, x, Vec3::Z, &phase, NO_SURFACE, 16, rng);
-            f64::from(once.value[1] + more.value[1])
-        });
+        for lengths in [Lengths::Tracking, Lengths::Marched] {
+            let settings = Settings { lengths, max_vertices: 1000, ..Settings::new(STEPS) };
+            let walk = Walk { medium: &medium, scene: &Empty, lights: &lights, settings };
+            let phase = medium.inner.medium.phase;
+            assert_mean(&format!("white furnace, {lengths:?}"), 400, 1.0, |rng| {
+                let once = single_scatter::sample(x, Vec3::Z, &phase, &medium, &Empty, &lights, 16, STEPS, rng);
+                let more = multiple_scatter::sample(&walk, x, Vec3::Z, &phase, NO_SURFACE, 16, rng);
+                f64::from(once.value[1] + more.value[1])
+            });
+        }
         assert!(medium.counts()[0] > 0);
     }
 }
@@ -59,7 +61,7 @@ fn multiple_scattering_in_an_infinite_medium_agrees_with_the_fourier_solution() 
     let medium = Analytic::grey(Field::Homogeneous { a: 1.0 }, 0.8);
     let lamp = PointLight::from_flux(Vec3::ZERO, Spectrum::ONE).unwrap();
     let lights = [Light::Point(lamp)];
-    for lengths in [Lengths::Tracking, Lengths::Exponential { floor: 0.05 }] {
+    for lengths in [Lengths::Tracking, Lengths::Marched, Lengths::Exponential { floor: 0.05 }] {
         let settings = Settings { lengths, max_vertices: 1000, ..Settings::new(STEPS) };
         let walk = Walk { medium: &medium, scene: &Empty, lights: &lights, settings };
         let x = Vec3::new(0.0, 1.5, 0.0);

@@ -12,7 +12,7 @@
 //!   cross walls, and the gradient of the volume's border was missing. The sums above get a factor `Πφ` on each
 //!   `∇` and the terms of [`Weight::advance_by`]; phase functions turn with their directions. Densities,
 //!   lengths, roulette and visibility stay frozen;
-//! - lengths come from delta tracking, which suits heterogeneous media; Eq. 29 remains as a choice;
+//! - lengths come from marched thickness or delta tracking, which suit heterogeneous media; Eq. 29 remains as a choice;
 //! - within its near field ([`Light::steep_field`](crate::light::Light::steep_field): all of space for
 //!   lights without extent) a light is joined not to the collisions but to a point of every segment,
 //!   sampled equiangularly (Kulla and Fajardo 2012), which takes the `1/ρ²` out along the segment.

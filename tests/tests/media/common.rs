@@ -1,6 +1,6 @@
 //! What the tests of media share.
 
-use fogbow::host::Medium;
+use fogbow::host::{Medium, Stretch};
 use fogbow::math::{Affine3, Mat3, Ray, Vec3, float};
 use fogbow::medium::{Density, Grid, MediumError, MinMax};
 use fogbow::phase::Phase;
@@ -74,13 +74,27 @@ pub(crate) fn assert_near(a: f32, b: f32, tolerance: f32, what: &str) {
     assert!((a - b).abs() <= tolerance, "{what}: {a} and {b} differ by more than {tolerance}");
 }
 
-/// Walks along a ray and checks every promise of [`Medium::stretch`]; returns the number of steps.
+/// Walks along a ray and checks every promise of [`Medium::stretch`] and of [`Medium::run`]; returns the number of
+/// stretches.
 ///
 /// Within `blur` (m) of a face its two sides cannot be told apart, and either's value is right.
 pub(crate) fn check_walk(medium: &impl Medium, ray: &Ray, end: f32, blur: f32, rng: &mut Generator) -> u32 {
+    let stretches = check_steps(medium, |t| medium.stretch(ray, t), ray, end, blur, rng);
+    check_steps(medium, |t| medium.run(ray, t), ray, end, blur, rng);
+    stretches
+}
+
+fn check_steps(
+    medium: &impl Medium,
+    next: impl Fn(f32) -> Stretch,
+    ray: &Ray,
+    end: f32,
+    blur: f32,
+    rng: &mut Generator,
+) -> u32 {
     let (mut t, mut steps) = (0.0_f32, 0);
     while t < end {
-        let stretch = medium.stretch(ray, t);
+        let stretch = next(t);
         steps += 1;
         assert!(stretch.until > t, "no progress at {t}: {stretch:?}, {ray:?}");
         assert!(steps < 20_000, "endless walk: {ray:?}");
@@ -93,6 +107,9 @@ pub(crate) fn check_walk(medium: &impl Medium, ray: &Ray, end: f32, blur: f32, r
                 _ => t + (until - t) * uniform(rng),
             };
             let sigma = medium.extinction(ray.at(s));
+            let (value, gradient) = medium.extinction_with_gradient(ray.at(s));
+            let apart = (gradient - medium.gradients(ray.at(s)).extinction).norm().max_element();
+            assert!(value == sigma && apart <= 1e-5 * gradient.norm().max_element(), "{value:?}, {sigma:?}, {apart}");
             for channel in 0..3 {
                 let (low, high) = (stretch.minorant[channel], stretch.majorant[channel]);
                 assert!(low <= high, "{stretch:?}");

@@ -100,7 +100,20 @@ fn empty_blocks_are_passed_in_one_step() {
     let stretch = grid.stretch(&Ray::new(Vec3::new(-1.0, 0.5, 0.5), Vec3::X), 0.0);
     assert!(stretch.majorant.is_black());
     // The last block, or the one before it, which interpolates with its neighbour.
+    let run = grid.run(&Ray::new(Vec3::new(-1.0, 0.5, 0.5), Vec3::X), 0.0);
+    assert_eq!(run, stretch);
     assert_near(stretch.until, 2.0 - 1.0 / 16.0, 1e-6, "start of the last block");
+}
+
+/// Thick smoke ends stretches early, so that bounds are tight; marching has no use for bounds.
+#[test]
+fn smoke_is_one_run_however_thick() {
+    let n = 16 * BLOCK;
+    let mut voxels = Voxels::new([n, 1, 1], Affine3::IDENTITY, |i| 1e3 * (1.0 + i as f32));
+    let grid = voxels.grid();
+    let ray = Ray::new(Vec3::new(-1.0, 0.5, 0.5), Vec3::X);
+    assert!(grid.stretch(&ray, 1.0).until < 1.2);
+    assert_near(grid.run(&ray, 1.0).until, 2.0, 1e-5, "end of the smoke");
 }
 
 #[test]
