@@ -98,7 +98,7 @@ pub fn march(ray: &Ray, medium: &(impl Medium + ?Sized), marching: Marching, u: 
         let inverse = 1.0 / length;
         // 0 for an infinite ray: then the far end moves along, as it were.
         let end = if inverse > 0.0 { Gradient::outer(value * inverse, -ray.direction) } else { Gradient::ZERO };
-        *joint + *moment * -inverse + end
+        *joint - *moment * inverse + end
     };
     let mut collision = draw.found.map(|(distance, density)| {
         let value = Spectrum::splat(-float::ln(1.0 - u));
@@ -157,7 +157,7 @@ impl Draw {
             }
         }
         self.left = (self.left - thickness).max(0.0);
-        let slope = (slope_a + (slope_b + slope_a * -1.0) * rise) * run;
+        let slope = (slope_a + (slope_b - slope_a) * rise) * run;
         self.joint += slope;
         self.moment += slope * (from + 0.5 * run);
     }
