@@ -203,8 +203,9 @@ def determinism(scenes, _):
 
 def cost(scenes, _):
     for scene in scenes or CORNELL + ["spot-shafts", "room-plume", "nave-shafts"]:
-        _, whole = render(scene, *CACHED)
-        _, single = render(scene, *CACHED, "--max-depth", 2)
+        # As many samples for both: by default there are more where nothing is cached.
+        _, whole = render(scene, *CACHED, "--spp", 64)
+        _, single = render(scene, *CACHED, "--spp", 64, "--max-depth", 2)
         records, counts = whole["records"], whole["counts"]
         record = cpu(whole, ["fill"]) / max(records["computed"], 1)
         lookups = cpu(whole, ["render"]) - cpu(single, ["render"])

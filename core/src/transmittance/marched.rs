@@ -38,7 +38,9 @@ pub struct MarchedCollision {
 /// ```
 ///
 /// What extinction really is at the point of collision is for the caller to weigh: `σₛ(t)/σ(t)` has, as the marched `τ` has,
-/// no bias but that of the steps. In coloured media the first channel counts. `to_end` also measures what lies beyond.
+/// no bias but that of the steps; it has no bound where extinction between two samples is far above both, and what lies
+/// between two samples in vacuum is missed: steps must resolve the medium. In coloured media the first channel counts.
+/// `to_end` also measures what lies beyond. Inversion of Jarosz et al. 2008, Eq. 16; not in the paper, which draws by Eq. 29.
 ///
 /// ```
 /// # use fogbow::{math::*, medium::Homogeneous, phase::Lobe, spectrum::Spectrum};
