@@ -200,8 +200,8 @@ impl VolumeCache<'_> {
 }
 
 fn nearest(records: &[Record], point: Vec3) -> Option<f32> {
-    let apart = |r: &Record| r.position.distance_squared(point);
-    records.iter().min_by(|a, b| apart(a).total_cmp(&apart(b))).map(|r| r.radius)
+    let apart = records.iter().map(|r| (r.position.distance_squared(point), r.radius));
+    apart.reduce(|a, b| if b.0 < a.0 { b } else { a }).map(|(_, radius)| radius)
 }
 
 impl SurfaceCache<'_> {
