@@ -110,7 +110,7 @@ def speed(scenes, arguments):
         if side == 128:
             truth = Stored(scene)
         else:
-            truth = Halves(*halves(arguments.store, f"{scene}-{side}", scene, 512, *size))
+            truth = Halves(*halves(arguments.store, f"{scene}-{side}", scene, arguments.spp, *size))
         paths, peers = [], []
         for turn in range(2):
             image, statistics = render(scene, "--method", "path", "--spp", samples, "--seed", 100 + turn, *size)
