@@ -8,7 +8,7 @@ use super::lookup::{Reading, TurningBasis};
 use super::record::Facing;
 use super::store::{SurfaceCache, VolumeCache};
 use crate::host::{Hit, Medium, Properties, Rng, Scene};
-use crate::light::Light;
+use crate::light::{Light, sky};
 use crate::math::{Frame, Ray, float};
 use crate::multiple_scatter::{self, Collision, Cones, Incoming, Walk};
 use crate::path::trace::leave;
@@ -20,7 +20,7 @@ use crate::sh::{Coefficient, MAX_DEGREE};
 use crate::single_scatter::{self, Arrival, Contribution, Directional, Sums, nearest_surface, shadow_ray};
 use crate::spectrum::{Gradient, Spectrum};
 use crate::surface::{Surface, lambert};
-use crate::transmittance::thickness::{Marching, transmittance};
+use crate::transmittance::thickness::{Marching, Transmittance, transmittance, transmittance_with_gradients};
 
 /// Least cosine in the gradient of an irradiance sample: at grazing directions `1/cos` has a
 /// variance without bound.
@@ -63,6 +63,36 @@ impl Mixture<'_> {
     }
 }
 
+/// Light of a sky and what stands before it. Its edges, not the sky itself, change what arrives as a point moves,
+/// by as much as if the sky were a surface at their distance. Which directions are edges no single
+/// sample knows, so that the gradient lacks this; radii must not.
+#[derive(Debug, Clone, Copy, Default)]
+struct Openings {
+    sky: Spectrum,
+    /// Mean of 1/distance (1/m) of surfaces over directions, and the share of directions that meet some.
+    near: f32,
+    met: f32,
+}
+
+impl Openings {
+    /// A direction drawn with density `pdf` per sample, and the light that came.
+    #[inline]
+    fn add(&mut self, end: Option<&Hit>, pdf: f32, light: Spectrum) {
+        match end {
+            None => self.sky += light,
+            Some(hit) => {
+                self.near += 1.0 / (hit.distance * pdf);
+                self.met += 1.0 / pdf;
+            }
+        }
+    }
+
+    /// `Σ‖∇L_j‖` over the directions to the sky: a surface that is faced at the harmonic mean distance has `2L/r`.
+    fn norm(&self) -> Spectrum {
+        if self.met > 0.0 { self.sky * (2.0 * self.near / self.met) } else { Spectrum::ZERO }
+    }
+}
+
 /// Estimates the light that the caches hold.
 ///
 /// Light from surfaces takes its direct part from one connection to the lights, its indirect part
@@ -102,25 +132,22 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
         self.world.medium.properties(point).phase
     }
 
-    /// Light from the lights, scattered once at `point`: mean over directions (W·m⁻²·sr⁻¹), with
+    /// Light from the lights but a sky, scattered once at `point`: mean over directions (W·m⁻²·sr⁻¹), with
     /// the expansion of `phase` of degree 1 and more added to `higher`.
     pub fn single(&self, point: Vec3, phase: &Phase, higher: &mut [Coefficient], rng: &mut impl Rng) -> Sums {
         self.expanded(phase, higher, |into| {
-            let World { medium, scene, lights } = self.world;
-            single_scatter::sample_directional(
-                point,
-                medium,
-                scene,
-                lights,
-                self.light_samples,
-                self.walk.steps,
-                rng,
-                into,
-            )
+            let World { medium, scene, .. } = self.world;
+            let (samples, steps) = (self.light_samples, self.walk.steps);
+            let mut sums = Sums::default();
+            for lights in self.near_lights() {
+                let of = single_scatter::sample_directional(point, medium, scene, lights, samples, steps, rng, into);
+                sums.merge(&of);
+            }
+            sums
         })
     }
 
-    /// Light from surfaces, scattered once at `point`, from `directions` directions. As
+    /// Light from surfaces and the sky, scattered once at `point`, from `directions` directions. As
     /// [`Estimator::single`].
     pub fn surface<'g>(
         &self,
@@ -132,27 +159,29 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
     ) -> Sums {
         let (mut child, shift) = (Generator::child(rng), uniform2(rng));
         let Looks { count, guide, mut learnt } = directions.into();
-        let World { medium, scene, lights } = self.world;
+        let World { scene, lights, .. } = self.world;
         // Rectangles light what lies before them, not what surrounds them.
         let aims = Aims::new(point, lights, scene, |light| !matches!(light, Light::Quad(_)));
         let mixture = Mixture { aims, guide, count, shift };
         self.expanded(phase, higher, |into| {
-            let mut sums = Sums::default();
+            let (mut sums, mut openings) = (Sums::default(), Openings::default());
             for j in 0..count {
                 let (direction, pdf) = mixture.direction(j, warp::uniform_sphere, |_| warp::uniform_sphere_pdf());
                 let ray = Ray::new(point, direction);
                 let marching = Marching { steps: self.walk.steps, offset: uniform(rng) };
-                let Some(hit) = nearest_surface(&ray, scene) else { continue };
-                let radiance = self.outgoing(&ray, &hit, &mut child);
-                let total = pdf * count as f32;
-                if let Some(arrival) = Arrival::from_surface(&ray, &hit, radiance, total, medium, marching) {
+                let end = nearest_surface(&ray, scene);
+                let through = || self.through(&ray, end.as_ref(), marching);
+                if let Some(arrival) = self.arriving(&ray, end.as_ref(), pdf * count as f32, through, &mut child) {
                     if let Some(learnt) = &mut learnt {
                         learnt.add(direction, arrival.irradiance.mean() * count as f32, pdf, count);
                     }
                     let arrival = self.steadied(arrival);
-                    sums.add(&arrival.scatter_directional(into.moments, 1.0, into.coefficients), true);
+                    let light = arrival.scatter_directional(into.moments, 1.0, into.coefficients);
+                    openings.add(end.as_ref(), pdf, light.radiance);
+                    sums.add(&light, true);
                 }
             }
+            sums.add_norm(openings.norm());
             sums
         })
     }
@@ -226,7 +255,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
     }
 
     /// Indirect irradiance (W·m⁻²) at `point` on a surface with `normal`, from `paths` directions:
-    /// light from other surfaces through the medium, and light scattered in the medium. Its gradient
+    /// light from other surfaces and the sky through the medium, and light scattered in the medium. Its gradient
     /// is that of a move along the surface with the normal held.
     ///
     /// ```text
@@ -242,7 +271,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
     ) -> (Sums, Facing) {
         let Looks { count, guide, mut learnt } = paths.into();
         let (mut sums, mut scattered, mut turn) = (Sums::default(), Cones::default(), Gradient::ZERO);
-        let mut halves = Halves::default();
+        let (mut halves, mut openings) = (Halves::default(), Openings::default());
         let mut child = Generator::child(rng);
         let (frame, walk, shift, third) = (Frame::around(normal), self.walker(), uniform2(rng), uniform(rng));
         let share = 1.0 / count.max(1) as f32;
@@ -262,18 +291,16 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
             let mut total = Contribution::ZERO;
             let end = nearest_surface(&ray, self.world.scene);
             let u = third + THIRD * j as f32;
-            let flown = walk.first(&ray, end.as_ref(), u - libm::floorf(u), end.is_some(), rng);
+            let shines = end.is_some() || !sky(self.world.lights, to_light).is_black();
+            let flown = walk.first(&ray, end.as_ref(), u - libm::floorf(u), shines, rng);
             // How the cosine changes as what is seen stays.
             let tilt = (to_light * cosine - normal) / cosine.max(MIN_COSINE);
-            if let Some(hit) = &end {
-                let radiance = self.outgoing(&ray, hit, &mut child);
-                let through = || flown.whole.unwrap_or_default().transmittance();
-                let arrival = Arrival::from_surface_through(&ray, hit, radiance, 1.0, through);
-                if let Some(arrival) = arrival {
-                    let light = tilted(&self.steadied(arrival), tilt) * weight;
-                    sums.add(&light, true);
-                    total += light;
-                }
+            let through = || flown.whole.unwrap_or_default().transmittance();
+            if let Some(arrival) = self.arriving(&ray, end.as_ref(), 1.0, through, &mut child) {
+                let light = tilted(&self.steadied(arrival), tilt) * weight;
+                openings.add(end.as_ref(), pdf / cosine, light.radiance);
+                sums.add(&light, true);
+                total += light;
             }
             let light = self.walked(&walk, ray, end.as_ref(), 1.0, flown.collision, rng);
             let light = tilted(&light, tilt) * weight;
@@ -285,9 +312,36 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
             halves.add(j, &total.gradient);
             turn += Gradient::outer(total.radiance, to_light / cosine.max(MIN_COSINE));
         }
+        sums.add_norm(openings.norm());
         sums.merge(&scattered.sums());
         sums.gradient = sums.gradient * halves.trust();
         (sums, Facing { normal, turn })
+    }
+
+    /// Lights that are no sky, in runs.
+    fn near_lights(&self) -> impl Iterator<Item = &[Light<'_>]> {
+        let runs = self.world.lights.chunk_by(|a, b| a.is_sky() == b.is_sky());
+        runs.filter(|run| run.first().is_some_and(|light| !light.is_sky()))
+    }
+
+    /// Transmittance of a ray up to its `end`.
+    fn through(&self, ray: &Ray, end: Option<&Hit>, marching: Marching) -> Transmittance {
+        let length = end.map_or(f32::INFINITY, |hit| hit.distance);
+        transmittance_with_gradients(&ray.with_length(length), self.world.medium, marching)
+    }
+
+    /// Light that arrives along a ray from its `end`, the nearest surface, or without one from the sky.
+    fn arriving(
+        &self,
+        ray: &Ray,
+        end: Option<&Hit>,
+        pdf: f32,
+        through: impl FnOnce() -> Transmittance,
+        rng: &mut Generator,
+    ) -> Option<Arrival> {
+        let sky = || sky(self.world.lights, ray.direction);
+        let radiance = end.map_or_else(sky, |hit| self.outgoing(ray, hit, rng));
+        Arrival::from_end(ray, end, radiance, pdf, through)
     }
 
     /// Radiance (W·m⁻²·sr⁻¹) that a surface sends back along a ray, but for its own emission.
@@ -306,17 +360,26 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
         lambert::value(reflectance) * (direct + indirect)
     }
 
-    /// Irradiance (W·m⁻²) from the lights, by one connection.
+    /// Irradiance (W·m⁻²) from the lights but a sky, by one connection.
     pub fn direct(&self, point: Vec3, hit: &Hit, rng: &mut Generator) -> Spectrum {
         let random = (uniform(rng), uniform2(rng));
-        self.direct_at(point, hit, random, rng)
+        self.direct_at(point, hit, false, random, rng)
     }
 
-    /// [`Estimator::direct`] with given random numbers for the choice of light and the point on it.
-    pub fn direct_at(&self, point: Vec3, hit: &Hit, random: (f32, Vec2), rng: &mut Generator) -> Spectrum {
+    /// [`Estimator::direct`] with given random numbers for the choice of light and the point on it, and `with_sky` where
+    /// nothing else brings its light.
+    pub fn direct_at(
+        &self,
+        point: Vec3,
+        hit: &Hit,
+        with_sky: bool,
+        random: (f32, Vec2),
+        rng: &mut Generator,
+    ) -> Spectrum {
         let origin = |to_light: Vec3| leave(point, hit.normal, to_light, hit.distance);
         let cosine = |to_light: Vec3| Spectrum::splat(hit.normal.dot(to_light).max(0.0));
-        self.connected(point, origin, |light| light.importance(point), cosine, random, rng)
+        let weight = |light: &Light<'_>| if light.is_sky() && !with_sky { 0.0 } else { light.importance(point) };
+        self.connected(point, origin, weight, cosine, random, rng)
     }
 
     /// Light of one of the lights, chosen by `weight`, times `value(to_light)`. Transmittance is marched:
@@ -348,11 +411,18 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
         value * sample.incident.irradiance * through / chosen.probability
     }
 
-    /// Irradiance (W·m⁻²) that is not straight from the lights, by one path.
+    /// Irradiance (W·m⁻²) that is not straight from the lights but from a sky, by one path.
     pub fn indirect(&self, point: Vec3, hit: &Hit, rng: &mut Generator) -> Spectrum {
         let to_light = Frame::around(hit.normal).to_world(warp::cosine_hemisphere(uniform2(rng)));
         let origin = leave(point, hit.normal, to_light, hit.distance);
-        self.traced(&Ray::new(origin, to_light), rng) * float::PI
+        let ray = Ray::new(origin, to_light);
+        let mut light = self.traced(&ray, rng);
+        let sky = sky(self.world.lights, to_light);
+        if !sky.is_black() && nearest_surface(&ray, self.world.scene).is_none() {
+            let marching = Marching { steps: self.walk.steps, offset: uniform(rng) };
+            light += sky * transmittance(&ray, self.world.medium, marching);
+        }
+        light * float::PI
     }
 
     /// Radiance (W·m⁻²·sr⁻¹) that a surface of any kind sends `to_eye` from the lights, by one connection.
@@ -370,18 +440,23 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
         self.connected(point, origin, |light| light.importance(point), value, random, rng)
     }
 
-    /// Light of all lights, scattered once at `point` towards `to_eye`: one sample of each.
+    /// Light of all lights but a sky, scattered once at `point` towards `to_eye`: one sample of each.
     pub fn towards(&self, point: Vec3, to_eye: Vec3, phase: &Phase, rng: &mut Generator) -> Spectrum {
-        let World { medium, scene, lights } = self.world;
-        single_scatter::sample(point, to_eye, phase, medium, scene, lights, 1, self.walk.steps, rng).value
+        let World { medium, scene, .. } = self.world;
+        let steps = self.walk.steps;
+        let of = |lights| single_scatter::sample(point, to_eye, phase, medium, scene, lights, 1, steps, rng).value;
+        self.near_lights().map(of).sum()
     }
 
-    /// Light of surfaces, scattered once at `point` towards `to_eye`: one direction.
+    /// Light of surfaces and the sky, scattered once at `point` towards `to_eye`: one direction.
     pub fn surface_towards(&self, point: Vec3, to_eye: Vec3, phase: &Phase, rng: &mut Generator) -> Spectrum {
-        let World { medium, scene, .. } = self.world;
         let mut child = Generator::child(rng);
-        let outgoing = |ray: &Ray, hit: &Hit| self.outgoing(ray, hit, &mut child);
-        single_scatter::sample_surfaces(point, to_eye, phase, medium, scene, outgoing, 1, self.walk.steps, rng).value
+        let ray = Ray::new(point, warp::uniform_sphere(uniform2(rng)));
+        let marching = Marching { steps: self.walk.steps, offset: uniform(rng) };
+        let end = nearest_surface(&ray, self.world.scene);
+        let through = || self.through(&ray, end.as_ref(), marching);
+        let arrival = self.arriving(&ray, end.as_ref(), warp::uniform_sphere_pdf(), through, &mut child);
+        arrival.map_or(Spectrum::ZERO, |arrival| arrival.scatter(to_eye, phase).radiance)
     }
 
     /// Light scattered more than once, the last time at `point` towards `to_eye`: one walk.

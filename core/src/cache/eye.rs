@@ -73,13 +73,13 @@ pub struct Caches<'a> {
 pub struct Seen {
     /// Lights, the environment and glowing media.
     pub emitted: Spectrum,
-    /// Surfaces lit by the lights.
+    /// Surfaces lit by the lights; diffuse ones but for a sky ([`Light::is_sky`]), whose light is indirect.
     pub surface_direct: Spectrum,
     /// Surfaces lit by anything else.
     pub surface_indirect: Spectrum,
-    /// Light of the lights, scattered once in the medium.
+    /// Light of the lights but a sky, scattered once in the medium.
     pub medium_single: Spectrum,
-    /// Light of surfaces, scattered once in the medium.
+    /// Light of surfaces and a sky, scattered once in the medium.
     pub medium_surface: Spectrum,
     /// Light scattered more than once, the last time in the medium.
     pub medium_multiple: Spectrum,
@@ -326,7 +326,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Gather<'_, M, S> {
         });
         let weight = |light: &Light<'_>| {
             let is_near = light.steep_field().is_some_and(|field| field.contains(point));
-            if is_near { 0.0 } else { light.importance(point) }
+            if is_near || (light.is_sky() && self.settings.indirect) { 0.0 } else { light.importance(point) }
         };
         let value = |to_light: Vec3| properties.phase.value(deflection(to_light, to_eye));
         self.estimator.connected(point, |_| point, weight, value, (choice, Vec2::new(u, v)), &mut self.rng)
@@ -456,7 +456,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Sight for Gather<'_, M, S> {
                 return;
             }
         };
-        let direct = self.estimator.direct_at(point, hit, self.surface, &mut self.rng);
+        let direct = self.estimator.direct_at(point, hit, !self.settings.indirect, self.surface, &mut self.rng);
         self.seen.surface_direct += weight * value * direct;
         if !self.settings.indirect {
             return;

@@ -9,6 +9,10 @@ use crate::sampling::discrete::Table2;
 use crate::sampling::warp;
 use crate::spectrum::Spectrum;
 
+/// Brightest texel over the mean radiance, up to which an environment counts as even. A clear sky
+/// around a sun that was cut out has some 5, a sun thousands.
+const MOST_EVEN: f32 = 8.0;
+
 /// Parallel light.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sun {
@@ -71,6 +75,7 @@ pub struct EnvironmentMap<'a> {
     table: Table2<'a>,
     to_world: Mat3,
     mean: Spectrum,
+    brightest: f32,
 }
 
 impl<'a> EnvironmentMap<'a> {
@@ -123,7 +128,8 @@ impl<'a> EnvironmentMap<'a> {
         }
         let mean = Spectrum(mean.map(|sum| (sum / total) as f32));
         let table = Table2::build(width, weights, column).ok_or(LightError::Emission)?;
-        Ok(Self { width, height, texels, table, to_world, mean })
+        let brightest = texels.iter().map(|t| t.max_element()).fold(0.0, f32::max);
+        Ok(Self { width, height, texels, table, to_world, mean, brightest })
     }
 
     /// Angle (rad) between rows of texels.
@@ -136,6 +142,11 @@ impl<'a> EnvironmentMap<'a> {
     #[must_use]
     pub fn mean_radiance(&self) -> Spectrum {
         self.mean
+    }
+
+    /// Whether no place of it is so bright that directions which know nothing of it would do badly.
+    pub(super) fn is_even(&self) -> bool {
+        self.brightest <= MOST_EVEN * self.mean.max_element()
     }
 
     fn texture(&self, to_light: Vec3) -> Vec2 {

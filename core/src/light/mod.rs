@@ -160,6 +160,13 @@ impl LightSample {
     }
 }
 
+/// Radiance (W·m⁻²·sr⁻¹) of all lights together that are a sky: see [`Light::is_sky`].
+#[inline]
+#[must_use]
+pub fn sky(lights: &[Light<'_>], to_light: Vec3) -> Spectrum {
+    lights.iter().filter(|light| light.is_sky()).map(|light| light.background(to_light)).sum()
+}
+
 impl Light<'_> {
     /// Draws a point of the light, as seen from `from`. `None` where the light cannot reach.
     #[inline]
@@ -216,6 +223,19 @@ impl Light<'_> {
             Self::Constant(radiance) => *radiance,
             Self::Environment(map) => map.radiance(to_light),
             _ => Spectrum::ZERO,
+        }
+    }
+
+    /// Whether it shines evenly from everywhere around the world, so that directions which know nothing of it
+    /// meet it well. Caches keep the light of such a sky, as that of surfaces infinitely far: a
+    /// connection to it from every place would be noise wherever walls hide most of it.
+    #[inline]
+    #[must_use]
+    pub fn is_sky(&self) -> bool {
+        match self {
+            Self::Constant(_) => true,
+            Self::Environment(map) => map.is_even(),
+            _ => false,
         }
     }
 

@@ -5,7 +5,7 @@ use glam::{Vec2, Vec3};
 use super::flight::{Collision, Flown, Lengths, fly, own};
 use super::weight::{Shift, Weight};
 use crate::host::{Hit, Medium, Properties, Rng, Scene};
-use crate::light::{Falloff, Light};
+use crate::light::{Falloff, Light, sky};
 use crate::math::{Ray, float};
 use crate::phase::{Phase, deflection};
 use crate::sampling::discrete::choose;
@@ -13,7 +13,9 @@ use crate::sampling::distance::Equiangular;
 use crate::sampling::{Generator, uniform, uniform2, warp};
 use crate::single_scatter::{Arrival, Contribution, nearest_surface, shadow_ray};
 use crate::spectrum::{Gradient, Spectrum};
-use crate::transmittance::thickness::{Marching, Steps, optical_thickness_with_gradients};
+use crate::transmittance::thickness::{
+    Marching, Steps, optical_thickness_with_gradients, transmittance_with_gradients,
+};
 
 /// Beyond this many distances to the light an endless segment is not sampled equiangularly: 10⁻⁴ of
 /// the angle lies there, and `tan` loses its digits.
@@ -173,14 +175,15 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Walk<'_, M, S> {
             bend = (!properties.phase.is_isotropic()).then_some((to_eye, properties.phase));
             ray = Ray { origin: at, direction: turn.to_light, length: f32::INFINITY };
             end = nearest_surface(&ray, self.scene);
-            if let Some(hit) = end {
-                ray.length = hit.distance;
-                let marching = self.marching(rng);
-                let radiance = outgoing(&ray, &hit);
-                let arrival = Arrival::from_surface(&ray, &hit, radiance, turn.pdf, self.medium, marching);
-                if let Some(arrival) = arrival {
-                    add_scattered(&mut total, &weight, &arrival, to_eye, &properties.phase);
-                }
+            ray.length = end.map_or(f32::INFINITY, |hit| hit.distance);
+            let radiance = end.as_ref().map_or_else(|| sky(self.lights, ray.direction), |hit| outgoing(&ray, hit));
+            if end.is_none() && radiance.is_black() {
+                continue;
+            }
+            let marching = self.marching(rng);
+            let through = || transmittance_with_gradients(&ray, self.medium, marching);
+            if let Some(arrival) = Arrival::from_end(&ray, end.as_ref(), radiance, turn.pdf, through) {
+                add_scattered(&mut total, &weight, &arrival, to_eye, &properties.phase);
             }
         }
         // A light or a hit within rounding of a vertex may leave the range of f32.
@@ -214,7 +217,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Walk<'_, M, S> {
     ) {
         let importance = |light: &Light<'_>| {
             let near = light.steep_field().is_some_and(|field| field.contains(at));
-            if near { 0.0 } else { light.importance(at) }
+            if near || light.is_sky() { 0.0 } else { light.importance(at) }
         };
         self.each_light(importance, rng, |light, share, rng| {
             let mut sample = light.sample(at, uniform2(rng))?;

@@ -160,6 +160,24 @@ impl Arrival {
         Self::through(&ray.with_length(hit.distance), irradiance, slope, &through())
     }
 
+    /// [`Arrival::from_surface_through`] for the `end` of a ray: a surface, or, without one, the sky
+    /// ([`crate::light::sky`]), a surface infinitely far.
+    #[must_use]
+    pub fn from_end(
+        ray: &Ray,
+        end: Option<&Hit>,
+        outgoing: Spectrum,
+        pdf: f32,
+        through: impl FnOnce() -> Transmittance,
+    ) -> Option<Self> {
+        let Some(hit) = end else {
+            let seen = !outgoing.is_black() && pdf > 0.0;
+            let ray = ray.with_length(f32::INFINITY);
+            return seen.then(|| Self::through(&ray, outgoing / pdf, Gradient::ZERO, &through())).flatten();
+        };
+        Self::from_surface_through(ray, hit, outgoing, pdf, through)
+    }
+
     /// `None` where the light or its slope leaves the range of `f32`, within about 10⁻¹² m of a strong
     /// source: as at the source itself.
     fn through(ray: &Ray, irradiance: Spectrum, slope: Gradient, t: &Transmittance) -> Option<Self> {

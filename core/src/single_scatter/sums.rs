@@ -45,6 +45,13 @@ impl Sums {
         }
     }
 
+    /// Adds to the norms alone: change (W·m⁻³·sr⁻¹) of which no direction is known.
+    #[inline]
+    pub fn add_norm(&mut self, norm: Spectrum) {
+        self.gradient_norms += norm;
+        self.unshadowed_gradient_norms += norm;
+    }
+
     /// Adds the summands of another estimate.
     #[inline]
     pub fn merge(&mut self, other: &Self) {
