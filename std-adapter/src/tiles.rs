@@ -13,16 +13,21 @@ use fogbow::spectrum::Spectrum;
 use rayon::iter::{IndexedParallelIterator, IntoParallelIterator, ParallelIterator};
 
 use crate::film::{Film, accumulate};
+pub use crate::noise::Goal;
+use crate::noise::Noise;
 use crate::progress::{Control, Reporter};
 use crate::seed::{SampleRng, Sequence, pixel_key};
 use crate::stats::{Counters, Seconds, Stopwatch, Tally};
 
 /// How to render.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Settings {
     /// Samples every pixel shall have in the end, those already in the film included; `u32::MAX`
     /// for as many as time allows.
     pub samples: u32,
+    /// Ends a tile sooner, once its new samples leave less noise than this. [`render_prepared`], whose noise is that of
+    /// passes and not of samples, takes no notice.
+    pub goal: Option<Goal>,
     /// Time granted on the wall clock, if limited. Whole passes are done while they are expected
     /// to fit, so it is missed by part of a pass at most; the first sample of each pixel is always taken.
     pub time: Option<Duration>,
@@ -33,13 +38,13 @@ pub struct Settings {
     /// Kind of random numbers.
     pub sequence: Sequence,
     /// Side of a tile in pixels. Larger: threads wait for each other at the end of a pass.
-    /// Smaller: more locking of the film. Changes no result.
+    /// Smaller: more locking of the film. Changes no result but with a [`Settings::goal`], which each tile reaches by itself.
     pub tile: u32,
 }
 
 impl Default for Settings {
     fn default() -> Self {
-        Self { samples: 16, time: None, threads: 0, seed: 0, sequence: Sequence::default(), tile: 8 }
+        Self { samples: 16, goal: None, time: None, threads: 0, seed: 0, sequence: Sequence::default(), tile: 8 }
     }
 }
 
@@ -59,7 +64,7 @@ pub struct Sample<'t> {
 /// Why a render ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Reason {
-    /// Every pixel has its samples.
+    /// Every pixel has its samples, or little enough noise.
     Done,
     /// The host asked to stop. The tiles finished by then are in the film, with their own counts.
     Cancelled,
@@ -106,11 +111,12 @@ impl core::error::Error for RenderError {}
 /// Samples per pixel of the longest pass: longer ones would keep a cancelled picture uneven.
 const LONGEST_PASS: u32 = 32;
 
-/// Adds samples to `film` until every pixel has [`Settings::samples`], or time or host end it.
+/// Adds samples to `film` until every pixel has [`Settings::samples`] or its tile reaches [`Settings::goal`], or time or
+/// host end it.
 ///
 /// `integrand` writes one colour per layer into the slice it is given (black at first), from the
 /// random numbers it is given and nothing else that changes: then the film's bits depend on
-/// neither threads nor tiles nor passes, and a film rendered in two goes equals one rendered in one.
+/// neither threads nor tiles nor passes, and (without a goal) a film rendered in two goes equals one rendered in one.
 /// A sample with a value that is not finite counts as black and in [`Counters::non_finite`].
 ///
 /// # Errors
@@ -215,8 +221,10 @@ where
             loop {
                 let (from, start) = (film.min_count(), reporter.elapsed());
                 let (reporter, film_of) = (&reporter, Mutex::new(&mut *film));
-                counters += Pass { film: film_of, settings, control, reporter, integrand: &integrand, until }.run();
-                if film.min_count() < until {
+                let pass = Pass { film: film_of, settings, control, reporter, integrand: &integrand, until, noise: None };
+                let (counted, is_complete) = pass.run();
+                counters += counted;
+                if !is_complete {
                     return Ok((Reason::Cancelled, counters));
                 }
                 let now = reporter.elapsed();
@@ -270,9 +278,10 @@ fn passes<F>(
 where
     F: Fn(&Sample<'_>, &mut SampleRng, &mut [Spectrum]) + Sync,
 {
-    let (mut counters, mut length) = (Counters::default(), 1);
+    let (mut counters, mut length, mut done) = (Counters::default(), 1, film.min_count());
+    let tiles = film.width().div_ceil(settings.tile) * film.height().div_ceil(settings.tile);
+    let mut noise = settings.goal.map(|goal| Noise::new(goal, tiles as usize));
     loop {
-        let done = film.min_count();
         if done >= settings.samples {
             return (Reason::Done, counters);
         }
@@ -281,10 +290,15 @@ where
         }
         let until = done.saturating_add(length).min(settings.samples);
         let before = reporter.elapsed();
-        let pass = Pass { film: Mutex::new(film), settings, control, reporter, integrand, until };
-        counters += pass.run();
-        if film.min_count() < until {
+        let noise_of = noise.as_ref();
+        let pass = Pass { film: Mutex::new(film), settings, control, reporter, integrand, until, noise: noise_of };
+        let (counted, is_complete) = pass.run();
+        counters += counted;
+        if !is_complete {
             return (Reason::Cancelled, counters);
+        }
+        if noise.as_mut().is_some_and(|noise| noise.judge(until)) {
+            return (Reason::Done, counters);
         }
         let now = reporter.elapsed();
         length = until.min(LONGEST_PASS);
@@ -294,6 +308,7 @@ where
                 None => return (Reason::TimeUp, counters),
             }
         }
+        done = until;
     }
 }
 
@@ -309,7 +324,7 @@ fn affordable(settings: &Settings, now: Duration, taken: Duration, samples: u32)
     Some(((0.75 * affordable) as u32).max(1))
 }
 
-/// One pass: every pixel gets its samples up to `until`.
+/// One pass: every pixel gets its samples up to `until`, but in tiles whose noise is little enough.
 struct Pass<'a, F> {
     film: Mutex<&'a mut Film>,
     settings: &'a Settings,
@@ -317,10 +332,12 @@ struct Pass<'a, F> {
     reporter: &'a Reporter<'a>,
     integrand: &'a F,
     until: u32,
+    noise: Option<&'a Noise>,
 }
 
 /// Columns and rows of a tile: from (inclusive) and to (exclusive).
 struct Tile {
+    index: u32,
     x: [u32; 2],
     y: [u32; 2],
 }
@@ -329,7 +346,8 @@ impl<F> Pass<'_, F>
 where
     F: Fn(&Sample<'_>, &mut SampleRng, &mut [Spectrum]) + Sync,
 {
-    fn run(&self) -> Counters {
+    /// What was done, and whether all of it.
+    fn run(&self) -> (Counters, bool) {
         let (width, height) = self.with_film(|film| (film.width(), film.height()));
         let side = self.settings.tile;
         let (columns, rows) = (width.div_ceil(side), height.div_ceil(side));
@@ -339,14 +357,19 @@ where
             .with_max_len(1)
             .map(|i| {
                 let span = |at: u32, end: u32| [at * side, (at * side).saturating_add(side).min(end)];
-                self.tile(&Tile { x: span(i % columns, width), y: span(i / columns, height) }).unwrap_or_default()
+                let tile = Tile { index: i, x: span(i % columns, width), y: span(i / columns, height) };
+                self.tile(&tile).map_or((Counters::default(), false), |counters| (counters, true))
             })
             // Integers: their sum is the same in any order.
-            .reduce(Counters::default, |a, b| a + b)
+            .reduce(|| (Counters::default(), true), |a, b| (a.0 + b.0, a.1 && b.1))
     }
 
     /// Works on a copy of the tile's sums and puts it back when complete; `None` if cancelled.
     fn tile(&self, tile: &Tile) -> Option<Counters> {
+        let mut noise = self.noise.map(|noise| noise.tile(tile.index));
+        if noise.as_ref().is_some_and(|noise| noise.is_enough()) {
+            return Some(Counters::default());
+        }
         let (mut sums, mut counts) = (Vec::new(), Vec::new());
         let layers = self.with_film(|film| {
             for y in tile.y[0]..tile.y[1] {
@@ -356,6 +379,9 @@ where
             }
             film.layers().len()
         });
+        if let Some(noise) = &mut noise {
+            noise.begin(sums.iter().step_by(layers).zip(counts.iter().copied()));
+        }
         let (tally, mut colours) = (Tally::default(), vec![Spectrum::ZERO; layers]);
         let (mut samples, mut non_finite) = (0, 0);
         let width = (tile.x[1] - tile.x[0]) as usize;
@@ -376,6 +402,9 @@ where
                 samples += 1;
             }
             *count = self.until.max(*count);
+        }
+        if let Some(noise) = &mut noise {
+            noise.end(sums.iter().step_by(layers).zip(counts.iter().copied()));
         }
         self.with_film(|film| {
             for (i, y) in (tile.y[0]..tile.y[1]).enumerate() {

@@ -43,10 +43,14 @@ pub struct RenderArguments {
     /// How light is computed.
     #[arg(long, value_enum, default_value_t = Method::Path)]
     pub method: Method,
-    /// Samples per pixel, for photon beams and virtual lights rounded up to whole passes [default: what the scene says, for
-    /// radiance caching 64, for virtual lights one pass; with --time, as many as fit].
+    /// Samples per pixel, with --noise the most; for photon beams and virtual lights rounded up to whole passes [default: what
+    /// the scene says, for radiance caching as --noise 0.02 wants, at most 256, for virtual lights one pass; with --time, as many as fit].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub spp: Option<u32>,
+    /// Relative noise at which tiles of 8 by 8 pixels have enough samples: they get 8, and more where that leaves more noise;
+    /// not for photon beams and virtual lights, whose noise is that of whole passes.
+    #[arg(long, value_name = "E", value_parser = output::positive)]
+    pub noise: Option<f64>,
     /// Seconds to render for, on the wall clock.
     #[arg(long, value_name = "SECONDS", value_parser = output::positive)]
     pub time: Option<f64>,
@@ -143,11 +147,18 @@ const VPL_LAYERS: [&str; 12] = {
 /// Samples per pixel of virtual lights: one pass.
 const VPL_SAMPLES: u32 = 64;
 
-/// Samples per pixel of radiance caching: what is left for them to even out are edges and direct light.
-const CACHE_SAMPLES: u32 = 64;
+/// Noise of radiance caching, where neither samples nor time are given: that of its records is of this size. What is left
+/// for samples to even out are edges and direct light.
+const CACHE_NOISE: f64 = 0.02;
 
-/// The same where there is nothing but direct light.
-const DIRECT_SAMPLES: u32 = 256;
+/// The most samples per pixel for that: where noise falls no faster, an edge runs between black and a lamp.
+const CACHE_SAMPLES: u32 = 256;
+
+/// Samples that tell how much noise there is.
+const LEAST_SAMPLES: u32 = 8;
+
+/// The most samples per pixel for a given noise: a light seen through a keyhole must not take forever.
+const MOST_SAMPLES: u32 = 65536;
 
 /// Set by Ctrl-C.
 static STOP: AtomicBool = AtomicBool::new(false);
@@ -203,6 +214,9 @@ pub(crate) fn render(arguments: &RenderArguments) -> Result<Rendered, Failure> {
     if arguments.method == Method::RadianceCache {
         check_depth(&paths)?;
     }
+    if arguments.noise.is_some() && matches!(arguments.method, Method::PhotonBeams | Method::Vpl) {
+        return Err("--noise: the noise of photon beams and virtual lights is that of whole passes; use --spp or --time".into());
+    }
     let mut storage = Storage::new(&scene);
     let world = statistics.time("build", || World::new(&scene, &mut storage))?;
     let (width, height) = arguments.size.unwrap_or((scene.sensor.width, scene.sensor.height));
@@ -228,20 +242,10 @@ pub(crate) fn render(arguments: &RenderArguments) -> Result<Rendered, Failure> {
     let bar = Bar::new(arguments.quiet);
     let progress = |progress: &Progress| bar.show(progress, u64::from(width) * u64::from(height));
     let control = Control { cancel: Some(&STOP), progress: Some(&progress) };
-    let samples = match (arguments.spp, arguments.time) {
-        (Some(spp), _) => spp,
-        (None, Some(_)) => u32::MAX,
-        (None, None) if arguments.method == Method::RadianceCache => {
-            let is_direct = path_settings(&scene, arguments.max_depth).max_scatterings <= 1;
-            if is_direct { DIRECT_SAMPLES } else { CACHE_SAMPLES }
-        }
-        (None, None) if arguments.method == Method::Vpl => {
-            arguments.beams.pass_samples.map_or(VPL_SAMPLES, core::num::NonZero::get)
-        }
-        (None, None) => scene.sensor.samples,
-    };
+    let (samples, noise) = arguments.samples(scene.sensor.samples);
     let settings = tiles::Settings {
         samples,
+        goal: noise.map(|noise| tiles::Goal { noise: noise as f32, least: LEAST_SAMPLES }),
         time: arguments.time.map(Duration::try_from_secs_f64).transpose()?,
         threads: arguments.threads,
         seed: arguments.seed,
@@ -343,6 +347,21 @@ impl RenderArguments {
     /// Whether virtual lights' layers are kept: pixels that are filled in have none.
     fn is_audited(&self) -> bool {
         (self.aov || self.stats.is_some()) && self.sampling.is_uniform()
+    }
+
+    /// Samples of a pixel at most, given what the scene names, and the noise at which fewer are enough.
+    fn samples(&self, named: u32) -> (u32, Option<f64>) {
+        let is_free = self.spp.is_none() && self.time.is_none();
+        let usual = (is_free && self.method == Method::RadianceCache).then_some(CACHE_NOISE);
+        let samples = match (self.spp, self.time, self.method) {
+            (Some(spp), ..) => spp,
+            (None, Some(_), _) => u32::MAX,
+            (None, None, _) if self.noise.is_some() => MOST_SAMPLES,
+            (None, None, Method::RadianceCache) => CACHE_SAMPLES,
+            (None, None, Method::Vpl) => self.beams.pass_samples.map_or(VPL_SAMPLES, core::num::NonZero::get),
+            (None, None, _) => named,
+        };
+        (samples, self.noise.or(usual))
     }
 
     /// Photons that usually fill the grid.

@@ -68,6 +68,12 @@ pub(super) struct Report<'a> {
 }
 
 impl Report<'_> {
+    /// The mean, to a tenth: tiles with little noise have fewer.
+    fn samples_per_pixel(&self) -> f64 {
+        let pixels = f64::from(self.size.0) * f64::from(self.size.1);
+        (self.outcome.counters.samples as f64 / pixels * 10.0).round() / 10.0
+    }
+
     /// The summary, on standard error: standard output stays free for scripts.
     pub(super) fn print(&self) {
         let Seconds { wall, cpu } = self.outcome.seconds;
@@ -78,7 +84,7 @@ impl Report<'_> {
             Reason::TimeUp => " (time is up)",
             Reason::Cancelled => " (stopped early; the image so far is kept)",
         };
-        eprintln!("{width} x {height} pixels, {} samples per pixel{ending}", self.outcome.samples);
+        eprintln!("{width} x {height} pixels, {} samples per pixel{ending}", self.samples_per_pixel());
         let cpu = cpu.map_or_else(String::new, |c| format!(", {} of processor time", clock(c)));
         eprintln!("{}{cpu}, {:.2} million rays per second", clock(wall), self.rays_per_second() * 1e-6);
         if counters.non_finite > 0 {
@@ -145,7 +151,7 @@ impl Report<'_> {
             },
             self.size.0,
             self.size.1,
-            self.outcome.samples,
+            self.samples_per_pixel(),
             self.arguments.seed,
             counters.samples,
             counters.rays,

@@ -180,6 +180,10 @@ pub(super) const COARSE: [u64; 2] = [4, 5];
 /// Of those, so many first records get so many times the samples: what they have wrong nothing averages out.
 const FIRST: (u64, u32) = (100, 8);
 
+/// Eye rays from whose points others are followed to what lights them. More find small things that are seen; light is
+/// sums over all that is met, small things included.
+const LIGHTING: u32 = 16384;
+
 /// Records of which nothing usual can be said.
 const FEW: usize = 64;
 
@@ -269,7 +273,7 @@ where
             if place.is_seen {
                 is_open = !self.is_covered(caches, &place);
             }
-            if !is_open {
+            if !is_open || (!place.is_seen && number >= LIGHTING) {
                 return;
             }
             found.push(Wanted { place, distance: place.point.distance(ray.origin) });
