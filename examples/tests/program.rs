@@ -220,6 +220,8 @@ fn bad_input_is_exit_code_2_and_no_image() {
         (&["render", SCENE, "--size", "65536x65536"], "pixels"),
         (&["render", SCENE, "--spp", "0"], "--spp"),
         (&["render", SCENE, "--time=-3"], "--time"),
+        (&["render", SCENE, "--noise", "0"], "--noise"),
+        (&["render", SCENE, "--noise", "0.02", "--method", "vpl"], "--noise: the noise of photon beams"),
         (&["render", SCENE, "--time", "nan"], "--time"),
         (&["render", SCENE, "--max-depth", "0"], "--max-depth"),
         (&["render", SCENE, "--method", "magic"], "magic"),

@@ -221,7 +221,8 @@ where
             loop {
                 let (from, start) = (film.min_count(), reporter.elapsed());
                 let (reporter, film_of) = (&reporter, Mutex::new(&mut *film));
-                let pass = Pass { film: film_of, settings, control, reporter, integrand: &integrand, until, noise: None };
+                let pass =
+                    Pass { film: film_of, settings, control, reporter, integrand: &integrand, until, noise: None };
                 let (counted, is_complete) = pass.run();
                 counters += counted;
                 if !is_complete {

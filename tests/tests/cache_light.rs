@@ -4,8 +4,8 @@ use fogbow::cache::{
     Cache, Caches, Estimator, Extrapolation, EyeSettings, Reader, Reading, Record, VolumeCache, clearance, radiance,
 };
 use fogbow::host::{Empty, Medium, Scene};
-use fogbow::light::{Light, PointLight};
-use fogbow::math::{Ray, Vec2, Vec3, float::PI};
+use fogbow::light::{EnvironmentMap, Light, PointLight, Sun};
+use fogbow::math::{Mat3, Ray, Vec2, Vec3, float::PI};
 use fogbow::medium::Homogeneous;
 use fogbow::multiple_scatter;
 use fogbow::path::{self, World};
@@ -83,9 +83,9 @@ fn light_in_a_furnace_is_as_bright_as_the_sky() {
         let make = estimator(&medium, &Empty, &lights);
         let seen = estimate(1500, |rng| {
             let to_eye = warp::uniform_sphere(uniform2(rng));
-            let (_, single) = expanded(degree, to_eye, |higher| make.single(point, &phase, higher, rng));
+            let (_, once) = expanded(degree, to_eye, |higher| make.surface(point, &phase, 4, higher, rng));
             let (_, multiple) = expanded(degree, to_eye, |higher| make.multiple(point, &phase, 16, higher, rng));
-            single + multiple
+            once + multiple
         });
         seen.assert_is(SKY, 2e-5, &format!("{phase:?}"));
     }
@@ -110,7 +110,7 @@ fn white_bodies_in_a_furnace_are_as_bright_as_the_sky() {
         single + surface + make.multiple(beside, &Phase::ISOTROPIC, 4, &mut [], rng).value
     });
     seen.assert_is(SKY, 2e-4, "in the fog");
-    // On it: irradiance straight from the sky, and indirect.
+    // On it: irradiance from the sky, which counts as indirect.
     let (at, normal) = (Vec3::Y * 0.5, Vec3::Y);
     let hit = fogbow::host::Hit { distance: 1.0, normal, surface: body.surface, light: None };
     let seen = estimate(3000, |rng| {
@@ -118,6 +118,85 @@ fn white_bodies_in_a_furnace_are_as_bright_as_the_sky() {
         (direct + make.irradiance(at, normal, 4, rng).0.value) / PI
     });
     seen.assert_is(SKY, 2e-4, "on the ball");
+}
+
+/// Where nothing is cached, eye rays count the sky once, from surfaces and from fog: as bright as itself in a furnace,
+/// and, of light scattered once, as bright as path tracing finds it.
+#[test]
+fn eye_rays_without_caches_count_the_sky_once() {
+    use fogbow::medium::{Placed, Region};
+    let body = Ball { centre: Vec3::ZERO, radius: 0.5, surface: Surface::Lambert { reflectance: Spectrum::ONE } };
+    let medium = Placed::new(fog(0.0, 0.8, Phase::ISOTROPIC), Region::sphere(Vec3::ZERO, 1.5).unwrap());
+    let lights = sky();
+    // One ray meets the ball, one passes it.
+    for origin in [Vec3::new(0.1, 0.2, 4.0), Vec3::new(0.9, 0.3, 4.0)] {
+        let ray = Ray::new(origin, Vec3::NEG_Z);
+        let make = estimator(&medium, &body, &lights);
+        let eye = EyeSettings { density: 8.0, connections: 4, lights_visible: true, indirect: true };
+        let all = estimate(8000, |rng| radiance(&ray, &make, &Caches::default(), &eye, rng).total());
+        all.assert_is(SKY, 2e-4, &format!("all light from {origin}"));
+
+        let once = path::Settings { max_scatterings: 1, ..path::Settings::default() };
+        let make = Estimator { paths: once, ..make };
+        let eye = EyeSettings { indirect: false, ..eye };
+        let direct = estimate(20_000, |rng| radiance(&ray, &make, &Caches::default(), &eye, rng).total());
+        let traced = estimate(200_000, |rng| path::radiance(&ray, &make.world, &once, rng).total());
+        for c in 0..3 {
+            let apart = (direct.mean[c] - traced.mean[c]).abs();
+            let error = direct.error[c].hypot(traced.error[c]);
+            assert!(apart < 4.0 * error && error < 0.01 * traced.mean[c], "{direct:?} instead of {traced:?}");
+        }
+    }
+}
+
+/// Black below the horizon, 2 m away in all directions.
+struct Bowl;
+
+impl Scene for Bowl {
+    fn closest_hit(&self, ray: &Ray) -> Option<fogbow::host::Hit> {
+        (ray.direction.y < 0.0).then_some(fogbow::host::Hit {
+            distance: 2.0,
+            normal: -ray.direction,
+            surface: Surface::BLACK,
+            light: None,
+        })
+    }
+    fn is_blocked(&self, ray: &Ray) -> bool {
+        self.closest_hit(ray).is_some()
+    }
+}
+
+/// An even sky has no gradient, but what stands before it moves: its light changes by 2 L/r at most.
+#[test]
+fn the_edges_of_a_sky_bound_radii() {
+    let medium = fog(0.0, 0.0, Phase::ISOTROPIC);
+    let lights = sky();
+    let make = estimator(&medium, &Bowl, &lights);
+    let sums = make.surface(Vec3::ZERO, &Phase::ISOTROPIC, 4096, &mut [], &mut Generator::new(3));
+    assert!((sums.value - Spectrum::new(0.5, 1.0, 1.5)).0.iter().all(|c| c.abs() < 0.01), "{:?}", sums.value);
+    assert_eq!(sums.gradient, Gradient::ZERO);
+    let radius = fogbow::cache::valid_radius(&sums, 0.25).unwrap();
+    assert!((radius - 0.25).abs() < 1e-4, "{radius} m: 0.25 of half of 2 m");
+    // An open sky looks the same from everywhere.
+    let make = estimator(&medium, &Empty, &lights);
+    let sums = make.surface(Vec3::ZERO, &Phase::ISOTROPIC, 64, &mut [], &mut Generator::new(3));
+    assert_eq!(fogbow::cache::valid_radius(&sums, 0.25), None);
+}
+
+#[test]
+fn an_environment_is_a_sky_unless_it_holds_a_sun() {
+    for (brightest, is_sky) in [(1.0, true), (6.0, true), (500.0, false)] {
+        let mut texels = vec![Spectrum::ONE; 16 * 8];
+        texels[40] = Spectrum::splat(brightest);
+        let (mut weights, mut column) = (vec![0.0; texels.len()], vec![0.0; 8]);
+        let map = EnvironmentMap::new(16, 8, &texels, &mut weights, &mut column, Mat3::IDENTITY).unwrap();
+        let lights = [Light::Environment(&map), Light::Constant(Spectrum::ONE)];
+        assert_eq!(lights[0].is_sky(), is_sky, "{brightest}");
+        let seen = if is_sky { map.radiance(Vec3::Y) + Spectrum::ONE } else { Spectrum::ONE };
+        assert_eq!(fogbow::light::sky(&lights, Vec3::Y), seen);
+    }
+    let sun = Sun::new(Vec3::Y, Spectrum::ONE).unwrap();
+    assert!(!Light::Sun(sun).is_sky());
 }
 
 /// Inside a closed hollow ball without anything in it whose wall reflects half of what it gets, with a lamp in the

@@ -12,7 +12,7 @@ use fogbow_std::film::Film;
 use fogbow_std::progress::{Control, Progress};
 use fogbow_std::seed::{SampleRng, Sequence};
 use fogbow_std::stats::{CountingMedium, CountingScene};
-use fogbow_std::tiles::{Outcome, Reason, RenderError, Sample, Settings, render};
+use fogbow_std::tiles::{Goal, Outcome, Reason, RenderError, Sample, Settings, render};
 
 const LAYERS: [&str; 2] = ["total", "steps"];
 
@@ -74,6 +74,46 @@ fn a_film_rendered_in_two_goes_equals_one_rendered_in_one() {
     // And there is nothing left to do.
     assert_eq!(run(&mut twice, settings).counters.samples, 0);
     assert_eq!(once, twice);
+}
+
+/// Left of column 16 all samples are 1, right of it they are 0 or 2: mean 1, standard deviation 1.
+fn half_noisy(sample: &Sample<'_>, rng: &mut SampleRng, layers: &mut [Spectrum]) {
+    let coin = if uniform(rng) < 0.5 { 0.0 } else { 2.0 };
+    layers[0] = Spectrum::splat(if sample.x < 16 { 1.0 } else { coin });
+}
+
+#[test]
+fn tiles_get_the_samples_their_noise_asks_for() {
+    let goal = Goal { noise: 0.1, least: 8 };
+    let settings = Settings {
+        samples: 1000,
+        goal: Some(goal),
+        sequence: Sequence::Independent,
+        threads: 1,
+        ..Settings::default()
+    };
+    let mut expected = film();
+    let outcome = render(&mut expected, &settings, &Control::default(), half_noisy).unwrap();
+    assert_eq!((outcome.reason, outcome.samples), (Reason::Done, 8), "where there is no noise");
+    assert_eq!(expected.count(15, 20), 8);
+    // 1/sqrt(n) = 0.1 after 100 samples; passes of 32 end at 96 and 128, and single tiles err by some of these.
+    let noisy =
+        |film: &Film| (0..21).flat_map(|y| (16..37).map(move |x| (x, y))).map(|(x, y)| film.count(x, y)).sum::<u32>();
+    let mean = noisy(&expected) as f32 / (21.0 * 21.0);
+    assert!((85.0..130.0).contains(&mean), "{mean}");
+    let picture = expected.mean(0).unwrap().pixels;
+    let errors = picture.iter().enumerate().filter(|(i, _)| i % 37 >= 16).map(|(_, p)| (p[0] - 1.0) * (p[0] - 1.0));
+    let error = (errors.sum::<f32>() / (21.0 * 21.0)).sqrt();
+    assert!((0.085..0.115).contains(&error), "{error}");
+    for threads in [2, 7] {
+        let mut found = film();
+        let other = render(&mut found, &Settings { threads, ..settings }, &Control::default(), half_noisy).unwrap();
+        assert_eq!((&found, other.counters), (&expected, outcome.counters), "{threads} threads");
+    }
+    // The number of samples still is the most there are.
+    let mut few = film();
+    render(&mut few, &Settings { samples: 32, ..settings }, &Control::default(), half_noisy).unwrap();
+    assert_eq!(noisy(&few), 32 * 21 * 21);
 }
 
 #[test]

@@ -75,15 +75,20 @@ struct Openings {
 }
 
 impl Openings {
-    /// A direction drawn with density `pdf` per sample, and the light that came.
+    /// Light that came along a ray, if from the sky.
     #[inline]
-    fn add(&mut self, end: Option<&Hit>, pdf: f32, light: Spectrum) {
-        match end {
-            None => self.sky += light,
-            Some(hit) => {
-                self.near += 1.0 / (hit.distance * pdf);
-                self.met += 1.0 / pdf;
-            }
+    fn add_sky(&mut self, end: Option<&Hit>, light: Spectrum) {
+        if end.is_none() {
+            self.sky += light;
+        }
+    }
+
+    /// What a ray met, whose direction was drawn with density `pdf`; black or not, it hides the sky.
+    #[inline]
+    fn add_surface(&mut self, end: Option<&Hit>, pdf: f32) {
+        if let Some(hit) = end {
+            self.near += 1.0 / (hit.distance * pdf);
+            self.met += 1.0 / pdf;
         }
     }
 
@@ -177,9 +182,10 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
                     }
                     let arrival = self.steadied(arrival);
                     let light = arrival.scatter_directional(into.moments, 1.0, into.coefficients);
-                    openings.add(end.as_ref(), pdf, light.radiance);
+                    openings.add_sky(end.as_ref(), light.radiance);
                     sums.add(&light, true);
                 }
+                openings.add_surface(end.as_ref(), pdf);
             }
             sums.add_norm(openings.norm());
             sums
@@ -298,10 +304,11 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
             let through = || flown.whole.unwrap_or_default().transmittance();
             if let Some(arrival) = self.arriving(&ray, end.as_ref(), 1.0, through, &mut child) {
                 let light = tilted(&self.steadied(arrival), tilt) * weight;
-                openings.add(end.as_ref(), pdf / cosine, light.radiance);
+                openings.add_sky(end.as_ref(), light.radiance);
                 sums.add(&light, true);
                 total += light;
             }
+            openings.add_surface(end.as_ref(), pdf / cosine);
             let light = self.walked(&walk, ray, end.as_ref(), 1.0, flown.collision, rng);
             let light = tilted(&light, tilt) * weight;
             scattered.add(to_light, &light);

@@ -215,7 +215,9 @@ pub(crate) fn render(arguments: &RenderArguments) -> Result<Rendered, Failure> {
         check_depth(&paths)?;
     }
     if arguments.noise.is_some() && matches!(arguments.method, Method::PhotonBeams | Method::Vpl) {
-        return Err("--noise: the noise of photon beams and virtual lights is that of whole passes; use --spp or --time".into());
+        return Err(
+            "--noise: the noise of photon beams and virtual lights is that of whole passes; use --spp or --time".into(),
+        );
     }
     let mut storage = Storage::new(&scene);
     let world = statistics.time("build", || World::new(&scene, &mut storage))?;
