@@ -4,7 +4,7 @@
     FOGBOW_REFERENCE=FOLDER python3 tests/acceptance/cache.py accuracy    [SCENE...]
     FOGBOW_REFERENCE=FOLDER python3 tests/acceptance/cache.py speed       [SCENE...] [--size 128|512] [--store FOLDER]
     FOGBOW_REFERENCE=FOLDER python3 tests/acceptance/cache.py flicker     [--frames N] [--store FOLDER]
-    FOGBOW_REFERENCE=FOLDER python3 tests/acceptance/cache.py reuse       [--size WxH]
+    FOGBOW_REFERENCE=FOLDER python3 tests/acceptance/cache.py reuse       [--size WxH] [--noise E]
     FOGBOW_REFERENCE=FOLDER python3 tests/acceptance/cache.py determinism [SCENE...]
     FOGBOW_REFERENCE=FOLDER python3 tests/acceptance/cache.py cost        [SCENE...]
 
@@ -23,7 +23,7 @@ flicker      a fresh cache with other seeds for each of 12 frames of `fogbow plu
              converged frame), at most a quarter of path tracing's at equal CPU time. Converged frames come in two
              halves as above, so that their noise drops out of the variance.
 reuse        the walk through the atrium, every frame with the cache of the one before (--cache-in, --cache-out): every
-             later frame takes at most a third of the first one's CPU seconds.
+             later frame takes at most a third of the first one's CPU seconds; --noise for all of them, else the default.
 determinism  the same bytes of .pfm and .exr with 1, 2 and 7 threads, and from a cache saved and loaded.
 cost         CPU time of a record and of a look-up, their ratio (100 to 1000 in Jarosz et al. 2008), and the share of
              look-ups in the render. A look-up is what the render takes more than one of --max-depth 2, which marches to
@@ -165,12 +165,13 @@ def reuse(_, arguments):
     with open(os.path.join(scenes, "atrium-walk.txt")) as file:
         walk = file.read().splitlines()
     size = ("--size", arguments.size) if arguments.size else ()
+    noise = ("--noise", arguments.noise) if arguments.noise else ()
     failures, first = 0, None
     with tempfile.TemporaryDirectory() as folder:
         cache = os.path.join(folder, "walk.cache")
         for number, camera in enumerate(walk):
             known = ("--cache-in", cache) if number else ()
-            _, statistics = render(os.path.join(scenes, "atrium.xml"), *CACHED, "--camera", camera, "--seed", number, *size,
+            _, statistics = render(os.path.join(scenes, "atrium.xml"), *CACHED, "--camera", camera, "--seed", number, *size, *noise,
                                    *known, "--cache-out", cache)
             seconds = cpu(statistics)
             first = first or seconds
@@ -226,6 +227,7 @@ if __name__ == "__main__":
     parser.add_argument("what", choices=what)
     parser.add_argument("scenes", nargs="*", metavar="SCENE")
     parser.add_argument("--size")
+    parser.add_argument("--noise", type=float)
     parser.add_argument("--frames", type=int, default=12)
     parser.add_argument("--spp", type=int, default=512)
     parser.add_argument("--store", default=os.path.join(tempfile.gettempdir(), "fogbow-acceptance"))

@@ -144,6 +144,7 @@ fn body(plan: &Plan) -> Result<String, Failure> {
 fn head(plan: &Plan, seconds: f64) -> String {
     let quick = if plan.quick { " --quick" } else { "" };
     let note = if plan.quick { " These are the quick ones: small, with little effort.\n" } else { "\n" };
+    let [walks, samples] = rendered::efforts(plan);
     format!(
         "# Figures of *Radiance Caching for Participating Media*\n\n\
          Figures 4 to 10 of Jarosz et al. 2008 (J), with the scenes of this repository.{note}\n\
@@ -151,7 +152,8 @@ fn head(plan: &Plan, seconds: f64) -> String {
          makes all of this, the numbers on this page among it; here in {:.1} minutes. Errors are the root of the mean \
          square difference from the truth over the root of the mean square of the truth, over all pixels and channels. \
          Two more path-traced pictures, with random numbers of their own, stand in for the truth in such a way that their \
-         noise cancels: the mean of (image − a)(image − b). Bright outliers of path tracing make errors uncertain.\n\n",
+         noise cancels: the mean of (image − a)(image − b). Bright outliers of path tracing make errors uncertain. \
+         Pictures of Figs 6 to 10 are cached with {walks} walks for a record and {samples} samples for a pixel.\n\n",
         seconds / 60.0
     )
 }

@@ -79,15 +79,17 @@ struct Pair {
     judges: [Image; 2],
 }
 
+/// Walks of a record and samples of a pixel; few, because four pictures share the time, three of them path-traced.
+pub(super) fn efforts(plan: &Plan) -> [u32; 2] {
+    if plan.quick { [64, 8] } else { [512, 32] }
+}
+
 fn pair(plan: &Plan, scene: &Path, size: [u32; 2], options: &[&str]) -> Result<Pair, Failure> {
-    let samples = if plan.quick { "8" } else { "32" };
-    let mut words = vec!["--method", "radiance-cache", "--spp", samples];
+    let [walks, samples] = efforts(plan).map(|number| number.to_string());
+    let mut words = vec!["--method", "radiance-cache", "--spp", &samples, "--paths", &walks];
     if plan.quick {
-        words.extend(["--paths", "64", "--tolerance-of", "multiple=2", "--tolerance-of", "surface=3"]);
+        words.extend(["--tolerance-of", "multiple=2", "--tolerance-of", "surface=3"]);
         words.extend(["--tolerance-of", "irradiance=1", "--tolerance-of", "single=0.5"]);
-    } else {
-        // Four pictures share this time, three of them path-traced.
-        words.extend(["--paths", "512"]);
     }
     words.extend(options);
     let cached = shot(plan, scene, size, &words)?;
