@@ -12,13 +12,14 @@ const FLOOR: f64 = 0.1;
 /// ‖error‖ / √(mean² + (0.1 mean of the picture)²) ≤ noise,   root mean square over the pixels of the tile
 /// ```
 ///
-/// of layer 0, mean of the channels. The error is how far the mean of a pass lies from that of all before it: of
-/// samples that are even, as those of a low-discrepancy sequence, the variance would tell far too much. Tiles that a rare
+/// of layer 0, mean of the channels. The error is told by how far the mean of a pass of `m` samples lies from that of
+/// the `n` before it, times `√(nm)/(n + m)`. For independent samples that is exact in the mean square; for even ones, as those of
+/// a low-discrepancy sequence, it is too large (about twofold), and their variance would tell far more. Tiles that a rare
 /// bright sample has not met yet stop early: where light has such samples the picture gets darker by what they
 /// would bring, so that methods without them profit most.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Goal {
-    /// Relative standard error of a pixel; ≤ 0 is never reached.
+    /// Relative standard error of a pixel; at 0 or less only tiles without any noise have enough.
     pub noise: f32,
     /// Samples of every pixel in any case: fewer do not tell their noise. Black tiles get eight times as many.
     pub least: u32,

@@ -68,7 +68,8 @@ pub enum Reason {
     Done,
     /// The host asked to stop. The tiles finished by then are in the film, with their own counts.
     Cancelled,
-    /// The time is used up; all pixels have the same number of new samples.
+    /// The time is used up; all pixels have the same number of new samples, but in tiles that have reached
+    /// [`Settings::goal`].
     TimeUp,
 }
 

@@ -3,6 +3,7 @@
 use glam::{Vec2, Vec3};
 
 use super::aim::Aims;
+use super::evidence::{Halves, Openings};
 use super::guide::{Guided, Looks};
 use super::lookup::{Reading, TurningBasis};
 use super::record::Facing;
@@ -63,41 +64,6 @@ impl Mixture<'_> {
     }
 }
 
-/// Light of a sky and what stands before it. Its edges, not the sky itself, change what arrives as a point moves,
-/// by as much as if the sky were a surface at their distance. Which directions are edges no single
-/// sample knows, so that the gradient lacks this; radii must not.
-#[derive(Debug, Clone, Copy, Default)]
-struct Openings {
-    sky: Spectrum,
-    /// Mean of 1/distance (1/m) of surfaces over directions, and the share of directions that meet some.
-    near: f32,
-    met: f32,
-}
-
-impl Openings {
-    /// Light that came along a ray, if from the sky.
-    #[inline]
-    fn add_sky(&mut self, end: Option<&Hit>, light: Spectrum) {
-        if end.is_none() {
-            self.sky += light;
-        }
-    }
-
-    /// What a ray met, whose direction was drawn with density `pdf`; black or not, it hides the sky.
-    #[inline]
-    fn add_surface(&mut self, end: Option<&Hit>, pdf: f32) {
-        if let Some(hit) = end {
-            self.near += 1.0 / (hit.distance * pdf);
-            self.met += 1.0 / pdf;
-        }
-    }
-
-    /// `Σ‖∇L_j‖` over the directions to the sky: a surface that is faced at the harmonic mean distance has `2L/r`.
-    fn norm(&self) -> Spectrum {
-        if self.met > 0.0 { self.sky * (2.0 * self.near / self.met) } else { Spectrum::ZERO }
-    }
-}
-
 /// Estimates the light that the caches hold.
 ///
 /// Light from surfaces takes its direct part from one connection to the lights, its indirect part
@@ -144,7 +110,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
             let World { medium, scene, .. } = self.world;
             let (samples, steps) = (self.light_samples, self.walk.steps);
             let mut sums = Sums::default();
-            for lights in self.near_lights() {
+            for lights in self.lights_but_sky() {
                 let of = single_scatter::sample_directional(point, medium, scene, lights, samples, steps, rng, into);
                 sums.merge(&of);
             }
@@ -326,7 +292,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
     }
 
     /// Lights that are no sky, in runs.
-    fn near_lights(&self) -> impl Iterator<Item = &[Light<'_>]> {
+    fn lights_but_sky(&self) -> impl Iterator<Item = &[Light<'_>]> {
         let runs = self.world.lights.chunk_by(|a, b| a.is_sky() == b.is_sky());
         runs.filter(|run| run.first().is_some_and(|light| !light.is_sky()))
     }
@@ -452,7 +418,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
         let World { medium, scene, .. } = self.world;
         let steps = self.walk.steps;
         let of = |lights| single_scatter::sample(point, to_eye, phase, medium, scene, lights, 1, steps, rng).value;
-        self.near_lights().map(of).sum()
+        self.lights_but_sky().map(of).sum()
     }
 
     /// Light of surfaces and the sky, scattered once at `point` towards `to_eye`: one direction.
@@ -506,37 +472,4 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
 fn tilted(arrival: &Arrival, tilt: Vec3) -> Contribution {
     let gradient = arrival.gradient + Gradient::outer(arrival.turning, tilt);
     Contribution { radiance: arrival.irradiance, gradient }
-}
-
-/// How far an estimated gradient can be believed: as far as two halves of its samples agree.
-///
-/// ```text
-/// t = g₁·g₂ / ‖(g₁ + g₂)/2‖², in [0, 1], per channel
-/// ```
-///
-/// The product is an unbiased estimate of the true square, the norm is too large by the noise.
-/// Unbelieved, noise in gradients would brighten whatever is extrapolated with them, because
-/// the exponential of noise is more than 1 in the mean.
-#[derive(Debug, Clone, Copy, Default)]
-struct Halves([Gradient; 2]);
-
-impl Halves {
-    /// Adds the gradient of sample `j`; of every four neighbours, two go to either half.
-    #[inline]
-    fn add(&mut self, j: u32, gradient: &Gradient) {
-        self.0[(j as usize >> 1) & 1] += *gradient;
-    }
-
-    fn trust(&self) -> Spectrum {
-        let [a, b] = self.0;
-        // Scaled, so that squares stay in the range of f32.
-        let largest = a.norm().max(b.norm());
-        let dot = |a: &Gradient, b: &Gradient| {
-            let part = |a: Spectrum, b: Spectrum| a.ratio(largest) * b.ratio(largest);
-            part(a.x, b.x) + part(a.y, b.y) + part(a.z, b.z)
-        };
-        let sum = a + b;
-        let square = dot(&sum, &sum) * 0.25;
-        dot(&a, &b).zip(square, |ab, ss| if ss > 0.0 { (ab / ss).clamp(0.0, 1.0) } else { 0.0 })
-    }
 }

@@ -245,7 +245,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized, F: FnMut(Place)> Sight for Wanted<'_
 
 /// Radiance that arrives at the origin of `ray`, read from caches.
 ///
-/// Light of the lights is connected to at the points of the ray unless [`Caches::single`] is there: to
+/// Light of the lights but a sky is connected to at the points of the ray unless [`Caches::single`] is there: to
 /// lights within whose [`Light::steep_field`] it lies by an equiangular connection per segment.
 /// Where a cache has no record at a point, one sample of what it would hold takes its place, so that
 /// gaps make noise and no holes. `estimator` brings the world; its surface cache is what such

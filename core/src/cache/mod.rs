@@ -25,12 +25,14 @@
 //! | `aim` | where random walks start towards |
 //! | `guide` | [`Guide`], [`Guided`]: where light was found to come from; [`Looks`]: how samples are drawn |
 //! | `estimate` | [`Estimator`]: what records are made of |
+//! | `evidence` | how far gradients can be believed; edges of the sky |
 //! | `eye` | [`places`] and [`radiance`] of eye rays |
 //! | [`bytes`] | caches as bytes, to be saved |
 
 mod aim;
 pub mod bytes;
 mod estimate;
+mod evidence;
 mod extrapolate;
 mod eye;
 mod guide;

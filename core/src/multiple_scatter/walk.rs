@@ -57,7 +57,7 @@ pub struct Walk<'a, M: ?Sized, S: ?Sized> {
     pub medium: &'a M,
     /// The surfaces.
     pub scene: &'a S,
-    /// The lights.
+    /// The lights; a sky ([`Light::is_sky`]) is met by walks that leave the world, all others are connected to.
     pub lights: &'a [Light<'a>],
     /// How to walk.
     pub settings: Settings,
@@ -106,8 +106,8 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Walk<'_, M, S> {
     /// the density `pdf` (sr⁻¹) of its direction: radiance at the ray's origin over `pdf`, and how it
     /// changes as the origin moves and the vertices with it ([`Shift`]). `first` is where [`Walk::first`] ended.
     ///
-    /// `known(point, to_eye, properties)` may answer for all light but that straight from the lights
-    /// that is scattered towards `to_eye` at a collision (W·m⁻²·sr⁻¹), with its gradients as the point moves
+    /// `known(point, to_eye, properties)` may answer for all light but that straight from the lights walks
+    /// connect to (those that are no sky) that is scattered towards `to_eye` at a collision (W·m⁻²·sr⁻¹), with its gradients as the point moves
     /// and as `to_eye` turns: then the path ends there. Other arguments as for [`Walk::path`].
     pub fn along(
         &self,

@@ -234,7 +234,8 @@ impl CacheJob<'_> {
             surface: effort(Kind::Surface, 2.0, 256.0, degree(1, 1.5), 0.1),
             multiple: effort(Kind::Multiple, breadth, 1024.0, degree(2, 0.0), 0.1),
             irradiance: effort(Kind::Irradiance, 0.35, 512.0, 0, 0.1),
-            rays: (self.film.width() * self.film.height() / 4).max(16384),
+            // Small things are seen in large pictures; places take memory.
+            rays: (self.film.width() * self.film.height() / 4).clamp(16384, 131_072),
             extrapolation: arguments.extrapolation.map_or_else(Extrapolation::default, Into::into),
             margin: 0.15,
             pixels: (1.5, 64.0),

@@ -47,8 +47,8 @@ pub struct RenderArguments {
     /// the scene says, for radiance caching as --noise 0.02 wants, at most 256, for virtual lights one pass; with --time, as many as fit].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub spp: Option<u32>,
-    /// Relative noise at which tiles of 8 by 8 pixels have enough samples: they get 8, and more where that leaves more noise;
-    /// not for photon beams and virtual lights, whose noise is that of whole passes.
+    /// Relative noise at which tiles of 8 by 8 pixels have enough samples: they get 8, and more where that leaves more noise,
+    /// without --spp at most 65536; not for photon beams and virtual lights, whose noise is that of whole passes.
     #[arg(long, value_name = "E", value_parser = output::positive)]
     pub noise: Option<f64>,
     /// Seconds to render for, on the wall clock.
