@@ -12,11 +12,20 @@ const FLOOR: f64 = 0.1;
 /// ‖error‖ / √(mean² + (0.1 mean of the picture)²) ≤ noise,   root mean square over the pixels of the tile
 /// ```
 ///
-/// of layer 0, mean of the channels. The error is told by how far the mean of a pass of `m` samples lies from that of
-/// the `n` before it, times `√(nm)/(n + m)`. For independent samples that is exact in the mean square; for even ones, as those of
-/// a low-discrepancy sequence, it is too large (about twofold), and their variance would tell far more. Tiles that a rare
-/// bright sample has not met yet stop early: where light has such samples the picture gets darker by what they
-/// would bring, so that methods without them profit most.
+/// of layer 0, mean of the channels. The error is told by how far the mean of `m` samples lies from that of
+/// the `n` before them, times `√(nm)/(n + m)`. For independent samples that is exact in the mean square. Of an even sequence,
+/// as one of low discrepancy, the halves differ by more than that: if doubling divides the variance `V` by `q`, then
+///
+/// ```text
+/// ⟨(half − other half)²⟩/4 = V(n) − V(2n) = (q − 1) V(2n)
+/// ```
+///
+/// as long as the halves are exchangeable, as those of an Owen-scrambled net are. So when samples have been doubled,
+/// the square is divided by `q − 1`; `q`, from 2 (independent) to 4, is how much less the halves differ than at the doubling
+/// before, over all tiles that still got samples.
+///
+/// Tiles that a rare bright sample has not met yet stop early: where light has such samples the picture gets darker
+/// by what they would bring, so that methods without them profit most.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Goal {
     /// Relative standard error of a pixel; at 0 or less only tiles without any noise have enough.
@@ -38,7 +47,7 @@ impl Part {
     }
 }
 
-/// What a pixel had before a pass, and has after it.
+/// What a pixel had before some passes, and has after them.
 #[derive(Debug, Clone, Copy, Default)]
 struct Pixel {
     before: Part,
@@ -46,7 +55,7 @@ struct Pixel {
 }
 
 impl Pixel {
-    /// Variance of the mean after the pass: if a sample has variance `σ²`, the two parts' means are apart by
+    /// Variance of the mean after them: if a sample has variance `σ²`, the two parts' means are apart by
     /// `σ² (1/n + 1/m)` in square, and the whole's varies by `σ²/(n + m)`.
     fn error_squared(&self) -> f64 {
         let Self { before, after } = *self;
@@ -64,6 +73,8 @@ impl Pixel {
 pub(crate) struct Tile {
     pixels: Vec<Pixel>,
     is_enough: bool,
+    /// Noise squared when the samples were last doubled, as if they were independent.
+    when_doubled: Option<f64>,
 }
 
 impl Tile {
@@ -71,10 +82,14 @@ impl Tile {
         self.is_enough
     }
 
-    /// A pass begins; its pixels have these sums (layer 0) and counts.
+    /// A pass begins; its pixels have these sums (layer 0) and counts. What was before stays what there was at the last power of
+    /// two, so that samples are doubled again however long passes are.
     pub(crate) fn begin<'a>(&mut self, pixels: impl Iterator<Item = (&'a [f64; 3], u32)>) {
-        self.pixels.clear();
-        self.pixels.extend(pixels.map(|pixel| Pixel { before: part(pixel), ..Pixel::default() }));
+        let mut pixels = pixels.peekable();
+        if self.pixels.is_empty() || pixels.peek().is_some_and(|(_, count)| count.is_power_of_two()) {
+            self.pixels.clear();
+            self.pixels.extend(pixels.map(|pixel| Pixel { before: part(pixel), ..Pixel::default() }));
+        }
     }
 
     /// A pass ends.
@@ -82,6 +97,11 @@ impl Tile {
         for (pixel, now) in self.pixels.iter_mut().zip(pixels) {
             pixel.after = part(now);
         }
+    }
+
+    /// Whether there are twice as many samples as before.
+    fn is_doubled(&self) -> bool {
+        self.pixels.iter().all(|pixel| pixel.before.count > 0 && pixel.after.count == 2 * pixel.before.count)
     }
 
     fn noise_squared(&self, floor: f64) -> f64 {
@@ -96,6 +116,9 @@ impl Tile {
 fn part((sum, count): (&[f64; 3], u32)) -> Part {
     Part { sum: sum.iter().sum::<f64>() / 3.0, count }
 }
+
+/// Variance that falls with the square of the number of samples is as even as pictures get.
+const EVENNEST: f64 = 3.0;
 
 /// Black tiles get so many times [`Goal::least`]: nothing tells how rarely light comes there.
 const BLACK: u32 = 8;
@@ -118,18 +141,30 @@ impl Noise {
 
     /// Decides for every tile, after a pass that left all others with `samples`; whether all have enough.
     pub(crate) fn judge(&mut self, samples: u32) -> bool {
-        if samples < self.goal.least {
-            return false;
-        }
         let goal = f64::from(self.goal.noise.max(0.0)).powi(2);
         let mut tiles: Vec<&mut Tile> =
             self.tiles.iter_mut().map(|tile| tile.get_mut().unwrap_or_else(PoisonError::into_inner)).collect();
         let pixels = tiles.iter().map(|tile| tile.pixels.len()).sum::<usize>();
         let total: f64 = tiles.iter().flat_map(|tile| &tile.pixels).map(|pixel| pixel.after.mean()).sum();
         let floor = FLOOR * total.abs() / pixels.max(1) as f64;
-        for tile in &mut tiles {
+        tiles.retain(|tile| !tile.is_enough);
+        let (mut last, mut now) = (0.0, 0.0);
+        let mut measure = |tile: &mut Tile| {
+            let (noise, is_doubled) = (tile.noise_squared(floor), tile.is_doubled());
+            if is_doubled && let Some(before) = tile.when_doubled.replace(noise) {
+                last += before;
+                now += noise;
+            }
+            (noise, is_doubled)
+        };
+        let measured: Vec<(f64, bool)> = tiles.iter_mut().map(|tile| measure(tile)).collect();
+        if samples < self.goal.least {
+            return false;
+        }
+        let evenness = if now > 0.0 { (last / now - 1.0).clamp(1.0, EVENNEST) } else { 1.0 };
+        for (tile, (noise, is_doubled)) in tiles.iter_mut().zip(measured) {
             let is_known = samples / BLACK >= self.goal.least || tile.pixels.iter().any(|pixel| pixel.after.sum != 0.0);
-            tile.is_enough = tile.is_enough || (is_known && tile.noise_squared(floor) <= goal);
+            tile.is_enough = is_known && noise <= goal * if is_doubled { evenness } else { 1.0 };
         }
         tiles.iter().all(|tile| tile.is_enough)
     }
@@ -158,6 +193,30 @@ mod tests {
         let noise = ((0.04_f32 + 0.01) / 2.0 / 1.01).sqrt();
         assert_eq!(of(noise * 1.0001), (false, true));
         assert_eq!(of(noise * 0.9999), (false, false));
+    }
+
+    #[test]
+    fn samples_that_are_even_are_less_noisy_than_their_halves_say() {
+        // Halves that differ as if the variance fell by `ratio` from pass to pass, the last by 2·0.1.
+        let of = |ratio: f64, noise: f32| {
+            let mut all = Noise::new(Goal { noise, least: 8 }, 1);
+            for (count, error) in [(2, 0.1 * ratio.sqrt()), (4, 0.1)] {
+                let parts = [(1.0 - error) * f64::from(count), 2.0 * f64::from(count)];
+                all.tile(0).begin([(&[parts[0]; 3], count)].into_iter());
+                all.tile(0).end([(&[parts[1]; 3], 2 * count)].into_iter());
+                let is_enough = all.judge(2 * count);
+                if count == 4 {
+                    return is_enough;
+                }
+            }
+            false
+        };
+        // What 2, 3 and 4 say, and that less and more than these are not believed.
+        for (ratio, divisor) in [(0.5, 1.0), (2.0, 1.0), (3.0, 2.0), (4.0, 3.0), (9.0, 3.0)] {
+            let noise = (0.01_f32 / 1.01 / divisor).sqrt();
+            assert!(of(ratio, noise * 1.0001), "{ratio}");
+            assert!(!of(ratio, noise * 0.9999), "{ratio}");
+        }
     }
 
     #[test]

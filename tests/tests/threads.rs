@@ -6,7 +6,7 @@ use core::time::Duration;
 use fogbow::glam::Vec3;
 use fogbow::host::{Empty, Medium, Scene};
 use fogbow::math::Ray;
-use fogbow::sampling::uniform;
+use fogbow::sampling::{uniform, uniform2};
 use fogbow::spectrum::Spectrum;
 use fogbow_std::film::Film;
 use fogbow_std::progress::{Control, Progress};
@@ -114,6 +114,30 @@ fn tiles_get_the_samples_their_noise_asks_for() {
     let mut few = film();
     render(&mut few, &Settings { samples: 32, ..settings }, &Control::default(), half_noisy).unwrap();
     assert_eq!(noisy(&few), 32 * 21 * 21);
+}
+
+#[test]
+fn of_an_even_sequence_no_more_samples_are_taken_than_its_noise_asks_for() {
+    // A quarter of a disc in the unit square: mean π/4, and edges as pictures have.
+    let disc = |_: &Sample<'_>, rng: &mut SampleRng, layers: &mut [Spectrum]| {
+        layers[0] = if uniform2(rng).length_squared() < 1.0 { Spectrum::ONE } else { Spectrum::ZERO };
+    };
+    let goal = Goal { noise: 0.02, least: 8 };
+    let of = |sequence| {
+        let settings = Settings { samples: 10_000, goal: Some(goal), sequence, ..Settings::default() };
+        let mut film = film();
+        let outcome = render(&mut film, &settings, &Control::default(), disc).unwrap();
+        let picture = film.mean(0).unwrap().pixels;
+        let mean = core::f32::consts::FRAC_PI_4;
+        let error = picture.iter().map(|p| (p[0] / mean - 1.0).powi(2)).sum::<f32>() / picture.len() as f32;
+        (error.sqrt(), outcome.counters.samples as f32 / picture.len() as f32)
+    };
+    let ((even, few), (random, many)) = (of(Sequence::default()), of(Sequence::Independent));
+    // Samples are doubled, which divides the noise of even ones by 1.7.
+    assert!((0.5 * goal.noise..1.1 * goal.noise).contains(&even), "{even} with {few}");
+    // (1 − m)/m/0.02² = 683.
+    assert!((0.9 * goal.noise..1.1 * goal.noise).contains(&random), "{random} with {many}");
+    assert!((600.0..800.0).contains(&many) && few < 0.25 * many, "{few} of {many}");
 }
 
 #[test]
