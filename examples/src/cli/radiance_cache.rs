@@ -233,7 +233,7 @@ impl CacheJob<'_> {
         cache::Settings {
             single: if cached { effort(Kind::Single, 0.2, 16.0, degree(1, 0.0), 0.1) } else { None },
             surface: effort(Kind::Surface, 2.0, 256.0, degree(1, 1.5), 0.06),
-            multiple: effort(Kind::Multiple, breadth, 1024.0, degree(2, 0.0), 0.1),
+            multiple: effort(Kind::Multiple, breadth, 1024.0, degree(2, 0.0), breadth as f32 / 8.0),
             irradiance: effort(Kind::Irradiance, 0.35, 512.0, 0, 0.1),
             // Small things are seen in large pictures; places take memory.
             rays: (self.film.width() * self.film.height() / 4).clamp(16384, 131_072),
