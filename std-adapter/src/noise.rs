@@ -101,7 +101,9 @@ impl Tile {
 
     /// Whether there are twice as many samples as before.
     fn is_doubled(&self) -> bool {
-        self.pixels.iter().all(|pixel| pixel.before.count > 0 && pixel.after.count == 2 * pixel.before.count)
+        self.pixels
+            .iter()
+            .all(|pixel| pixel.before.count > 0 && pixel.after.count - pixel.before.count == pixel.before.count)
     }
 
     fn noise_squared(&self, floor: f64) -> f64 {

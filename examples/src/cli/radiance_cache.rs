@@ -31,8 +31,8 @@ use crate::world::{WithMedium, World};
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Radiance caching")]
 pub struct CacheArguments {
-    /// Error tolerance of all caches: smaller is finer and slower [default: 0.2 for single, 2 for surface, 1 less the
-    /// mean cosine of the phase function but at most 0.8 for multiple, 0.35 for irradiance].
+    /// Error tolerance of all caches: smaller is finer and slower [default: 0.2 for single, 2 for surface, for
+    /// multiple 1 less the absolute mean cosine of the phase function, within 0.1 and 0.8, 0.35 for irradiance].
     #[arg(long, value_name = "E", value_parser = output::positive)]
     pub tolerance: Option<f64>,
     /// Error tolerance of one cache, as CACHE=E; may be repeated.
@@ -228,12 +228,12 @@ impl CacheJob<'_> {
             Single::Cached => true,
         };
         // Expansions change faster than the mean over directions, from which radii come. Above 0.8 light that falls off
-        // like 1/r is carried too far, and what lies about a lamp turns out too dark.
+        // like 1/r is carried too far: fog around a lamp turns out too dark.
         let breadth = (1.0 - f64::from(phase.mean_cosine().map(f32::abs).max_element())).clamp(0.1, 0.8);
         cache::Settings {
             single: if cached { effort(Kind::Single, 0.2, 16.0, degree(1, 0.0), 0.1) } else { None },
             surface: effort(Kind::Surface, 2.0, 256.0, degree(1, 1.5), 0.06),
-            multiple: effort(Kind::Multiple, breadth, 1024.0, degree(2, 0.0), breadth as f32 / 8.0),
+            multiple: effort(Kind::Multiple, breadth, 1024.0, degree(2, 0.0), (breadth as f32 / 8.0).max(0.05)),
             irradiance: effort(Kind::Irradiance, 0.35, 512.0, 0, 0.1),
             // Small things are seen in large pictures; places take memory.
             rays: (self.film.width() * self.film.height() / 4).clamp(16384, 131_072),
