@@ -1,8 +1,12 @@
 //! Collisions drawn from marched rays against the law they follow and against marching itself.
 
-use fogbow::host::Medium;
+use fogbow::host::{Hit, Medium, Properties, Stretch};
 use fogbow::math::{Ray, Vec3};
+use fogbow::multiple_scatter::{Lengths, Settings, Walk};
 use fogbow::phase::Phase;
+use fogbow::sampling::Generator;
+use fogbow::spectrum::Spectrum;
+use fogbow::surface::Surface;
 use fogbow::transmittance::marched::march;
 use fogbow::transmittance::thickness::{Marching, Steps, Thickness, optical_thickness_with_gradients};
 use fogbow_tests::hosts::{Analytic, Body, Field, Filled};
@@ -82,6 +86,38 @@ fn coarse_steps_leave_no_bias_beyond_that_of_marching() {
         }
     }
     assert!((stopped - lost).abs() < 0.01 * lost, "{stopped}, {lost}");
+}
+
+/// A sheet of cloud at the start of a ray, thinner than the steps, in next to vacuum.
+struct Sheet;
+
+impl Medium for Sheet {
+    fn properties(&self, point: Vec3) -> Properties {
+        let scattering = Spectrum::splat(if point.x < 1e-4 { 40.0 } else { 1e-5 });
+        Properties { absorption: Spectrum::ZERO, scattering, emission: Spectrum::ZERO, phase: Phase::ISOTROPIC }
+    }
+    fn stretch(&self, _: &Ray, _: f32) -> Stretch {
+        Stretch { until: f32::INFINITY, minorant: Spectrum::ZERO, majorant: Spectrum::splat(40.0) }
+    }
+    fn is_grey(&self) -> bool {
+        true
+    }
+}
+
+/// A collision in what marching took for next to vacuum must not weigh as much as all other walks together.
+#[test]
+fn what_marching_missed_has_no_weight_without_bound() {
+    let mut settings = Settings::new(Steps::Length(0.1));
+    settings.lengths = Lengths::Marched;
+    let walk = Walk { medium: &Sheet, scene: &fogbow::host::Empty, lights: &[], settings };
+    let wall = Hit { distance: 2.0, normal: Vec3::NEG_X, surface: Surface::BLACK, light: None };
+    let ray = Ray::new(Vec3::ZERO, Vec3::X);
+    let rng = &mut Generator::new(3);
+    for u in [0.0, 1e-10] {
+        let collision = walk.first(&ray, Some(&wall), u, false, rng).collision.unwrap();
+        let weight = (collision.factor * collision.properties.scattering)[0];
+        assert!(weight > 0.0 && weight < 33.0, "{u}: {weight}");
+    }
 }
 
 /// In a medium without end every number collides somewhere, in vacuum none.

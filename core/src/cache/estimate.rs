@@ -27,8 +27,13 @@ use crate::transmittance::thickness::{Marching, Transmittance, transmittance, tr
 /// variance without bound.
 const MIN_COSINE: f32 = 0.05;
 
-/// A number whose multiples, wrapped, are even beside a golden-ratio lattice: the third coordinate.
-const THIRD: f32 = 0.414_213_56;
+/// The third coordinate beside a golden-ratio lattice, in [0, 1): multiples of a number that stay even when wrapped. It
+/// draws lengths, and in thin media its smallest values decide: after some hundred multiples f32 has none between 0 and
+/// 3·10⁻⁵.
+fn third(j: u32, shift: f32) -> f32 {
+    let u = f64::from(j) * (core::f64::consts::SQRT_2 - 1.0) + f64::from(shift);
+    ((u - libm::floor(u)) as f32).min(1.0 - 0.5 * f32::EPSILON)
+}
 
 /// A mixture of densities of directions, each with an equal part of the samples: a given one, one towards
 /// lights, and one that was learnt.
@@ -168,7 +173,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
         higher: &mut [Coefficient],
         rng: &mut impl Rng,
     ) -> Sums {
-        let (walk, shift, third) = (self.walker(), uniform2(rng), uniform(rng));
+        let (walk, shift, offset) = (self.walker(), uniform2(rng), uniform(rng));
         let Looks { count, guide, mut learnt } = paths.into();
         let share = 1.0 / count.max(1) as f32;
         let aims = Aims::new(point, self.world.lights, self.world.scene, |_| true);
@@ -179,8 +184,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
                 let (to_light, pdf) = mixture.direction(j, warp::uniform_sphere, |_| warp::uniform_sphere_pdf());
                 let ray = Ray::new(point, to_light);
                 let end = nearest_surface(&ray, self.world.scene);
-                let u = third + THIRD * j as f32;
-                let flown = walk.first(&ray, end.as_ref(), u - libm::floorf(u), false, rng);
+                let flown = walk.first(&ray, end.as_ref(), third(j, offset), false, rng);
                 let incoming = self.walked(&walk, ray, end.as_ref(), pdf, flown.collision, rng) * share;
                 if let Some(learnt) = &mut learnt {
                     learnt.add(to_light, incoming.irradiance.mean() * count as f32, pdf, count);
@@ -245,7 +249,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
         let (mut sums, mut scattered, mut turn) = (Sums::default(), Cones::default(), Gradient::ZERO);
         let (mut halves, mut openings) = (Halves::default(), Openings::default());
         let mut child = Generator::child(rng);
-        let (frame, walk, shift, third) = (Frame::around(normal), self.walker(), uniform2(rng), uniform(rng));
+        let (frame, walk, shift, offset) = (Frame::around(normal), self.walker(), uniform2(rng), uniform(rng));
         let share = 1.0 / count.max(1) as f32;
         let outside = leave(point, normal, normal, 0.0);
         let aims = Aims::new(outside, self.world.lights, self.world.scene, |_| true);
@@ -262,9 +266,8 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
             let ray = Ray::new(leave(point, normal, to_light, 0.0), to_light);
             let mut total = Contribution::ZERO;
             let end = nearest_surface(&ray, self.world.scene);
-            let u = third + THIRD * j as f32;
             let shines = end.is_some() || !sky(self.world.lights, to_light).is_black();
-            let flown = walk.first(&ray, end.as_ref(), u - libm::floorf(u), shines, rng);
+            let flown = walk.first(&ray, end.as_ref(), third(j, offset), shines, rng);
             // How the cosine changes as what is seen stays.
             let tilt = (to_light * cosine - normal) / cosine.max(MIN_COSINE);
             let through = || flown.whole.unwrap_or_default().transmittance();
@@ -472,4 +475,26 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
 fn tilted(arrival: &Arrival, tilt: Vec3) -> Contribution {
     let gradient = arrival.gradient + Gradient::outer(arrival.turning, tilt);
     Contribution { radiance: arrival.irradiance, gradient }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// As many lengths within 10⁻⁵ mean free paths as there should be, and hardly any of none.
+    #[test]
+    fn small_values_of_the_third_coordinate_are_as_rare_as_small() {
+        let (mut small, mut none) = (0, 0);
+        let rng = &mut Generator::new(1);
+        for _ in 0..4096 {
+            let shift = uniform(rng);
+            for u in (0..1024).map(|j| third(j, shift)) {
+                assert!((0.0..1.0).contains(&u), "{u}");
+                small += u32::from(u < 1e-5);
+                none += u32::from(u == 0.0);
+            }
+        }
+        // 42 expected, give or take 6.5.
+        assert!((16..=68).contains(&small) && none <= 2, "{small}, {none}");
+    }
 }

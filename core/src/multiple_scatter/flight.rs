@@ -8,13 +8,19 @@ use crate::transmittance::marched::march;
 use crate::transmittance::thickness::{Marching, Thickness, optical_thickness_with_gradients};
 use crate::transmittance::tracking;
 
+/// Extinction at a collision drawn from marched thickness counts as at most so many times what was marched there. Where
+/// steps resolve the medium the two are alike; at the edge of a cloud, in next to vacuum as marched, a collision happens once in
+/// millions of walks and would weigh as much as hundreds of thousands: a record that has it is a ball of light.
+const MOST_MISSED: f32 = 32.0;
+
 /// How the lengths of a walk's segments are drawn.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Lengths {
     /// Delta tracking: in proportion to transmittance times extinction, whatever the medium.
     Tracking,
     /// Drawn from the thickness that is marched for gradients anyway: every length follows from one number, and
-    /// there is no bias but that of marching. Where extinction is coloured, as [`Lengths::Tracking`].
+    /// there is no bias but that of marching, and that no extinction counts as more than 32 times what was marched.
+    /// Where extinction is coloured, as [`Lengths::Tracking`].
     Marched,
     /// `σ̂ e^{−σ̂ r}` with the mean extinction at the start of the segment, and at least `floor` times
     /// the majorant there (J, Eq. 29; sheet § 1.7). Its weights grow where the medium thins out:
@@ -62,11 +68,15 @@ pub(super) fn fly(
 ) -> Flown {
     if lengths == Lengths::Marched && medium.is_grey() {
         let marched = march(ray, medium, marching, u, to_end);
-        let collision = marched.collision.map(|drawn| Collision {
-            distance: drawn.distance,
-            properties: medium.properties(ray.at(drawn.distance)),
-            factor: Spectrum::splat(drawn.factor),
-            thickness: drawn.thickness,
+        let collision = marched.collision.map(|drawn| {
+            let properties = medium.properties(ray.at(drawn.distance));
+            let factor = drawn.factor.min(MOST_MISSED / properties.extinction()[0]);
+            Collision {
+                distance: drawn.distance,
+                properties,
+                factor: Spectrum::splat(factor),
+                thickness: drawn.thickness,
+            }
         });
         return Flown { collision, whole: marched.whole };
     }

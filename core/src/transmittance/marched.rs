@@ -38,8 +38,8 @@ pub struct MarchedCollision {
 /// ```
 ///
 /// What extinction really is at the point of collision is for the caller to weigh: `σₛ(t)/σ(t)` has, as the marched `τ` has,
-/// no bias but that of the steps; it has no bound where extinction between two samples is far above both, and what lies
-/// between two samples in vacuum is missed: steps must resolve the medium. In coloured media the first channel counts.
+/// no bias but that of the steps; it has no bound where extinction between two samples is far above both (walks set one), and
+/// what lies between two samples in vacuum is missed: steps must resolve the medium. In coloured media the first channel counts.
 /// `to_end` also measures what lies beyond. Inversion of Jarosz et al. 2008, Eq. 16; not in the paper, which draws by Eq. 29.
 ///
 /// ```
@@ -103,7 +103,7 @@ pub fn march(ray: &Ray, medium: &(impl Medium + ?Sized), marching: Marching, u: 
         *joint - *moment * inverse + end
     };
     let mut collision = draw.found.map(|(distance, density)| {
-        let value = Spectrum::splat(-float::ln(1.0 - u));
+        let value = Spectrum::splat(-float::ln_1p(-u));
         let gradient_fixed = held(&draw.joint, &draw.moment, value, distance);
         let thickness = Thickness { value, gradient_fixed, gradient_joint: draw.joint };
         MarchedCollision { distance, factor: 1.0 / density, thickness }
@@ -136,7 +136,7 @@ struct Draw {
 
 impl Draw {
     fn new(u: f32) -> Self {
-        Self { left: -float::ln(1.0 - u), joint: Gradient::ZERO, moment: Gradient::ZERO, found: None }
+        Self { left: -float::ln_1p(-u), joint: Gradient::ZERO, moment: Gradient::ZERO, found: None }
     }
 
     /// A piece of a ray on which extinction and its gradient are linear.
