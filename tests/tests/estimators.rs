@@ -89,6 +89,28 @@ fn one_light_at_a_time_has_the_same_mean_as_all_of_them() {
     assert!((all - one).abs() < STANDARD_ERRORS * e.hypot(f), "{all} ± {e}, {one} ± {f}");
 }
 
+/// Towards a lamp outside of the medium that the ray all but meets, the other lamp is chosen no less often than it matters.
+#[test]
+fn no_sample_of_light_along_a_ray_towards_a_lamp_is_an_outlier() {
+    let medium = ball_of(Field::Homogeneous { a: 0.1 }, 0.9, 0.0, 1.0);
+    let lamp = |at: Vec3| Light::Point(PointLight::new(at, Spectrum::splat(100.0)).unwrap());
+    let lights = [lamp(Vec3::new(10.0, 0.001, 0.0)), lamp(Vec3::new(0.0, 10.0, 0.0))];
+    let ray = Ray::new(Vec3::ZERO, Vec3::X);
+    let along = |lights: &[Light<'_>], seed: u64| {
+        let settings = Settings { one_light: true, max_vertices: 1, ..Settings::new(STEPS) };
+        let walk = Walk { medium: &medium, scene: &Empty, lights, settings };
+        let incoming = walk.along(ray, None, 1.0, None, NO_SURFACE, |_, _, _| None, &mut Generator::new(seed));
+        f64::from(incoming.irradiance[0])
+    };
+    let samples = |lights: &[Light<'_>]| (0..4000).map(|seed| along(lights, seed)).collect::<Vec<_>>();
+    let (both, [first, second]) = (samples(&lights), [0, 1].map(|i| mean_and_error(&samples(&lights[i..=i]))));
+    let (mean, error) = mean_and_error(&both);
+    let off = (mean - first.0 - second.0).abs();
+    assert!(off < STANDARD_ERRORS * (error + first.1 + second.1), "{mean} ± {error}, {first:?} + {second:?}");
+    let most = both.iter().copied().fold(0.0, f64::max);
+    assert!(most < 2.0 * mean, "{most} among samples with the mean {mean}");
+}
+
 /// A cloud without edges, lit by a sun, in three colours: estimated gradients against differences of
 /// estimated values.
 #[test]

@@ -147,10 +147,12 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
                 let marching = Marching { steps: self.walk.steps, offset: uniform(rng) };
                 let end = nearest_surface(&ray, scene);
                 let through = || self.through(&ray, end.as_ref(), marching);
-                if let Some(arrival) = self.arriving(&ray, end.as_ref(), pdf * count as f32, through, &mut child) {
-                    if let Some(learnt) = &mut learnt {
-                        learnt.add(direction, arrival.irradiance.mean() * count as f32, pdf, count);
-                    }
+                let arrival = self.arriving(&ray, end.as_ref(), pdf * count as f32, through, &mut child);
+                if let Some(learnt) = &mut learnt {
+                    let found = arrival.as_ref().map_or(0.0, |arrival| arrival.irradiance.mean());
+                    learnt.add(direction, found * count as f32, pdf, count);
+                }
+                if let Some(arrival) = arrival {
                     let arrival = self.steadied(arrival);
                     let light = arrival.scatter_directional(into.moments, 1.0, into.coefficients);
                     openings.add_sky(end.as_ref(), light.radiance);
@@ -260,6 +262,9 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
             let (to_light, pdf) = mixture.direction(j, upwards, cosine_pdf);
             let cosine = normal.dot(to_light);
             if cosine <= 0.0 {
+                if let Some(learnt) = &mut learnt {
+                    learnt.add(to_light, 0.0, pdf, count);
+                }
                 continue;
             }
             let weight = share * cosine / pdf;

@@ -18,7 +18,7 @@ use crate::sampling::{Generator, uniform, uniform2, warp};
 use crate::single_scatter::shadow_ray;
 use crate::spectrum::Spectrum;
 use crate::surface::{Surface, lambert};
-use crate::transmittance::thickness::{Marching, transmittance};
+use crate::transmittance::thickness::{Marching, transmittance, until_the_end};
 
 /// Mirrors and panes of glass an eye ray follows: a hall of mirrors must end.
 const MAX_BOUNCES: u32 = 32;
@@ -136,7 +136,7 @@ fn look<M: Medium + ?Sized, S: Scene + ?Sized>(
         // Behind a mirror, direct light has been scattered twice.
         let scatters = settings.indirect || !bounced;
         if scatters {
-            sight.segment(&segment, throughput);
+            sight.segment(&until_the_end(&segment, world.medium), throughput);
         }
         let seen = scattering_points(&segment, world.medium, settings.density, u, jitter, |t, properties, weight| {
             if scatters && !properties.scattering.is_black() {
@@ -336,11 +336,9 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Gather<'_, M, S> {
     fn near(&mut self, segment: &Ray, choice: f32, u: f32) -> Option<Spectrum> {
         let world = &self.estimator.world;
         let reached = world.lights.iter().filter_map(|light| {
-            let centre = light.steep_field()?.centre();
+            light.steep_field()?;
             let interval = light.near_interval(segment, 0.0, segment.length)?;
-            let along = segment.direction.dot(centre - segment.origin).clamp(interval.0, interval.1);
-            let height = segment.at(along).distance(centre).max(1e-6);
-            Some((light.intensity() / height, (light, interval)))
+            Some((light.sent_along(segment, interval), (light, interval)))
         });
         let ((light, interval), chosen) = choose(reached, choice)?;
         let (pivot, source) = light.anchor(uniform2(&mut self.rng))?;

@@ -10,16 +10,23 @@ const COLUMNS: usize = 16;
 /// Cells of equal solid angle that the sphere is divided into.
 const CELLS: usize = ROWS * COLUMNS;
 
-/// What samples have found by direction: `∫ f² dω` per cell, from which the best density follows.
+/// What samples have found by direction: `∫ f² dω` per cell, from which the best density follows; and by how much they
+/// differ.
 ///
 /// A record's own samples must not be drawn by what they found themselves, or records that happened to see
 /// something bright would keep it: learn from some, draw others.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Guide([f32; CELLS]);
+pub struct Guide {
+    squares: [f32; CELLS],
+    /// Of estimates, of the mean squares of their samples, and how many there are.
+    sum: f32,
+    sum_of_squares: f32,
+    weight: f32,
+}
 
 impl Default for Guide {
     fn default() -> Self {
-        Self([0.0; CELLS])
+        Self { squares: [0.0; CELLS], sum: 0.0, sum_of_squares: 0.0, weight: 0.0 }
     }
 }
 
@@ -34,15 +41,41 @@ impl Guide {
     /// Adds one of `count` samples: `value` is what it found over its density `pdf` (sr⁻¹).
     #[inline]
     pub fn add(&mut self, direction: Vec3, value: f32, pdf: f32, count: u32) {
-        let square = value * value * pdf / count.max(1) as f32;
+        let share = 1.0 / count.max(1) as f32;
+        self.weight += share;
+        let square = value * value * pdf * share;
         if square > 0.0 && square.is_finite() {
-            self.0[cell(direction)] += square;
+            self.squares[cell(direction)] += square;
+            self.sum += value * share;
+            self.sum_of_squares += value * value * share;
         }
+    }
+
+    /// Relative variance of the samples, `⟨f²⟩/⟨f⟩² − 1`: what `n` of them say varies by the `n`-th part of it, or by less if
+    /// they are evenly spread. 0 where nothing was found.
+    ///
+    /// ```
+    /// # use fogbow::{cache::Guide, math::Vec3};
+    /// let mut guide = Guide::default();
+    /// guide.add(Vec3::Z, 1.0, 0.08, 2);
+    /// guide.add(Vec3::X, 3.0, 0.08, 2);
+    /// assert_eq!(guide.relative_variance(), 0.25);
+    /// let twice = guide;
+    /// guide.merge(&twice, 1.0);
+    /// assert_eq!(guide.relative_variance(), 0.25);
+    /// ```
+    #[must_use]
+    pub fn relative_variance(&self) -> f32 {
+        let ratio = (self.sum_of_squares / self.sum) * (self.weight / self.sum);
+        if ratio > 1.0 && ratio.is_finite() { ratio - 1.0 } else { 0.0 }
     }
 
     /// Adds what another has learnt nearby.
     pub fn merge(&mut self, other: &Self, weight: f32) {
-        self.0.iter_mut().zip(&other.0).for_each(|(a, b)| *a += weight * b);
+        self.squares.iter_mut().zip(&other.squares).for_each(|(a, b)| *a += weight * b);
+        self.sum += weight * other.sum;
+        self.sum_of_squares += weight * other.sum_of_squares;
+        self.weight += weight * other.weight;
     }
 }
 
@@ -68,7 +101,7 @@ impl Guided {
     #[must_use]
     pub fn new(guide: &Guide) -> Option<Self> {
         let mut total = 0.0;
-        let mut until = guide.0.map(|square| {
+        let mut until = guide.squares.map(|square| {
             total += float::sqrt(square);
             total
         });

@@ -26,6 +26,7 @@ pub use geometry::{Falloff, Incident, Source};
 pub use point::{PhongLight, PointLight, SpotLight};
 
 use crate::math::{Bounds, Ray};
+use crate::sampling::distance::Equiangular;
 use crate::spectrum::Spectrum;
 
 /// A light.
@@ -320,6 +321,32 @@ impl Light<'_> {
             Self::Spot(light) => light.lit_interval(ray, near, far),
             _ => self.near_field()?.interval(ray, near, far),
         }
+    }
+
+    /// What the light sends to the part of `ray` between `near` and `far` (m), one of [`Light::near_interval`], without
+    /// fog or shadows: about `∫ I/r² dt` (W·m⁻¹·sr⁻¹, mean of the channels), as if all of it came from its middle; 0 for
+    /// lights at infinity. By it, lights are chosen for connections along rays: one whose share is far too small makes
+    /// outliers.
+    ///
+    /// ```
+    /// # use fogbow::{light::{Light, PointLight}, math::{Ray, Vec3}, spectrum::Spectrum};
+    /// let lamp = Light::Point(PointLight::new(Vec3::new(10.0, 0.0, 0.0), Spectrum::ONE).unwrap());
+    /// // Straight towards the lamp, but only up to half the way: 1/5 − 1/10.
+    /// let sent = lamp.sent_along(&Ray::new(Vec3::ZERO, Vec3::X), (0.0, 5.0));
+    /// assert!((sent - 0.1).abs() < 1e-5);
+    /// ```
+    #[inline]
+    #[must_use]
+    pub fn sent_along(&self, ray: &Ray, (near, far): (f32, f32)) -> f32 {
+        let Some(field) = self.near_field() else { return 0.0 };
+        let Some(law) = Equiangular::new(ray.origin, ray.direction, field.centre(), near, far) else { return 0.0 };
+        // A ray through the middle of a flat light is on the mean a quarter of its width away from where it shines.
+        let most = match (self, field.radius()) {
+            (Self::Quad(_) | Self::Mesh(_), Some(radius)) => 2.0 * crate::math::float::PI / radius,
+            _ => f32::INFINITY,
+        };
+        // Capped, so that a sum over all lights stays a number.
+        (self.intensity() * law.weight().min(most)).min(1e30)
     }
 
     /// A rough irradiance (mean of the channels) at `from` without fog or shadows: by it, lights

@@ -14,7 +14,7 @@ use crate::sampling::{Generator, uniform, uniform2, warp};
 use crate::single_scatter::{Arrival, Contribution, nearest_surface, shadow_ray};
 use crate::spectrum::{Gradient, Spectrum};
 use crate::transmittance::thickness::{
-    Marching, Steps, optical_thickness_with_gradients, transmittance_with_gradients,
+    Marching, Steps, optical_thickness_with_gradients, transmittance_with_gradients, until_the_end,
 };
 
 /// Beyond this many distances to the light an endless segment is not sampled equiangularly: 10⁻⁴ of
@@ -242,14 +242,16 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Walk<'_, M, S> {
         total: &mut Incoming,
         rng: &mut Generator,
     ) {
-        let importance = |light: &Light<'_>| match light.steep_field() {
-            Some(field) => light.intensity() / height(ray, field.centre()),
-            None => 0.0,
+        let lit = until_the_end(ray, self.medium);
+        let interval = |light: &Light<'_>| {
+            let centre = light.steep_field()?.centre();
+            let farthest = lit.length.min(ENDLESS * ray.origin.distance(centre).max(self.medium.resolution()));
+            light.near_interval(&lit, 0.0, farthest)
         };
+        let importance = |light: &Light<'_>| interval(light).map_or(0.0, |part| light.sent_along(&lit, part));
         self.each_light(importance, rng, |light, share, rng| {
             let (position, source) = light.anchor(uniform2(rng))?;
-            let farthest = ray.length.min(ENDLESS * ray.origin.distance(position).max(self.medium.resolution()));
-            let (near, far) = light.near_interval(ray, 0.0, farthest)?;
+            let (near, far) = interval(light)?;
             let law = Equiangular::new(ray.origin, ray.direction, position, near, far)?;
             let distance = law.sample(uniform(rng)).clamp(near, far);
             let (at, marching) = (ray.at(distance), self.marching(rng));
@@ -334,23 +336,4 @@ fn add(total: &mut Incoming, turn: Option<f32>, carried: &Contribution) {
     total.irradiance += carried.radiance;
     total.gradient += carried.gradient;
     total.turning += carried.radiance * turn.unwrap_or(0.0);
-}
-
-/// Distance (m) of a light from a ray: its light along the ray sums up to about π over this.
-fn height(ray: &Ray, position: Vec3) -> f32 {
-    let along = ray.direction.dot(position - ray.origin).clamp(0.0, ray.length);
-    ray.at(along).distance(position).max(1e-6)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn height_of_a_light_behind_the_ray_is_its_distance() {
-        let ray = Ray::new(Vec3::ZERO, Vec3::X);
-        assert_eq!(height(&ray, Vec3::new(-3.0, 4.0, 0.0)), 5.0);
-        assert_eq!(height(&ray, Vec3::new(3.0, 4.0, 0.0)), 4.0);
-        assert!(height(&ray, Vec3::X) > 0.0, "a light on the ray itself");
-    }
 }

@@ -140,8 +140,8 @@ pub(super) fn along<M: Medium + ?Sized, S: Scene + ?Sized>(
         |pivot: Vec3, (near, far): (f32, f32)| Equiangular::new(segment.origin, segment.direction, pivot, near, far);
     let reached = lights.iter().filter_map(|light| {
         let interval = light.near_interval(segment, near, far)?;
-        let strength = if lights.len() == 1 { 1.0 } else { strength(light, segment, interval)? };
-        Some((strength, (light, interval)))
+        let sent = if lights.len() == 1 { 1.0 } else { light.sent_along(segment, interval) };
+        Some((sent, (light, interval)))
     });
     let Some(((light, interval), chosen)) = discrete::choose(reached, random.0) else {
         return Spectrum::ZERO;
@@ -179,16 +179,4 @@ pub(super) fn along<M: Medium + ?Sized, S: Scene + ?Sized>(
         arriving *= transmittance(world.medium, &segment.with_length(distance), rng);
     }
     scattered * arriving * incident.irradiance * (weight / (equiangular.pdf(distance) * chosen.probability))
-}
-
-/// About what a light sends to a part of a ray: its intensity times `length / (r₀ r₁)`, which is
-/// the integral of `1/r²` but for the difference between the angle seen and its sine.
-#[inline]
-fn strength(light: &Light<'_>, segment: &Ray, (near, far): (f32, f32)) -> Option<f32> {
-    let centre = light.near_field()?.centre();
-    let start = segment.at(near).distance(centre);
-    // Infinitely far, length and distance cancel.
-    let stretch = if far.is_finite() { (far - near) / segment.at(far).distance(centre) } else { 1.0 };
-    // A light on the ray itself must not become infinitely strong.
-    Some(light.intensity() * (stretch / start).min(1e6 / (far - near).min(1e6)).max(1e-12))
 }

@@ -150,6 +150,27 @@ pub(super) enum Part {
     },
 }
 
+/// Most stretches asked for where a medium ends.
+const MOST_TO_END: u32 = 8;
+
+/// `ray`, cut off where the medium ends for good if it has no end itself; whole where that is not found soon.
+pub(crate) fn until_the_end(ray: &Ray, medium: &(impl Medium + ?Sized)) -> Ray {
+    let mut at = 0.0;
+    if ray.length.is_infinite() {
+        for _ in 0..MOST_TO_END {
+            let stretch = medium.run(ray, at);
+            if stretch.until.is_infinite() && stretch.majorant.is_black() {
+                return ray.with_length(at);
+            }
+            if !(stretch.until > at) || stretch.until.is_infinite() {
+                break;
+            }
+            at = stretch.until;
+        }
+    }
+    *ray
+}
+
 /// Splits a ray at the medium's constant stretches; what lies between two of them is one run, or
 /// several where it is long. Stops as soon as `visit(part, is_endless)` says so: on endless and very long rays, where nothing
 /// is seen beyond. What lies behind the most stretches a walk may visit counts as vacuum.

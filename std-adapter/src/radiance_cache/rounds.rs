@@ -140,10 +140,12 @@ pub(super) struct Estimate<A> {
     sums: Sums,
     attached: A,
     learnt: Guide,
+    /// How many times the samples of a usual one it took.
+    effort: f32,
 }
 
-/// Mixes new estimates, of which the share `share` stays, into the records from a number on, and adds to what was
-/// learnt; how many.
+/// Mixes new estimates, of which the share `share` stays, or more where they took more samples, into the records from a
+/// number on, and adds to what was learnt; how many.
 pub(super) fn blend<C: Fill>(
     cache: &mut Option<C>,
     effort: Option<Effort>,
@@ -154,9 +156,10 @@ pub(super) fn blend<C: Fill>(
 ) -> u64 {
     let (Some(cache), Some(effort)) = (cache, effort) else { return 0 };
     let count = estimates.len() as u64;
-    for (i, Estimate { sums, mut attached, learnt }) in estimates.into_iter().enumerate() {
+    for (i, Estimate { sums, mut attached, learnt, effort: more }) in estimates.into_iter().enumerate() {
         // Within its radius a record changes by a factor of e to the tolerance at most.
         let number = from + i;
+        let share = 1.0 - (1.0 - share) / more;
         let reach = cache.record(number).1 / effort.tolerance;
         let (value, gradient) = cache.light(number);
         let new = clamp_gradient(&sums.gradient, sums.value, reach);
@@ -179,6 +182,9 @@ pub(super) const COARSE: [u64; 2] = [4, 5];
 
 /// Of those, so many first records get so many times the samples: what they have wrong nothing averages out.
 const FIRST: (u64, u32) = (100, 8);
+
+/// Most samples of an estimate whose samples vary more than usual, as a multiple.
+const MOST_SAMPLES: f32 = 4.0;
 
 /// Eye rays from whose points others are followed to what lights them. More find small things that are seen; light is
 /// sums over all that is met, small things included.
@@ -211,13 +217,15 @@ where
     S: Scene + Sync + ?Sized,
     F: Fn([f32; 2]) -> Ray + Sync,
 {
-    /// Estimates for all records from a number on, each guided by what those around it have learnt.
+    /// Estimates for all records from a number on, each guided by what those around it have learnt; with more samples where
+    /// these have a relative variance above `spread`.
     pub(super) fn estimates<C: Fill>(
         &self,
         cache: &Option<C>,
         effort: Option<Effort>,
         from: usize,
         stream: u64,
+        spread: f32,
         guides: &[Guide],
         compute: impl Fn(&C, Looks<'_>, &Place, &mut Generator) -> (Sums, C::Attached) + Sync,
     ) -> Vec<Estimate<C::Attached>> {
@@ -236,10 +244,11 @@ where
                 }
             });
             let (guide, mut learnt) = (Guided::new(&around), Guide::default());
-            let count = samples(&effort, radius, usual);
+            let more = (around.relative_variance() / spread).clamp(1.0, MOST_SAMPLES);
+            let count = (samples(&effort, radius, usual) as f32 * more) as u32;
             let looks = Looks { count, guide: guide.as_ref(), learnt: Some(&mut learnt) };
             let (sums, attached) = compute(cache, looks, &place, &mut Generator::new(seed ^ number as u64));
-            Estimate { sums, attached, learnt }
+            Estimate { sums, attached, learnt, effort: more }
         };
         (from..cache.count()).into_par_iter().map(estimate).collect()
     }
