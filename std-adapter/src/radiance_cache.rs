@@ -23,7 +23,7 @@ pub struct Effort {
     /// `ε` of J's Eq. 34: larger is coarser.
     pub tolerance: f32,
     /// Directions or random walks of each of the two estimates of a record; fewer where it reaches less far than
-    /// others do.
+    /// others do, and in the second up to four times as many where they differ much.
     pub samples: u32,
     /// Degree of the expansions; 0 in isotropic media and on surfaces.
     pub degree: usize,

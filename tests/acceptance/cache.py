@@ -12,9 +12,9 @@ FOLDER and what must be built and installed: see ground.py. SCENE is a name in p
 phases of filling and of the rendering, without reading, building the tree and writing. --store keeps long renders.
 
 accuracy     default settings: relRMSE_c <= 3 % (6 % in spot-shafts, nave-shafts, lantern and their -ss), |bias| <= 1 %,
-             no 16x16 block off by more than 5 %; --seed is 1 unless told. `ref` is the mean standard error of the reference's own blocks. The worst
-             block (row, column) is told with its distance in the reference's own standard errors there; where all blocks
-             beyond 5 % lie within 3 of them the line says `noise`, and the blocks still count.
+             no 16x16 block off by more than 5 %; --seed is 1 unless told. `ref` is the mean standard error of the
+             reference's own blocks. The worst block (row, column) is told with its distance in the reference's own standard
+             errors there; where all blocks beyond 5 % lie within 3 of them the line says `noise`, and the blocks still count.
 speed        CPU seconds to 2 % relRMSE_c, by the cheapest rung of LADDER that reaches it (the error is the root mean
              square of three seeds), against path tracing and the peer, whose seconds to 2 % are c^2 / 0.02^2 of runs of
              64 (at 512x512: 16) samples in turns. At least 50 times faster than the slower, and than our own path tracing.

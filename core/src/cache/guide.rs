@@ -17,10 +17,13 @@ const CELLS: usize = ROWS * COLUMNS;
 /// something bright would keep it: learn from some, draw others.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Guide {
+    /// `∫ f² dω` per cell, summed over estimates.
     squares: [f32; CELLS],
-    /// Of estimates, of the mean squares of their samples, and how many there are.
+    /// Sum of estimates: of the means of their samples.
     sum: f32,
+    /// Sum of the mean squares of their samples.
     sum_of_squares: f32,
+    /// How many estimates have been summed, weighted.
     weight: f32,
 }
 
@@ -51,8 +54,9 @@ impl Guide {
         }
     }
 
-    /// Relative variance of the samples, `⟨f²⟩/⟨f⟩² − 1`: what `n` of them say varies by the `n`-th part of it, or by less if
-    /// they are evenly spread. 0 where nothing was found.
+    /// Relative variance of the samples as they were drawn, `⟨v²⟩/⟨v⟩² − 1` of the values `v` given to [`Guide::add`]:
+    /// what `n` of them say varies by the `n`-th part of it, or by less if they are evenly spread. At least 0, and 0 where
+    /// nothing was found.
     ///
     /// ```
     /// # use fogbow::{cache::Guide, math::Vec3};

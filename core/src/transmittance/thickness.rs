@@ -352,3 +352,24 @@ pub fn transmittance(ray: &Ray, medium: &(impl Medium + ?Sized), marching: March
 pub fn transmittance_with_gradients(ray: &Ray, medium: &(impl Medium + ?Sized), marching: Marching) -> Transmittance {
     optical_thickness_with_gradients(ray, medium, marching).transmittance()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::medium::{Homogeneous, Placed, Region};
+    use crate::phase::Phase;
+
+    #[test]
+    fn endless_rays_end_where_the_medium_does_and_no_others_change() {
+        let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::ONE, Phase::ISOTROPIC).unwrap();
+        let bubble = [Region::sphere(Vec3::ZERO, 1.0).unwrap()];
+        let ball = Placed::new(fog, Region::sphere(Vec3::ZERO, 2.0).unwrap()).with_holes(&bubble);
+        let from_outside = Ray::new(Vec3::new(-5.0, 0.0, 0.0), Vec3::X);
+        assert_eq!(until_the_end(&from_outside, &ball).length, 7.0);
+        assert_eq!(until_the_end(&Ray::new(Vec3::X * 5.0, Vec3::X), &ball).length, 0.0);
+        for length in [0.5, 100.0] {
+            assert_eq!(until_the_end(&from_outside.with_length(length), &ball).length, length);
+        }
+        assert_eq!(until_the_end(&from_outside, &fog).length, f32::INFINITY);
+    }
+}

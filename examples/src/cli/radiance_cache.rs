@@ -39,7 +39,8 @@ pub struct CacheArguments {
     #[arg(long, value_name = "CACHE=E", value_parser = named)]
     pub tolerance_of: Vec<(Kind, f64)>,
     /// Random walks of each of the two estimates of a record of multiple scattering, fewer where it reaches less far
-    /// than others; the other caches in proportion [default: 2048].
+    /// than others, in the second up to four times as many where they differ much; the other caches in proportion
+    /// [default: 2048].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     pub paths: Option<u32>,
     /// Degree of expansions in anisotropic media [default: from the phase function].

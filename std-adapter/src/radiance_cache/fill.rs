@@ -96,9 +96,9 @@ const REVISIONS: u64 = 2;
 /// a third of it takes the error of `cornell-homog-iso` from 2.04 to 1.87 %, and leaves its bias within 0.1 %.
 const SECOND: f32 = 0.67;
 
-/// Relative variance of samples (`Guide::relative_variance`) up to which the usual number of them will do: of light of surfaces,
-/// light scattered more than once, and irradiance. In smoke boxes the means are 0.7 to 1.5, 4 to 6 and 2; where shafts of light
-/// fall through windows, 18, 45 and 15.
+/// Relative variance of samples ([`Guide::relative_variance`]) up to which the usual number of them will do: of light of
+/// surfaces, light scattered more than once, and irradiance. In smoke boxes the means are 0.7 to 1.5, 4 to 6 and 2; where
+/// shafts of light fall through windows, 18, 45 and 15.
 const SPREADS: [f32; 3] = [3.0, 12.0, 6.0];
 
 /// What light a record in the medium holds.

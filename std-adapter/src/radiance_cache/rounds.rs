@@ -217,8 +217,8 @@ where
     S: Scene + Sync + ?Sized,
     F: Fn([f32; 2]) -> Ray + Sync,
 {
-    /// Estimates for all records from a number on, each guided by what those around it have learnt; with more samples where
-    /// these have a relative variance above `spread`.
+    /// Estimates for all records from a number on, each guided by what those around it have learnt; with more samples
+    /// where these have a relative variance above `spread`.
     pub(super) fn estimates<C: Fill>(
         &self,
         cache: &Option<C>,
