@@ -74,6 +74,70 @@ impl<T: Copy> List<'_, T> {
         }
     }
 
+    /// Number of elements so far.
+    ///
+    /// ```
+    /// # use fogbow::storage::List;
+    /// let mut slots = [0u32; 2];
+    /// let mut list = List::from(&mut slots[..]);
+    /// assert!(list.is_empty());
+    /// list.push(7).unwrap();
+    /// assert_eq!(list.len(), 1);
+    /// ```
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.as_slice().len()
+    }
+
+    /// Whether there is no element.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.as_slice().is_empty()
+    }
+
+    /// Appends elements in order, all or none.
+    ///
+    /// ```
+    /// # use fogbow::storage::{Full, List};
+    /// let mut slots = [0u32; 2];
+    /// let mut list = List::from(&mut slots[..]);
+    /// assert_eq!(list.extend_from_slice(&[1, 2, 3]), Err(Full));
+    /// assert!(list.is_empty());
+    /// assert_eq!(list.extend_from_slice(&[1, 2]), Ok(()));
+    /// ```
+    ///
+    /// # Errors
+    /// [`Full`] when a lent slice has no room for all.
+    pub fn extend_from_slice(&mut self, values: &[T]) -> Result<(), Full> {
+        match &mut self.0 {
+            Storage::Lent { slots, used } => {
+                slots.get_mut(*used..*used + values.len()).ok_or(Full)?.copy_from_slice(values);
+                *used += values.len();
+            }
+            #[cfg(feature = "alloc")]
+            Storage::Grown(vec) => vec.extend_from_slice(values),
+        }
+        Ok(())
+    }
+
+    /// Keeps the first `count` elements, or all if there are fewer.
+    ///
+    /// ```
+    /// # use fogbow::storage::List;
+    /// let mut slots = [0u32; 2];
+    /// let mut list = List::from(&mut slots[..]);
+    /// list.extend_from_slice(&[1, 2]).unwrap();
+    /// list.truncate(1);
+    /// assert_eq!(list.as_slice(), [1]);
+    /// ```
+    pub fn truncate(&mut self, count: usize) {
+        match &mut self.0 {
+            Storage::Lent { used, .. } => *used = count.min(*used),
+            #[cfg(feature = "alloc")]
+            Storage::Grown(vec) => vec.truncate(count),
+        }
+    }
+
     /// Forgets all elements and keeps the memory.
     pub fn clear(&mut self) {
         match &mut self.0 {
@@ -87,6 +151,14 @@ impl<T: Copy> List<'_, T> {
 impl<'s, T> From<&'s mut [T]> for List<'s, T> {
     fn from(slots: &'s mut [T]) -> Self {
         Self(Storage::Lent { slots, used: 0 })
+    }
+}
+
+#[cfg(feature = "alloc")]
+impl<T> Default for List<'_, T> {
+    /// Nothing, in memory that grows.
+    fn default() -> Self {
+        Self(Storage::Grown(alloc::vec::Vec::new()))
     }
 }
 

@@ -7,7 +7,7 @@
 
 use std::path::PathBuf;
 
-use fogbow::cache::{Estimator, Extrapolation, EyeSettings, Limits, Place, places};
+use fogbow::cache::{Asked, Effort, Estimator, EyeSettings, Limits, Place, RadianceCaches, Settings, places};
 use fogbow::host::Medium;
 use fogbow::math::{Vec2, Vec3};
 use fogbow::multiple_scatter;
@@ -21,8 +21,8 @@ use fogbow_examples::camera::Camera;
 use fogbow_examples::scene_file::SceneFile;
 use fogbow_examples::world::{Storage, WithMedium, World};
 use fogbow_std::progress::Control;
-use fogbow_std::radiance_cache::{Effort, RadianceCaches, Settings, fill};
 use fogbow_std::stats::Stopwatch;
+use fogbow_std::threads::{Threads, run};
 
 const SAMPLES: u32 = 256;
 const REPEATS: u64 = 24;
@@ -72,30 +72,35 @@ impl WithMedium for Job<'_> {
 /// Greatest radius over the size of the scene.
 const REACH: f32 = 0.1;
 
-fn filled<M: Medium + Sync>(estimator: &Estimator<'_, M, World<'_>>, camera: &Camera, most: f32) -> RadianceCaches {
+fn filled<M: Medium + Sync>(
+    estimator: &Estimator<'_, M, World<'_>>,
+    camera: &Camera,
+    most: f32,
+) -> RadianceCaches<'static> {
     let effort = |tolerance| {
         let limits = Limits { min: 0.01 * most, max: most };
         Some(Effort { tolerance, samples: SAMPLES, degree: 0, limits, clearance: f32::INFINITY })
     };
-    let mut caches = RadianceCaches::new(Settings {
-        single: None,
+    let caches = RadianceCaches::new(Settings {
         surface: effort(2.0),
         multiple: effort(1.0),
         irradiance: effort(0.7),
         rays: 4096,
-        extrapolation: Extrapolation::default(),
         margin: 0.1,
-        pixels: (1.5, 64.0),
-        round: 64,
-        threads: 0,
+        walk: estimator.walk,
+        paths: estimator.paths,
+        light_samples: estimator.light_samples,
+        finest: estimator.finest,
         seed: 1,
+        ..Settings::default()
     });
-    let eye = EyeSettings { density: 8.0, connections: 4, lights_visible: true, indirect: true };
     let ray = |at: [f32; 2]| camera.ray(Vec2::from(at));
-    if let Err(error) = fill(&mut caches, estimator, &eye, 0.005, &Control::default(), ray) {
-        eprintln!("{error}");
+    let mut filling = caches.fill(Asked::View { ray, pixel: 0.005 });
+    match Threads::new(0) {
+        Ok(threads) => drop(run(&mut filling, &estimator.world, &threads, &Control::default(), None, |_| {})),
+        Err(error) => eprintln!("{error}"),
     }
-    caches
+    filling.finish()
 }
 
 fn measure<M: Medium>(estimator: &Estimator<'_, M, World<'_>>, found: &[Place]) {

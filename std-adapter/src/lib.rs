@@ -50,5 +50,6 @@ pub mod progress;
 pub mod radiance_cache;
 pub mod seed;
 pub mod stats;
+pub mod threads;
 pub mod tiles;
 pub mod virtual_lights;

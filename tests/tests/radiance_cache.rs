@@ -3,22 +3,24 @@
 use core::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 use fogbow::cache::{
-    Estimator, Extrapolation, EyeSettings, Limits, Place, Reading, Record, VolumeCache, clearance, places, radiance,
+    Asked, Effort, EyeSettings, Filling, Kind, Limits, Output, Place, RadianceCaches, Reading, Record, Settings,
+    clearance, places,
 };
 use fogbow::host::{Gradients, Medium, Properties, Stretch};
 use fogbow::light::{Light, PointLight};
-use fogbow::math::{Ray, Vec2, Vec3};
+use fogbow::math::{Bounds, Ray, Vec2, Vec3};
 use fogbow::medium::Homogeneous;
-use fogbow::path::{self, World};
+use fogbow::path::World;
 use fogbow::phase::Lobe;
-use fogbow::sampling::Generator;
+use fogbow::sampling::{Generator, uniform};
 use fogbow::spectrum::Spectrum;
 use fogbow::surface::Surface;
 use fogbow::transmittance::thickness::Steps;
+use fogbow::work::{Rounds, finish};
 use fogbow::{multiple_scatter, single_scatter::Sums};
 use fogbow_std::film::Film;
 use fogbow_std::progress::Control;
-use fogbow_std::radiance_cache::{Effort, Outcome, RadianceCaches, Settings, decode, encode, fill};
+use fogbow_std::threads::{Ending, Threads, run};
 use fogbow_std::tiles;
 use fogbow_tests::hosts::{Ball, Body, Filled};
 
@@ -58,13 +60,15 @@ fn settings() -> Settings {
         surface: effort(1.5, 2),
         multiple: effort(1.0, 2),
         irradiance: effort(0.5, 0),
-        extrapolation: Extrapolation::Curved,
         rays: 600,
-        margin: 0.15,
-        pixels: (1.0, 1000.0),
+        pixels: [1.0, 1000.0],
         round: 16,
-        threads: 2,
+        eye: EYE,
+        walk: multiple_scatter::Settings::new(Steps::Length(0.3)),
+        light_samples: 1,
+        finest: 0.02,
         seed: 1,
+        ..Settings::default()
     }
 }
 
@@ -75,50 +79,58 @@ fn settled() -> Settings {
     Settings { surface: more(few.surface), multiple: more(few.multiple), irradiance: more(few.irradiance), ..few }
 }
 
-fn estimator<'a, M>(medium: &'a M, room: &'a Ball, lights: &'a [Light<'a>]) -> Estimator<'a, M, Ball> {
-    Estimator {
-        world: World { medium, scene: room, lights },
-        surfaces: None,
-        scattered: None,
-        walk: multiple_scatter::Settings::new(Steps::Length(0.3)),
-        paths: path::Settings::default(),
-        light_samples: 1,
-        finest: 0.02,
-    }
-}
+type Caches = RadianceCaches<'static>;
+type Eye = fn([f32; 2]) -> Ray;
 
-/// Fills `caches` as far as `control` lets it.
-fn fill_in<M: Medium + Sync>(caches: &mut RadianceCaches, medium: &M, control: &Control<'_>) -> Outcome {
+const VIEW: Asked<Eye> = Asked::View { ray: eye_ray, pixel: PIXEL };
+
+/// Fills `caches` as far as `control` lets it, on so many threads.
+fn fill_on<M: Medium + Sync>(
+    caches: Caches,
+    medium: &M,
+    threads: usize,
+    control: &Control<'_>,
+) -> (Filling<'static, Eye>, Ending) {
     let (room, lights) = (room(), [lamp()]);
-    fill(caches, &estimator(medium, &room, &lights), &EYE, PIXEL, control, eye_ray).unwrap()
+    let world = World { medium, scene: &room, lights: &lights };
+    let mut filling = caches.fill(VIEW);
+    let ran = run(&mut filling, &world, &Threads::new(threads).unwrap(), control, None, |_| {});
+    (filling, ran.ending)
 }
 
-fn filled(settings: Settings) -> (RadianceCaches, Outcome) {
-    let mut caches = RadianceCaches::new(settings);
-    let outcome = fill_in(&mut caches, &fog(), &Control::default());
-    (caches, outcome)
+fn fill_in<M: Medium + Sync>(caches: Caches, medium: &M) -> (Caches, [u64; 6]) {
+    let (filling, ending) = fill_on(caches, medium, 2, &Control::default());
+    assert_eq!(ending, Ending::Done);
+    let computed = computed(&filling);
+    (filling.finish(), computed)
 }
 
-/// All that is stored, to the last bit: the shortest decimal that reads back as the same number tells numbers
-/// apart, and zeros by their sign.
-fn stored(caches: &RadianceCaches) -> String {
-    let volumes = [&caches.single, &caches.surface, &caches.multiple]
-        .map(|cache| cache.as_ref().map(|cache| (cache.records(), cache.attachments())));
-    let surface = caches.irradiance.as_ref().map(|cache| (cache.records(), cache.attachments()));
-    format!("{volumes:?} {surface:?}")
+fn computed(filling: &Filling<'static, Eye>) -> [u64; 6] {
+    Kind::ALL.map(|kind| filling.computed(kind))
+}
+
+fn filled(settings: Settings) -> Caches {
+    fill_in(RadianceCaches::new(settings), &fog()).0
+}
+
+fn counts(caches: &Caches) -> [usize; 4] {
+    Kind::FINAL.map(|kind| caches.records(kind).len())
+}
+
+/// All that is stored, to the last bit.
+fn stored(caches: &Caches) -> Vec<u8> {
+    caches.to_bytes(0)
 }
 
 /// An image with the caches, and how many of its look-ups were misses.
-fn picture(caches: &RadianceCaches, threads: usize) -> (Film, u64, u64) {
+fn picture(caches: &Caches, threads: usize) -> (Film, u64, u64) {
     let (fog, room, lights) = (fog(), room(), [lamp()]);
-    let reader = caches.reader();
-    let surfaces = reader.irradiance.map(|r| (r.cache, r.reading));
-    let estimator = Estimator { surfaces, ..estimator(&fog, &room, &lights) };
+    let world = World { medium: &fog, scene: &room, lights: &lights };
     let mut film = Film::new(16, 16, &["total"]).unwrap();
     let settings = tiles::Settings { samples: 4, threads, ..tiles::Settings::default() };
     let outcome = tiles::render(&mut film, &settings, &Control::default(), |sample, rng, layers| {
         let at = (Vec2::new(sample.x as f32, sample.y as f32) + 0.5) / 16.0;
-        let seen = radiance(&eye_ray(at.to_array()), &estimator, &reader, &EYE, rng);
+        let seen = caches.radiance(&eye_ray(at.to_array()), &world, rng);
         sample.tally.look_up(seen.lookups, seen.misses);
         layers[0] = seen.total();
     })
@@ -134,23 +146,77 @@ fn mean(film: &Film) -> f32 {
 
 #[test]
 fn caches_filled_by_one_two_and_seven_threads_hold_the_same_bits() {
-    let (one, outcome) = filled(Settings { threads: 1, ..settings() });
-    assert!(one.counts().iter().all(|&(records, _)| records > 10), "{:?}", one.counts());
+    let on = |threads| {
+        let (filling, _) = fill_on(RadianceCaches::new(settings()), &fog(), threads, &Control::default());
+        let computed = computed(&filling);
+        (filling.finish(), computed)
+    };
+    let (one, expected) = on(1);
+    assert!(counts(&one).iter().all(|&records| records > 10), "{:?}", counts(&one));
     let image = picture(&one, 1);
     for threads in [2, 7] {
-        let (other, counted) = filled(Settings { threads, ..settings() });
-        assert!(stored(&other) == stored(&one), "{threads} threads: {:?}, {:?}", other.counts(), one.counts());
-        assert_eq!(counted.computed, outcome.computed);
+        let (other, computed) = on(threads);
+        assert!(stored(&other) == stored(&one), "{threads} threads: {:?}, {:?}", counts(&other), counts(&one));
+        assert_eq!(computed, expected);
         assert_eq!(picture(&other, threads), image);
     }
 }
 
 #[test]
+fn a_fill_a_few_jobs_at_a_time_in_any_order_has_the_same_bits() {
+    let (fog, room, lights) = (fog(), room(), [lamp()]);
+    let world = World { medium: &fog, scene: &room, lights: &lights };
+    let mut filling = RadianceCaches::new(settings()).fill(VIEW);
+    let mut slots: Vec<Output<'static>> = (0..5).map(|_| Output::default()).collect();
+    let mut frame = 0_u32;
+    while !jobs(&filling).is_empty() {
+        // So many jobs a frame, the last first; of every third frame only the first result is taken, the rest is lost.
+        let jobs = jobs(&filling);
+        let batch: Vec<u32> = jobs.clone().take(1 + frame as usize % slots.len()).collect();
+        for (job, slot) in batch.iter().zip(&mut slots).rev() {
+            filling.run(*job, &world, slot);
+        }
+        let taken = if frame % 3 == 2 { 1 } else { batch.len() };
+        slots[..taken].iter().for_each(|slot| take(&mut filling, slot));
+        frame += 1;
+    }
+    assert!(frame > 100);
+    let once = stored(&filling.finish());
+    assert!(once == stored(&filled(settings())));
+}
+
+type Room<'a> = World<'a, Filled<Homogeneous>, Ball>;
+
+fn jobs(filling: &Filling<'static, Eye>) -> core::ops::Range<u32> {
+    Rounds::<Room<'_>>::jobs(filling)
+}
+
+fn take(filling: &mut Filling<'static, Eye>, output: &Output<'static>) {
+    Rounds::<Room<'_>>::accept(filling, output);
+}
+
+#[test]
+fn a_box_of_points_has_records_everywhere_in_it() {
+    let (fog, room, lights) = (fog(), room(), [lamp()]);
+    let world = World { medium: &fog, scene: &room, lights: &lights };
+    let bounds = Bounds { min: Vec3::splat(-0.8), max: Vec3::splat(0.8) };
+    let mut filling = RadianceCaches::new(settings()).fill(Asked::<Eye>::Box(bounds));
+    finish(&mut filling, &world, &mut Output::default());
+    let caches = filling.finish();
+    let read = caches.volume(Kind::Multiple).unwrap();
+    let mut rng = Generator::new(3);
+    let open = (0..1000).filter(|_| {
+        let at = Vec3::new(uniform(&mut rng), uniform(&mut rng), uniform(&mut rng));
+        !read.cache.covers(bounds.min + bounds.size() * at, &read.reading)
+    });
+    assert!(open.count() < 20);
+}
+
+#[test]
 fn other_seeds_fill_other_records_of_about_as_much_light() {
-    let (caches, _) = filled(settled());
-    let (others, _) = filled(Settings { seed: 2, ..settled() });
-    let records = |caches: &RadianceCaches| caches.multiple.as_ref().unwrap().records().to_vec();
-    assert_ne!(records(&caches)[0], records(&others)[0]);
+    let caches = filled(settled());
+    let others = filled(Settings { seed: 2, ..settled() });
+    assert_ne!(caches.records(Kind::Multiple)[0], others.records(Kind::Multiple)[0]);
     let (a, b) = (mean(&picture(&caches, 2).0), mean(&picture(&others, 2).0));
     // Records of 512 walks towards a lamp without extent are off by some per cent, and some hundred of them make the image.
     assert!((a - b).abs() < 0.05 * a && a > 0.0, "{a} and {b}");
@@ -158,38 +224,34 @@ fn other_seeds_fill_other_records_of_about_as_much_light() {
 
 #[test]
 fn what_is_filled_answers_every_question_of_the_image() {
-    let (caches, outcome) = filled(settings());
-    assert!(!outcome.cancelled);
-    let (_, lookups, misses) = picture(&caches, 2);
+    let (_, lookups, misses) = picture(&filled(settings()), 2);
     assert!(lookups > 10_000 && misses == 0, "{misses} of {lookups}");
 }
 
 #[test]
 fn records_reach_no_farther_than_surfaces_let_them() {
-    let beyond = |caches: &RadianceCaches, share: f32| {
+    let beyond = |caches: &Caches, share: f32| {
         let bound = |record: &Record| share * clearance(record.position, None, &room());
         // No radius is narrowed to less than what is asked for at all, or than a pixel.
         let least = |record: &Record| (PIXEL * record.position.distance(eye_ray([0.5; 2]).origin)).max(0.02);
         let is_beyond = |record: &&Record| record.radius > bound(record).max(least(record)) * 1.000_01;
-        let count =
-            |cache: &Option<VolumeCache<'_>>| cache.as_ref().unwrap().records().iter().filter(is_beyond).count();
-        [count(&caches.surface), count(&caches.multiple), count(&caches.coarse_multiple)]
+        [Kind::Surface, Kind::Multiple, Kind::CoarseMultiple]
+            .map(|kind| caches.records(kind).iter().filter(is_beyond).count())
     };
     let near = |effort: Option<Effort>| effort.map(|e| Effort { clearance: 0.5, ..e });
     let few = settings();
-    let (bounded, _) = filled(Settings { surface: near(few.surface), multiple: near(few.multiple), ..few });
+    let bounded = filled(Settings { surface: near(few.surface), multiple: near(few.multiple), ..few });
     assert_eq!(beyond(&bounded, 0.5), [0; 3]);
     // Unbounded ones do reach farther, but for those at which walks end.
-    let (unbounded, _) = filled(few);
-    let [surface, multiple, coarse] = beyond(&unbounded, 1.0);
+    let [surface, multiple, coarse] = beyond(&filled(few), 1.0);
     assert!(surface > 0 && multiple > 0 && coarse == 0, "{surface}, {multiple}, {coarse}");
 }
 
 /// Share of places of fresh eye rays that no record of a cache of multiple scattering reaches.
-fn uncovered(caches: &RadianceCaches) -> f64 {
+fn uncovered(caches: &Caches) -> f64 {
     let (fog, room, lights) = (fog(), room(), [lamp()]);
     let world = World { medium: &fog, scene: &room, lights: &lights };
-    let cache = caches.multiple.as_ref().unwrap();
+    let cache = caches.volume(Kind::Multiple).unwrap().cache;
     let reading = Reading::new(settings().multiple.unwrap().tolerance);
     let (mut asked, mut open) = (0, 0);
     for number in 0..400_u64 {
@@ -207,30 +269,41 @@ fn uncovered(caches: &RadianceCaches) -> f64 {
 
 #[test]
 fn hardly_a_place_of_other_eye_rays_is_left_uncovered() {
-    let (caches, _) = filled(settings());
+    let open = uncovered(&filled(settings()));
     // As many rays were asked as records cover several pixels each; the rest is what gaps are for.
-    assert!(uncovered(&caches) < 0.02, "{}", uncovered(&caches));
+    assert!(open < 0.02, "{open}");
 }
 
 #[test]
-fn filling_what_is_full_adds_next_to_nothing() {
-    let (mut caches, _) = filled(settings());
-    let before = caches.counts().map(|(records, _)| records);
-    fill_in(&mut caches, &fog(), &Control::default());
-    let after = caches.counts().map(|(records, _)| records);
-    for (before, after) in before.into_iter().zip(after) {
-        // Records shrink as their neighbours are clamped: a few places are open again at the end.
-        assert!(after >= before && after <= before + before / 10 + 1, "{before} records, then {after}");
+fn filling_what_is_full_computes_nothing() {
+    let caches = filled(settings());
+    let before = stored(&caches);
+    let (again, computed) = fill_in(caches, &fog());
+    assert_eq!((computed, stored(&again) == before), ([0; 6], true));
+}
+
+#[test]
+fn filling_for_another_view_adds_what_is_missing_there() {
+    let caches = filled(settings());
+    let before = counts(&caches);
+    let other: Eye = |film| Ray { origin: Vec3::new(0.05, 0.0, -1.5), ..eye_ray(film) };
+    let (room, fog, lights) = (room(), fog(), [lamp()]);
+    let world = World { medium: &fog, scene: &room, lights: &lights };
+    let mut filling = caches.fill(Asked::View { ray: other, pixel: PIXEL });
+    finish(&mut filling, &world, &mut Output::default());
+    for (before, after) in before.into_iter().zip(counts(&filling.finish())) {
+        assert!(after >= before && after <= before + before / 4 + 1, "{before} records, then {after}");
     }
 }
 
 #[test]
 fn a_fill_cancelled_beforehand_leaves_empty_caches_that_serve() {
     let flag = AtomicBool::new(true);
-    let mut caches = RadianceCaches::new(settings());
-    let outcome = fill_in(&mut caches, &fog(), &Control { cancel: Some(&flag), progress: None });
-    assert!(outcome.cancelled);
-    assert_eq!((outcome.computed, caches.counts().map(|(records, _)| records)), ([0; 4], [0; 4]));
+    let control = Control { cancel: Some(&flag), progress: None };
+    let (filling, ending) = fill_on(RadianceCaches::new(settings()), &fog(), 2, &control);
+    assert_eq!((ending, computed(&filling)), (Ending::Cancelled, [0; 6]));
+    let caches = filling.finish();
+    assert_eq!(counts(&caches), [0; 4]);
     // Every question is answered by a sample of its own.
     let (film, lookups, misses) = picture(&caches, 2);
     assert!(lookups == misses && mean(&film) > 0.0, "{misses} of {lookups}");
@@ -259,47 +332,50 @@ impl Medium for Impatient<'_> {
 }
 
 #[test]
-fn a_fill_cancelled_on_its_way_leaves_caches_that_serve_and_can_be_filled() {
+fn a_fill_cancelled_on_its_way_leaves_caches_that_serve_and_goes_on_to_the_same_bits() {
     let flag = AtomicBool::new(false);
     let impatient = |questions| Impatient { medium: fog(), left: AtomicU64::new(questions), flag: &flag };
-    let (mut whole, patient) = (RadianceCaches::new(settled()), impatient(u64::MAX));
-    fill_in(&mut whole, &patient, &Control::default());
+    let patient = impatient(u64::MAX);
+    let (whole, _) = fill_in(RadianceCaches::new(settled()), &patient);
     let asked = u64::MAX - patient.left.load(Ordering::Relaxed);
     let expected = mean(&picture(&whole, 2).0);
     for tenths in [1, 3, 8] {
         let questions = asked * tenths / 10;
-        let medium = impatient(questions);
         flag.store(false, Ordering::Relaxed);
-        let mut caches = RadianceCaches::new(settled());
-        let outcome = fill_in(&mut caches, &medium, &Control { cancel: Some(&flag), progress: None });
-        assert!(outcome.cancelled, "{questions}: {outcome:?}");
-        let (film, _, misses) = picture(&caches, 2);
+        let control = Control { cancel: Some(&flag), progress: None };
+        let (mut filling, ending) = fill_on(RadianceCaches::new(settled()), &impatient(questions), 2, &control);
+        assert_eq!(ending, Ending::Cancelled, "{questions}");
+
+        // What was made by then is in the bytes, which remember that it is still to be estimated anew.
+        let mut loaded = RadianceCaches::new(settled());
+        loaded.read(&filling.caches().to_bytes(7), 7).unwrap();
+        assert!(loaded.is_open());
+        let (film, _, misses) = picture(&loaded, 2);
         // What is missing is sampled: noise of 4 samples in 256 pixels.
         assert!((mean(&film) / expected - 1.0).abs() < 0.2, "{questions}: {} for {expected}", mean(&film));
         // The last questions only improve records that are there.
         assert!(misses > 0 || tenths == 8, "{questions}: nothing was missing");
-
-        // A file remembers that records are still to be estimated anew.
-        let mut loaded = decode(&encode(&caches, 7), settled(), 7).unwrap();
-        assert_eq!(loaded.settled, [0; 5]);
-        let again = fill_in(&mut loaded, &fog(), &Control::default());
-        let outcome = fill_in(&mut caches, &fog(), &Control::default());
-        assert!(!outcome.cancelled);
-        assert_eq!((again.computed, picture(&loaded, 2)), (outcome.computed, picture(&caches, 2)));
-        let (film, _, misses) = picture(&caches, 2);
+        let (again, _) = fill_in(loaded, &fog());
+        let (film, _, misses) = picture(&again, 2);
         let ratio = mean(&film) / expected;
-        assert!((ratio - 1.0).abs() < 0.05 && misses == 0, "{questions}: {ratio}, {misses} misses");
+        assert!((ratio - 1.0).abs() < 0.05 && misses == 0 && !again.is_open(), "{questions}: {ratio}, {misses} misses");
+
+        // The fill itself goes on where it was.
+        let (fog, room, lights) = (fog(), room(), [lamp()]);
+        let world = World { medium: &fog, scene: &room, lights: &lights };
+        finish(&mut filling, &world, &mut Output::default());
+        assert!(stored(&filling.finish()) == stored(&whole), "{questions}");
     }
 }
 
 #[test]
 fn nothing_asked_for_is_nothing_filled() {
     let none = Settings { single: None, surface: None, multiple: None, irradiance: None, ..settings() };
-    let (caches, outcome) = filled(none);
-    assert_eq!((outcome.computed, caches.counts()), ([0; 4], [(0, 0); 4]));
+    let (caches, computed) = fill_in(RadianceCaches::new(none), &fog());
+    assert_eq!((computed, counts(&caches), Kind::ALL.map(|kind| caches.bytes(kind))), ([0; 6], [0; 4], [0; 6]));
     assert_eq!(picture(&caches, 2).2, 0);
-    let (caches, outcome) = filled(Settings { rays: 0, ..settings() });
-    assert_eq!((outcome.computed, caches.counts().map(|(records, _)| records)), ([0; 4], [0; 4]));
+    let (caches, computed) = fill_in(RadianceCaches::new(Settings { rays: 0, ..settings() }), &fog());
+    assert_eq!((computed, counts(&caches)), ([0; 6], [0; 4]));
 }
 
 #[test]
@@ -307,10 +383,12 @@ fn an_estimate_of_nothing_fills_no_radius() {
     // In the dark every sum is zero: records are there, as far as they may reach.
     assert_eq!(fogbow::cache::valid_radius(&Sums::default(), 1.0), None);
     let (room, medium) = (room(), fog());
-    let mut caches = RadianceCaches::new(settings());
-    fill(&mut caches, &estimator(&medium, &room, &[]), &EYE, PIXEL, &Control::default(), eye_ray).unwrap();
-    for cache in [&caches.single, &caches.surface, &caches.multiple] {
-        let records = cache.as_ref().unwrap().records();
+    let world = World { medium: &medium, scene: &room, lights: &[] };
+    let mut filling = RadianceCaches::new(settings()).fill(VIEW);
+    finish(&mut filling, &world, &mut Output::default());
+    let caches = filling.finish();
+    for kind in [Kind::Single, Kind::Surface, Kind::Multiple] {
+        let records = caches.records(kind);
         assert!(!records.is_empty() && records.iter().all(|r| r.value.is_black() && r.radius == 0.8), "{records:?}");
     }
 }

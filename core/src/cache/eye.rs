@@ -39,6 +39,14 @@ pub struct EyeSettings {
     pub indirect: bool,
 }
 
+impl Default for EyeSettings {
+    /// Eight points where fog is opaque, four connections to near lights, all light. More of both: less noise in each sample, for
+    /// more time; fewer, and samples are spent on rays that bring little.
+    fn default() -> Self {
+        Self { density: 8.0, connections: 4, lights_visible: true, indirect: true }
+    }
+}
+
 /// What a cache is for, and how it is read.
 #[derive(Debug)]
 pub struct Reader<'a, C> {
@@ -181,7 +189,7 @@ fn look<M: Medium + ?Sized, S: Scene + ?Sized>(
 }
 
 /// A place where an eye ray asks a cache.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Place {
     /// Where (m).
     pub point: Vec3,
@@ -202,6 +210,21 @@ pub fn places<M: Medium + ?Sized, S: Scene + ?Sized>(
 ) {
     let mut wanted = Wanted { world, rng: Generator::child(rng), visit };
     look(ray, world, settings, rng, &mut wanted);
+}
+
+/// As [`places`], for one point of the medium, lit from `direction` among others.
+pub(super) fn places_around<M: Medium + ?Sized, S: Scene + ?Sized>(
+    point: Vec3,
+    direction: Vec3,
+    world: &World<'_, M, S>,
+    mut visit: impl FnMut(Place),
+) {
+    if world.medium.properties(point).scattering.is_black() {
+        return;
+    }
+    visit(Place { point, normal: None, is_seen: true });
+    // One direction is given: no random numbers are drawn.
+    Wanted { world, rng: Generator::new(0), visit }.beyond(&Ray::new(point, direction));
 }
 
 struct Wanted<'a, M: ?Sized, S: ?Sized, F> {

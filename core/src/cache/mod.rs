@@ -31,23 +31,34 @@
 
 mod aim;
 pub mod bytes;
+mod caches;
 mod estimate;
 mod evidence;
 mod extrapolate;
 mod eye;
+mod fill;
 mod guide;
 mod index;
+mod kind;
 mod lookup;
 mod radius;
 mod record;
+mod set_bytes;
+mod settings;
+mod slot;
 mod store;
 
+pub use caches::RadianceCaches;
 pub use estimate::Estimator;
 pub use extrapolate::{Blend, Extrapolation, exponent_limit, weight};
 pub use eye::{Caches, EyeSettings, Place, Reader, Seen, places, radiance, radiance_beyond};
+pub use fill::{Asked, Estimate, Filling, Memory, Output, Wanted};
 pub use guide::{Guide, Guided, Looks};
 pub use index::{Block, Index, Node};
+pub use kind::Kind;
 pub use lookup::{Basis, Reading, TURNING_DEGREE, TurningBasis};
 pub use radius::{Limits, clamp_gradient, clearance, log_gradient_radius, neighbour_clamped, valid_radius};
 pub use record::{Facing, Record};
+pub use set_bytes::CachesError;
+pub use settings::{Effort, Settings};
 pub use store::{Cache, SurfaceCache, VolumeCache};

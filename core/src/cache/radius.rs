@@ -19,7 +19,7 @@ use crate::spectrum::{Gradient, Spectrum};
 /// let limits = Limits { min: 0.01, max: 2.0 }.on_screen(1.0, 100.0, 0.001, 50.0);
 /// assert_eq!((limits.min, limits.max), (0.05, 2.0));
 /// ```
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Limits {
     /// Least radius: smaller, and borders of shadows swallow all records.
     pub min: f32,

@@ -68,7 +68,7 @@ impl Record {
 }
 
 /// What a record on a surface has besides: 12 floats, 48 bytes.
-#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Pod, Zeroable)]
 #[repr(C)]
 pub struct Facing {
     /// The surface's normal (unit).

@@ -4,7 +4,9 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use fogbow::bytes::Crc;
-use fogbow::cache::{Estimator, Extrapolation, EyeSettings, Limits, Seen, radiance, radiance_beyond};
+use fogbow::cache::{
+    self, Asked, CachesError, Effort, Extrapolation, EyeSettings, Limits, RadianceCaches, Seen,
+};
 use fogbow::host::Medium;
 use fogbow::light::Light;
 use fogbow::math::{Ray, Vec2};
@@ -16,8 +18,9 @@ use fogbow::transmittance::thickness::Steps;
 use fogbow_std::film::Film;
 use fogbow_std::image_sampling::Plan;
 use fogbow_std::progress::Control;
-use fogbow_std::radiance_cache::{self as cache, Effort, Problem, RadianceCaches};
+use fogbow_std::radiance_cache::{self as files, Problem};
 use fogbow_std::stats::{CountingMedium, CountingScene, Seconds, Stopwatch};
+use fogbow_std::threads::{self, Threads};
 use fogbow_std::tiles::{self, Outcome};
 
 use super::image_sampling::is_computed;
@@ -85,10 +88,10 @@ impl CacheArguments {
         Ok(crc.value())
     }
 
-    fn load(&self, settings: cache::Settings, tag: u64) -> Result<RadianceCaches, String> {
+    fn load(&self, settings: cache::Settings, tag: u64) -> Result<RadianceCaches<'static>, String> {
         let Some(file) = &self.cache_in else { return Ok(RadianceCaches::new(settings)) };
-        cache::load(file, settings, tag).map_err(|error| match error.problem {
-            Problem::Tag { .. } => {
+        files::load(file, settings, tag).map_err(|error| match error.problem {
+            Problem::Content(CachesError::Tag { .. }) => {
                 format!("{}: was made for another scene, or with another --max-depth", file.display())
             }
             _ => error.to_string(),
@@ -194,15 +197,18 @@ pub(super) struct CacheJob<'a> {
 /// What caching did besides the picture.
 #[derive(Debug)]
 pub(super) struct Cached {
-    pub(super) caches: RadianceCaches,
-    pub(super) filled: cache::Outcome,
+    pub(super) caches: RadianceCaches<'static>,
+    /// Time of filling by stage.
+    pub(super) filled: Vec<(&'static str, Seconds)>,
+    /// Records that were computed.
+    pub(super) computed: u64,
     /// Time to read and write them.
     pub(super) files: [Seconds; 2],
     pub(super) render: Outcome,
 }
 
 impl CacheJob<'_> {
-    fn efforts(&self, phase: &Phase) -> cache::Settings {
+    fn settings(&self, phase: &Phase, resolution: f32) -> cache::Settings {
         let size = self.world.bounds().size().max_element();
         let arguments = self.arguments;
         let scale = f64::from(arguments.paths.unwrap_or(PATHS)) / 1024.0;
@@ -239,11 +245,21 @@ impl CacheJob<'_> {
             // Small things are seen in large pictures; places take memory.
             rays: (self.film.width() * self.film.height() / 4).clamp(16384, 131_072),
             extrapolation: arguments.extrapolation.map_or_else(Extrapolation::default, Into::into),
-            margin: 0.15,
-            pixels: (1.5, 64.0),
-            round: 64,
-            threads: self.settings.threads,
+            eye: EyeSettings {
+                lights_visible: self.paths.lights_visible,
+                indirect: self.paths.max_scatterings > 1,
+                ..EyeSettings::default()
+            },
+            walk: multiple_scatter::Settings {
+                one_light: self.lights.len() > 1,
+                lengths: Lengths::Marched,
+                ..multiple_scatter::Settings::new(Steps::Length(3.0 * resolution))
+            },
+            paths: self.paths,
+            light_samples: (LIGHT_SAMPLES / self.lights.len().max(1) as u32).clamp(1, 16),
+            finest: FINEST * size,
             seed: self.settings.seed,
+            ..cache::Settings::default()
         }
     }
 }
@@ -275,65 +291,40 @@ impl WithMedium for CacheJob<'_> {
             let mean = |p: &Phase| p.moment(1).max_element().abs();
             mean(a).total_cmp(&mean(b))
         });
-        let settings = self.efforts(&sharpest.unwrap_or(Phase::ISOTROPIC));
-        let eye = EyeSettings {
-            density: 8.0,
-            connections: 4,
-            lights_visible: self.paths.lights_visible,
-            indirect: self.paths.max_scatterings > 1,
-        };
-        let steps = Steps::Length(3.0 * medium.resolution());
-        let estimator = Estimator {
-            world: PathWorld { medium, scene: self.world, lights: self.lights },
-            surfaces: None,
-            scattered: None,
-            walk: multiple_scatter::Settings {
-                one_light: self.lights.len() > 1,
-                lengths: Lengths::Marched,
-                ..multiple_scatter::Settings::new(steps)
-            },
-            paths: self.paths,
-            light_samples: (LIGHT_SAMPLES / self.lights.len().max(1) as u32).clamp(1, 16),
-            finest: FINEST * self.world.bounds().size().max_element(),
-        };
+        let settings = self.settings(&sharpest.unwrap_or(Phase::ISOTROPIC), medium.resolution());
         let (width, height) = (self.film.width() as f32, self.film.height() as f32);
         let ray = |at: [f32; 2]| -> Ray { self.camera.ray(Vec2::from(at)) };
         let apart = ray([0.5, 0.5]).direction.angle_between(ray([0.5 + 1.0 / width, 0.5]).direction);
         let clock = Stopwatch::start();
-        let mut caches = self.arguments.load(settings, self.tag)?;
+        let caches = self.arguments.load(settings, self.tag)?;
         let loaded = clock.elapsed();
-        let filled = cache::fill(&mut caches, &estimator, &eye, apart, self.control, ray)?;
+        let world = PathWorld { medium, scene: self.world, lights: self.lights };
+        let mut filling = caches.fill(Asked::View { ray, pixel: apart });
+        let pool = Threads::new(self.settings.threads)?;
+        let filled = threads::run(&mut filling, &world, &pool, self.control, None, |_| {}).stages;
+        let computed = cache::Kind::ALL.into_iter().map(|kind| filling.computed(kind)).sum();
+        let caches = filling.finish();
         let clock = Stopwatch::start();
         if let Some(file) = &self.arguments.cache_out {
-            cache::save(file, &caches, self.tag)?;
+            files::save(file, &caches, self.tag)?;
         }
         let files = [loaded, clock.elapsed()];
         let has_layers = self.film.layers().len() > 1;
-        let reader = caches.reader();
         let render = tiles::render(self.film, self.settings, self.control, |sample, rng, layers| {
             let world = PathWorld {
                 medium: &CountingMedium { medium, tally: sample.tally },
                 scene: &CountingScene { scene: self.world, tally: sample.tally },
                 lights: self.lights,
             };
-            let estimator = Estimator {
-                world,
-                surfaces: reader.irradiance.map(|r| (r.cache, r.reading)),
-                scattered: None,
-                walk: estimator.walk,
-                paths: estimator.paths,
-                light_samples: 1,
-                finest: estimator.finest,
-            };
             let jitter = uniform2(rng);
             let film = Vec2::new((sample.x as f32 + jitter.x) / width, (sample.y as f32 + jitter.y) / height);
             let ray = self.camera.ray(film);
             let seen = if self.paths.max_scatterings == 0 {
-                Seen { emitted: path::radiance(&ray, &estimator.world, &self.paths, rng).emitted, ..Seen::default() }
+                Seen { emitted: path::radiance(&ray, &world, &self.paths, rng).emitted, ..Seen::default() }
             } else if is_computed(self.plan, sample, width as u32) {
-                radiance(&ray, &estimator, &reader, &eye, rng)
+                caches.radiance(&ray, &world, rng)
             } else {
-                radiance_beyond(&ray, &estimator, &reader, &eye, rng)
+                caches.radiance_beyond(&ray, &world, rng)
             };
             sample.tally.look_up(seen.lookups, seen.misses);
             if has_layers {
@@ -351,6 +342,6 @@ impl WithMedium for CacheJob<'_> {
                 *total = seen.total();
             }
         })?;
-        Ok(Cached { caches, filled, files, render })
+        Ok(Cached { caches, filled, computed, files, render })
     }
 }

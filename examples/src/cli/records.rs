@@ -3,14 +3,13 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use fogbow::cache::Record;
+use fogbow::cache::{self, RadianceCaches, Record};
 use fogbow::host::Scene;
 use fogbow::math::{Ray, Vec2, Vec3};
 use fogbow::spectrum::Spectrum;
 use fogbow_std::film::{Film, Image};
 use fogbow_std::image::{Layer, write};
 use fogbow_std::progress::{Control, Progress};
-use fogbow_std::radiance_cache::RadianceCaches;
 use fogbow_std::tiles;
 
 use super::radiance_cache::{CacheArguments, CacheJob, Kind};
@@ -145,14 +144,13 @@ struct Shown<'a> {
     records: &'a [Record],
 }
 
-fn records(caches: &RadianceCaches, kind: Kind) -> &[Record] {
-    let volume = match kind {
-        Kind::Irradiance => return caches.irradiance.as_ref().map_or(&[], |cache| cache.records()),
-        Kind::Single => &caches.single,
-        Kind::Surface => &caches.surface,
-        Kind::Multiple => &caches.multiple,
-    };
-    volume.as_ref().map_or(&[], |cache| cache.records())
+fn records<'a>(caches: &'a RadianceCaches<'_>, kind: Kind) -> &'a [Record] {
+    caches.records(match kind {
+        Kind::Single => cache::Kind::Single,
+        Kind::Surface => cache::Kind::Surface,
+        Kind::Multiple => cache::Kind::Multiple,
+        Kind::Irradiance => cache::Kind::Irradiance,
+    })
 }
 
 /// The picture, darkened, with a disc for every record that no surface hides.

@@ -5,6 +5,7 @@ use core::time::Duration;
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
+use fogbow::cache::{Kind, RadianceCaches};
 use fogbow::covariance::Grid;
 use fogbow::host::Medium;
 use fogbow::light::Light;
@@ -18,7 +19,6 @@ use fogbow_std::film::Film;
 use fogbow_std::image::write_film;
 use fogbow_std::image_sampling::Plan;
 use fogbow_std::progress::{Control, Progress};
-use fogbow_std::radiance_cache::{NAMES, RadianceCaches};
 use fogbow_std::seed::SampleRng;
 use fogbow_std::stats::{CountingMedium, CountingScene, Statistics};
 use fogbow_std::tiles::{self, Outcome, Reason, RenderError, Sample};
@@ -171,7 +171,7 @@ pub(crate) struct Rendered {
     pub(crate) statistics: Statistics,
     pub(crate) camera: Camera,
     /// Of radiance caching.
-    pub(crate) caches: Option<RadianceCaches>,
+    pub(crate) caches: Option<RadianceCaches<'static>>,
     /// Of virtual lights, where it was asked for.
     pub(crate) audit: Option<Audit>,
 }
@@ -323,22 +323,15 @@ pub(crate) fn render(arguments: &RenderArguments) -> Result<Rendered, Failure> {
         film = statistics.time("draw ellipsoids", || ellipsoids::drawn(&film, grid, &camera, &world))?;
     }
     if let Some(cached) = &cached {
-        for (i, name) in NAMES.iter().enumerate() {
-            statistics.add(&format!("fill {name}"), cached.filled.seconds[i]);
-            statistics.bytes.push((format!("cache {name}"), cached.caches.counts()[i].1 as u64));
-            statistics.records.push(((*name).to_owned(), cached.caches.counts()[i].0 as u64));
+        cached.filled.iter().for_each(|(stage, seconds)| statistics.add(stage, *seconds));
+        for (name, seconds) in ["read caches", "write caches"].into_iter().zip(cached.files) {
+            statistics.add(name, seconds);
         }
-        statistics.add("fill search", cached.filled.search);
-        for (i, name) in ["read caches", "write caches"].into_iter().enumerate() {
-            statistics.add(name, cached.files[i]);
+        for kind in Kind::ALL {
+            statistics.bytes.push((format!("cache {}", kind.name()), cached.caches.bytes(kind) as u64));
+            statistics.records.push((kind.name().to_owned(), cached.caches.records(kind).len() as u64));
         }
-        for (name, (records, bytes)) in
-            ["coarse multiple", "coarse irradiance"].iter().zip(cached.caches.coarse_counts())
-        {
-            statistics.bytes.push((format!("cache {name}"), bytes as u64));
-            statistics.records.push(((*name).to_owned(), records as u64));
-        }
-        statistics.records.push(("computed".to_owned(), cached.filled.computed.iter().sum()));
+        statistics.records.push(("computed".to_owned(), cached.computed));
     }
     statistics.add("render", outcome.seconds);
     statistics.counters = outcome.counters;

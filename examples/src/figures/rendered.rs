@@ -3,10 +3,10 @@
 use std::path::Path;
 
 use clap::Parser;
+use fogbow::cache::Kind;
 use fogbow::math::Vec3;
 use fogbow::spectrum::Spectrum;
 use fogbow_std::film::Image;
-use fogbow_std::radiance_cache::NAMES;
 use fogbow_std::tiles::Reason;
 
 use super::{Plan, montage, records};
@@ -139,7 +139,7 @@ fn with_insets(pair: &Pair, centre: [f32; 2]) -> Result<Image, Failure> {
 
 /// Times, records and errors as a row of a table.
 fn row(name: &str, pair: &Pair) -> String {
-    let records: Vec<String> = NAMES.iter().map(|name| pair.cached.records(name).to_string()).collect();
+    let records: Vec<String> = Kind::FINAL.iter().map(|kind| pair.cached.records(kind.name()).to_string()).collect();
     format!(
         "| {name} | {:.1} s | {} | {:.2} % | {:.1} s, {} spp | {:.2} % |\n",
         pair.cached.cpu,
@@ -192,14 +192,11 @@ pub(super) fn boxes(plan: &Plan) -> Result<String, Failure> {
 fn dots(plan: &Plan, cached: &Shot) -> Result<String, Failure> {
     let size = [cached.image.width, cached.image.height];
     let Some(caches) = &cached.rendered.caches else { return Ok(String::new()) };
-    let volumes = [("surface", &caches.surface), ("multiple", &caches.multiple)];
     let mut images = Vec::new();
-    for (_, cache) in volumes {
-        let points: Vec<Vec3> = cache.iter().flat_map(|c| c.records()).map(|r| r.position).collect();
+    for kind in [Kind::Surface, Kind::Multiple, Kind::Irradiance] {
+        let points: Vec<Vec3> = caches.records(kind).iter().map(|r| r.position).collect();
         images.push(records::seen(&points, &cached.rendered.camera, size)?);
     }
-    let points: Vec<Vec3> = caches.irradiance.iter().flat_map(|c| c.records()).map(|r| r.position).collect();
-    images.push(records::seen(&points, &cached.rendered.camera, size)?);
     montage::save(&plan.output.join("fig-07-records.png"), &montage::beside(&images)?, 0.0)?;
     Ok(format!(
         "## Fig. 7: records\n\n![records](fig-07-records.png)\n\nThe records of the first box as the camera sees them, a \
@@ -219,8 +216,8 @@ pub(super) fn atrium(plan: &Plan) -> Result<String, Failure> {
     let pair = pair(plan, &scene_of(plan, "atrium"), size, &[])?;
     montage::save(&plan.output.join("fig-08-atrium.png"), &with_insets(&pair, [0.45, 0.55])?, 0.0)?;
     let caches = pair.cached.rendered.caches.as_ref();
-    let surface = caches.and_then(|caches| caches.surface.as_ref());
-    let points: Vec<Vec3> = surface.iter().flat_map(|cache| cache.records()).map(|r| r.position).collect();
+    let surface = caches.iter().flat_map(|caches| caches.records(Kind::Surface));
+    let points: Vec<Vec3> = surface.map(|r| r.position).collect();
     let (low, high) = (Vec3::new(-13.2, 0.0, -6.2), Vec3::new(13.2, 0.0, 6.2));
     let section = records::section(&points, [0.0, 2.0], low, high, 640)?;
     montage::save(&plan.output.join("fig-08-section.png"), &section, 0.0)?;

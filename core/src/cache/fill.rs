@@ -1,0 +1,753 @@
+//! Filling caches, as work in rounds.
+//!
+//! Eye rays (or points of a box) say where light is asked for. Where no record reaches, one is computed against the
+//! frozen caches, many in a round; then they are inserted in order, and those left out that an earlier one of the same round
+//! covers. The order of kinds is that of [`STEPS`].
+//!
+//! Of each record places and radii come from some samples, values for the most part from as many others, so that
+//! noise in one does not steer the other.
+
+use core::ops::Range;
+
+use super::caches::RadianceCaches;
+use super::eye::{Place, places, places_around};
+use super::guide::{Guide, Guided, Looks};
+use super::kind::{Kind, Pass, Places, STEPS, Step};
+use super::lookup::Reading;
+use super::radius::{Limits, clearance};
+use super::settings::{Effort, Settings};
+use super::slot::{Attached, ByKind, Inserted, learnt_near};
+use super::{Estimator, Facing, Record};
+use crate::bytes::Crc;
+use crate::host::{Medium, Scene};
+use crate::math::{Bounds, Ray, Vec3};
+use crate::path::World;
+use crate::sampling::uniform::mix;
+use crate::sampling::{Generator, uniform2, warp};
+use crate::sh::Coefficient;
+use crate::single_scatter::Sums;
+use crate::storage::List;
+use crate::work::Rounds;
+
+/// Eye rays of the first batch; each next one has twice as many, up to [`LAST_BATCH`]: what first rays ask for lies far apart,
+/// and what later ones find are the gaps.
+const FIRST_BATCH: u32 = 64;
+
+/// See [`FIRST_BATCH`].
+const LAST_BATCH: u32 = 4096;
+
+/// Eye rays of one job. More: jobs take longer than some milliseconds in dense worlds.
+const RAYS_PER_JOB: u32 = 16;
+
+/// Places that one job looks up.
+const PLACES_PER_JOB: u32 = 1024;
+
+/// The first records of kinds on which all others stand get so many times the samples: what they have wrong nothing
+/// averages out.
+const FIRST: (u64, u32) = (100, 8);
+
+/// Most samples of an estimate whose samples vary more than usual, as a multiple.
+const MOST_SAMPLES: f32 = 4.0;
+
+/// Eye rays from whose points others are followed to what lights them. More find small things that are seen; light is
+/// sums over all that is met, small things included.
+const LIGHTING: u32 = 16384;
+
+/// Records of which nothing usual can be said.
+const FEW: usize = 64;
+
+/// Samples of any estimate at least.
+const LEAST_SAMPLES: u32 = 16;
+
+/// Records that reach less far than usual take a share of the samples down to this.
+const LEAST_SHARE: f32 = 0.25;
+
+/// Where light is asked for.
+#[derive(Debug, Clone, Copy)]
+pub enum Asked<F = fn([f32; 2]) -> Ray> {
+    /// Along the eye rays of a picture.
+    View {
+        /// The eye ray of a point of the film, both coordinates in [0, 1].
+        ray: F,
+        /// Angular width of a pixel (rad): bounds radii.
+        pixel: f32,
+    },
+    /// Anywhere in a box of the medium, for probes: points spread evenly over it, and the surfaces that light them.
+    Box(Bounds),
+}
+
+/// A place where light is asked for, and from where.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Wanted {
+    place: Place,
+    /// How far the eye is (m); infinite if there is none.
+    distance: f32,
+    /// The number of the ray that asks.
+    ray: u32,
+}
+
+/// An estimate for one record.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Estimate {
+    place: Place,
+    sums: Sums,
+    facing: Facing,
+    limits: Limits,
+    learnt: Guide,
+    /// How many times the samples of a usual one it took.
+    effort: f32,
+}
+
+/// What a job of a [`Filling`] leaves.
+#[derive(Debug)]
+#[cfg_attr(feature = "alloc", derive(Default))]
+pub struct Output<'o> {
+    wanted: List<'o, Wanted>,
+    open: List<'o, u32>,
+    estimate: Option<Estimate>,
+    higher: List<'o, Coefficient>,
+    is_cut: bool,
+}
+
+/// What a fill remembers between its rounds, besides the caches.
+#[derive(Debug)]
+#[cfg_attr(feature = "alloc", derive(Default))]
+pub struct Memory<'s> {
+    wanted: List<'s, Wanted>,
+    /// Numbers of the places of a batch without a record; those that still have none after the round's look.
+    open: List<'s, u32>,
+    still_open: List<'s, u32>,
+    /// The places of a round, with how far apart they must be.
+    chosen: List<'s, (u32, f32)>,
+    estimates: List<'s, Estimate>,
+    higher: List<'s, Coefficient>,
+    /// What the records of this fill have learnt, kind by kind.
+    guides: ByKind<List<'s, Guide>>,
+}
+
+impl Memory<'_> {
+    fn clear(&mut self) {
+        self.wanted.clear();
+        self.open.clear();
+        self.still_open.clear();
+        self.chosen.clear();
+        self.estimates.clear();
+        self.higher.clear();
+        self.guides.0.iter_mut().for_each(List::clear);
+    }
+}
+
+/// What the jobs of a round do.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Round {
+    /// Follow eye rays.
+    Search,
+    /// Look which places of a batch have no record.
+    Look,
+    /// Estimates for new records.
+    Make,
+    /// Estimates anew for records from a number on.
+    Again { from: u32 },
+    Done,
+}
+
+/// A fill of [`RadianceCaches`], as [`Rounds`] of jobs in a [`World`]. It owns the caches until
+/// [`Filling::finish`] gives them back, filled so far.
+#[derive(Debug)]
+pub struct Filling<'s, F> {
+    caches: RadianceCaches<'s>,
+    asked: Asked<F>,
+    view: u64,
+    memory: Memory<'s>,
+    round: Round,
+    jobs: u32,
+    taken: u32,
+    /// Which of [`STEPS`].
+    step: usize,
+    /// The rays whose places are being covered.
+    batch: [u32; 2],
+    /// Records computed in this step, and the number of its first.
+    computed: u64,
+    first: u64,
+    /// The radius from which on a record gets all samples (m).
+    usual: f32,
+    /// From these records on nothing is final.
+    before: ByKind<usize>,
+    /// All records computed, by kind.
+    all_computed: ByKind<u64>,
+    is_cut: bool,
+}
+
+impl<'s> RadianceCaches<'s> {
+    /// Work that adds records until every place that is asked for has one.
+    ///
+    /// If the caches were filled for the same view before, there is nothing to do.
+    #[cfg(feature = "alloc")]
+    #[must_use]
+    pub fn fill<F: Fn([f32; 2]) -> Ray>(self, asked: Asked<F>) -> Filling<'s, F> {
+        self.fill_in(Memory::default(), asked)
+    }
+
+    /// As [`RadianceCaches::fill`], in lent memory. Where that is too small, the rest is left out:
+    /// [`Filling::is_cut`].
+    #[must_use]
+    pub fn fill_in<F: Fn([f32; 2]) -> Ray>(self, mut memory: Memory<'s>, asked: Asked<F>) -> Filling<'s, F> {
+        memory.clear();
+        let view = asked.mark(&self.settings);
+        let (before, rays) = (self.settled, self.settings.rays);
+        let is_known = self.views.as_slice().contains(&view);
+        let mut is_cut = false;
+        for kind in Kind::ALL {
+            // What a fill that was left has made is estimated again, too.
+            for _ in before[kind]..self.slots[kind].len() {
+                is_cut |= memory.guides[kind].push(Guide::default()).is_err();
+            }
+        }
+        Filling {
+            caches: self,
+            asked,
+            view,
+            memory,
+            round: if is_known { Round::Done } else { Round::Search },
+            jobs: if is_known { 0 } else { rays.div_ceil(RAYS_PER_JOB) },
+            taken: 0,
+            step: 0,
+            batch: [0, 0],
+            computed: 0,
+            first: 0,
+            usual: 0.0,
+            before,
+            all_computed: ByKind([0; Kind::COUNT]),
+            is_cut,
+        }
+    }
+}
+
+impl<F: Fn([f32; 2]) -> Ray> Asked<F> {
+    /// A mark of where eye rays go and how densely places are asked for.
+    fn mark(&self, settings: &Settings) -> u64 {
+        let Settings { rays, margin, pixels, round, seed, ref eye, .. } = *settings;
+        let pixel = if let Self::View { pixel, .. } = self { *pixel } else { 0.0 };
+        let mut crc = Crc::new();
+        let mut add = |numbers: &[f32]| numbers.iter().for_each(|n| crc.add(&n.to_bits().to_le_bytes()));
+        add(&[margin, pixels[0], pixels[1], pixel, eye.density, f32::from(eye.lights_visible), f32::from(eye.indirect)]);
+        match self {
+            Self::View { ray, .. } => {
+                for at in [[0.5, 0.5], [0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.3, 0.6]] {
+                    let ray = ray(at);
+                    add(&ray.origin.to_array());
+                    add(&ray.direction.to_array());
+                }
+            }
+            Self::Box(bounds) => {
+                add(&bounds.min.to_array());
+                add(&bounds.max.to_array());
+            }
+        }
+        for number in [u64::from(rays), u64::from(round), seed] {
+            crc.add(&number.to_le_bytes());
+        }
+        crc.value()
+    }
+
+    /// Calls `visit(place, distance of the eye)` for the places that ray number `number` asks for.
+    fn visit<M: Medium + ?Sized, S: Scene + ?Sized>(
+        &self,
+        number: u32,
+        world: &World<'_, M, S>,
+        settings: &Settings,
+        mut visit: impl FnMut(Place, f32),
+    ) {
+        // The plane filled evenly by multiples of the plastic number, space by those of its sister (Roberts 2018).
+        let turn = |step: f64| {
+            let x = 0.5 + step * f64::from(number + 1);
+            (x - libm::floor(x)) as f32
+        };
+        let mut rng = Generator::new(mix(settings.seed ^ 0x70_1a_ce) ^ u64::from(number));
+        match self {
+            Self::View { ray, .. } => {
+                let ray = ray([turn(0.754_877_666_246_692_8), turn(0.569_840_290_998_053_3)]);
+                places(&ray, world, &settings.eye, &mut rng, |place| visit(place, place.point.distance(ray.origin)));
+            }
+            Self::Box(bounds) => {
+                let at = [0.819_172_513_396_164_4, 0.671_043_606_703_789_2, 0.549_700_477_901_985_2].map(turn);
+                let point = bounds.min + bounds.size() * Vec3::from(at);
+                let direction = warp::uniform_sphere(uniform2(&mut rng));
+                places_around(point, direction, world, |place| visit(place, f32::INFINITY));
+            }
+        }
+    }
+}
+
+/// The lowest radius of a line that records around a point of it reach, in the mean: `Σ R²/Σ R` (m); none of few.
+fn usual_radius(records: &[Record]) -> f32 {
+    if records.len() < FEW {
+        return 0.0;
+    }
+    let sums = |(sum, squares): (f32, f32), record: &Record| (sum + record.radius, squares + record.radius * record.radius);
+    let (sum, squares) = records.iter().fold((0.0, 0.0), sums);
+    squares / sum
+}
+
+/// Samples for a record that reaches `radius` (m): what reaches less far than `usual` lights fewer pixels. If one sample is
+/// as noisy everywhere, the noise of a picture whose records light areas `R²` is least, for a given sum of samples, where
+/// these go as `R`. No fewer than a quarter, because dark corners are where that is not so.
+fn samples(effort: &Effort, radius: f32, usual: f32) -> u32 {
+    let share = if radius < usual { (radius / usual).max(LEAST_SHARE) } else { 1.0 };
+    ((effort.samples as f32 * share) as u32).max(LEAST_SAMPLES)
+}
+
+impl<'s, F> Filling<'s, F> {
+    /// The caches as they are.
+    #[must_use]
+    pub fn caches(&self) -> &RadianceCaches<'s> {
+        &self.caches
+    }
+
+    /// The caches, filled so far, to be read. What was made counts, and a later fill estimates it anew.
+    #[must_use]
+    pub fn finish(mut self) -> RadianceCaches<'s> {
+        self.caches.finish();
+        self.caches
+    }
+
+    /// Whether lent memory was too small for something: some places then have no record.
+    #[must_use]
+    pub fn is_cut(&self) -> bool {
+        self.is_cut
+    }
+
+    /// How many records of a kind were computed: those left out because another of their round covered them, and those
+    /// estimated anew, included.
+    #[must_use]
+    pub fn computed(&self, kind: Kind) -> u64 {
+        self.all_computed[kind]
+    }
+
+    fn settings(&self) -> &Settings {
+        &self.caches.settings
+    }
+
+    /// The step at hand and its effort.
+    fn at_hand(&self) -> Option<(Step, Effort)> {
+        let step = *STEPS.get(self.step)?;
+        Some((step, self.settings().effort(step.kind)?))
+    }
+
+    /// Whether the final caches have all that is asked for at a place.
+    fn is_known(&self, place: &Place) -> bool {
+        Kind::FINAL.into_iter().all(|kind| {
+            let Some(effort) = self.settings().effort(kind) else { return true };
+            let reading = Reading { margin: self.settings().margin, ..Reading::new(effort.tolerance) };
+            self.caches.slots[kind].covers(place, &reading)
+        })
+    }
+
+    /// How a cache is read to see where records are missing.
+    fn strict(&self, kind: Kind) -> Option<Reading> {
+        Some(Reading { margin: self.settings().margin, ..self.settings().reading(kind)? })
+    }
+
+    /// The world lit by what a step is lit by.
+    fn estimator<'a, M: ?Sized, S: ?Sized>(&'a self, world: &World<'a, M, S>, step: Step) -> Estimator<'a, M, S> {
+        let scattered = step.ends_at.and_then(|multiple| {
+            let (surface, multiple) = (self.caches.volume(Kind::Surface)?, self.caches.volume(multiple)?);
+            Some([(surface.cache, surface.reading), (multiple.cache, multiple.reading)])
+        });
+        let settings = self.settings();
+        Estimator {
+            world: *world,
+            surfaces: self.caches.surface(Kind::CoarseIrradiance).map(|reader| (reader.cache, reader.reading)),
+            scattered,
+            walk: settings.walk,
+            paths: settings.paths,
+            light_samples: settings.light_samples,
+            finest: settings.finest,
+        }
+    }
+
+    fn search<M: Medium + ?Sized, S: Scene + ?Sized>(&self, job: u32, world: &World<'_, M, S>, output: &mut Output<'_>)
+    where
+        F: Fn([f32; 2]) -> Ray,
+    {
+        let from = job * RAYS_PER_JOB;
+        for ray in from..(from + RAYS_PER_JOB).min(self.settings().rays) {
+            // Surfaces that light a place come right after it, and are of no use if nothing is made there.
+            let mut is_open = false;
+            self.asked.visit(ray, world, self.settings(), |place, distance| {
+                if place.is_seen {
+                    is_open = !self.is_known(&place);
+                }
+                if is_open && (place.is_seen || ray < LIGHTING) {
+                    output.is_cut |= output.wanted.push(Wanted { place, distance, ray }).is_err();
+                }
+            });
+        }
+    }
+
+    fn look(&self, job: u32, output: &mut Output<'_>) {
+        let Some(((step, _), open)) = self.at_hand().zip(self.memory.open.as_slice().chunks(PLACES_PER_JOB as usize).nth(job as usize))
+        else {
+            return;
+        };
+        let Some(reading) = self.strict(step.kind) else { return };
+        let slot = &self.caches.slots[step.kind];
+        let wanted = self.memory.wanted.as_slice();
+        for &number in open {
+            if !slot.covers(&wanted[number as usize].place, &reading) {
+                output.is_cut |= output.open.push(number).is_err();
+            }
+        }
+    }
+
+    fn make<M: Medium + ?Sized, S: Scene + ?Sized>(&self, job: u32, world: &World<'_, M, S>, output: &mut Output<'_>) {
+        let (Some((step, effort)), Some(&(wanted, _))) =
+            (self.at_hand(), self.memory.chosen.as_slice().get(job as usize))
+        else {
+            return;
+        };
+        let Wanted { place, distance, .. } = self.memory.wanted.as_slice()[wanted as usize];
+        let settings = self.settings();
+        let limits = match &self.asked {
+            Asked::View { pixel, .. } => effort.limits.on_screen(settings.pixels[0], settings.pixels[1], *pixel, distance),
+            Asked::Box(_) => effort.limits,
+        };
+        let limits = limits.within(self.reach(&effort, &place, world.scene));
+        let number = self.first.wrapping_add(self.computed + u64::from(job));
+        let row = step.kind.row();
+        let is_first = row.is_ground && self.first == 0 && number < FIRST.0;
+        let count = samples(&effort, limits.max, self.usual) * if is_first { FIRST.1 } else { 1 };
+        let mut rng = Generator::new(mix(settings.seed ^ mix(row.stream + 1)) ^ number);
+        let mut estimate = Estimate { place, limits, effort: 1.0, ..Estimate::default() };
+        self.estimate(step, world, Looks { count, guide: None, learnt: None }, &mut estimate, &mut rng, output);
+        output.estimate = Some(estimate);
+    }
+
+    fn again<M: Medium + ?Sized, S: Scene + ?Sized>(&self, number: usize, world: &World<'_, M, S>, output: &mut Output<'_>) {
+        let Some((step, effort)) = self.at_hand() else { return };
+        let Pass::Again { stream, .. } = step.pass else { return };
+        let (slot, row) = (&self.caches.slots[step.kind], step.kind.row());
+        let (Some(place), radius) = (slot.place(number), slot.records()[number].radius) else { return };
+        let around = learnt_near(slot, self.memory.guides[step.kind].as_slice(), self.before[step.kind], place.point);
+        let guide = Guided::new(&around);
+        let more = (around.relative_variance() / row.spread).clamp(1.0, MOST_SAMPLES);
+        let count = (samples(&effort, radius, self.usual) as f32 * more) as u32;
+        let mut rng = Generator::new(mix(self.settings().seed ^ mix(stream + 16)) ^ number as u64);
+        let mut estimate = Estimate { place, effort: more, ..Estimate::default() };
+        self.estimate(step, world, Looks { count, guide: guide.as_ref(), learnt: None }, &mut estimate, &mut rng, output);
+        output.estimate = Some(estimate);
+    }
+
+    /// The light that a step's kind holds, at one place.
+    fn estimate<M: Medium + ?Sized, S: Scene + ?Sized>(
+        &self,
+        step: Step,
+        world: &World<'_, M, S>,
+        looks: Looks<'_>,
+        estimate: &mut Estimate,
+        rng: &mut Generator,
+        output: &mut Output<'_>,
+    ) {
+        let estimator = self.estimator(world, step);
+        let looks = Looks { learnt: Some(&mut estimate.learnt), ..looks };
+        let point = estimate.place.point;
+        if step.kind.is_on_surfaces() {
+            let normal = estimate.place.normal.unwrap_or(Vec3::Z);
+            (estimate.sums, estimate.facing) = estimator.irradiance(point, normal, looks, rng);
+            return;
+        }
+        for _ in 0..self.caches.slots[step.kind].stride() {
+            output.is_cut |= output.higher.push(Coefficient::ZERO).is_err();
+        }
+        let (phase, higher) = (estimator.phase(point), output.higher.as_mut_slice());
+        estimate.sums = match step.kind {
+            Kind::Single => estimator.single(point, &phase, higher, rng),
+            Kind::Surface => estimator.surface(point, &phase, looks, higher, rng),
+            _ => estimator.multiple(point, &phase, looks, higher, rng),
+        };
+    }
+
+    /// How far a record may reach because of surfaces near it.
+    fn reach(&self, effort: &Effort, place: &Place, scene: &(impl Scene + ?Sized)) -> f32 {
+        if effort.clearance == f32::INFINITY {
+            return f32::INFINITY;
+        }
+        (effort.clearance * clearance(place.point, place.normal, scene)).max(self.settings().finest)
+    }
+
+    /// The round after one is complete.
+    fn advance(&mut self) {
+        match self.round {
+            Round::Search => {
+                let is_settled = !self.caches.is_open();
+                if self.memory.wanted.is_empty() && is_settled {
+                    self.complete();
+                } else {
+                    self.begin(0);
+                }
+            }
+            Round::Look => {
+                core::mem::swap(&mut self.memory.open, &mut self.memory.still_open);
+                if !self.choose() {
+                    self.next_batch();
+                }
+            }
+            Round::Make => {
+                // Places where nothing can be stored must not be asked for again and again.
+                match self.insert() {
+                    0 => self.next_batch(),
+                    _ => self.next_look(),
+                }
+            }
+            Round::Again { from } => {
+                self.blend(from as usize);
+                self.begin(self.step + 1);
+            }
+            Round::Done => {}
+        }
+    }
+
+    fn enter(&mut self, round: Round, jobs: u32) {
+        (self.round, self.jobs, self.taken) = (round, jobs, 0);
+    }
+
+    /// Everything was done.
+    fn complete(&mut self) {
+        self.is_cut |= self.caches.views.push(self.view).is_err();
+        for kind in Kind::ALL {
+            self.caches.settled[kind] = self.caches.slots[kind].len();
+        }
+        self.enter(Round::Done, 0);
+    }
+
+    /// The first step from number `from` on that has something to do.
+    fn begin(&mut self, from: usize) {
+        for number in from..STEPS.len() {
+            self.step = number;
+            let Some((step, _)) = self.at_hand() else { continue };
+            let slot = &self.caches.slots[step.kind];
+            if slot.is_off() {
+                continue;
+            }
+            match step.pass {
+                Pass::Make => {
+                    // Records added later must not share the random numbers of the first.
+                    (self.computed, self.first) = (0, if slot.len() == 0 { 0 } else { mix(slot.len() as u64) });
+                    self.batch = [0, 0];
+                    if self.open_batch() {
+                        return;
+                    }
+                }
+                Pass::Again { .. } => {
+                    let from = self.before[step.kind].min(slot.len());
+                    let count = slot.len() - from;
+                    if count > 0 {
+                        // Final records are fewer than those that are covered more than once.
+                        self.usual = 1.5 * usual_radius(slot.records());
+                        self.memory.estimates.clear();
+                        self.memory.higher.clear();
+                        self.enter(Round::Again { from: from as u32 }, count as u32);
+                        return;
+                    }
+                }
+            }
+        }
+        self.complete();
+    }
+
+    /// The next batch of places, or after the last of them the next step.
+    fn next_batch(&mut self) {
+        if !self.open_batch() {
+            self.begin(self.step + 1);
+        }
+    }
+
+    /// The next batch of the step at hand that has places; `false` after the last.
+    fn open_batch(&mut self) -> bool {
+        let Some((step, _)) = self.at_hand() else { return false };
+        let rays = self.settings().rays;
+        let wanted = self.memory.wanted.as_slice();
+        while self.batch[1] < rays {
+            let size = if self.batch[1] == 0 { FIRST_BATCH } else { LAST_BATCH.min(2 * (self.batch[1] - self.batch[0])) };
+            self.batch = [self.batch[1], rays.min(self.batch[1].saturating_add(size))];
+            let at = |ray: u32| wanted.partition_point(|wanted| wanted.ray < ray);
+            self.memory.open.clear();
+            for number in at(self.batch[0])..at(self.batch[1]) {
+                let place = &wanted[number].place;
+                let is_for = match step.kind.row().places {
+                    Places::InMedium => place.normal.is_none(),
+                    Places::OnSurfaces => place.normal.is_some(),
+                    Places::InSight => place.normal.is_some() && place.is_seen,
+                };
+                if is_for {
+                    self.is_cut |= self.memory.open.push(number as u32).is_err();
+                }
+            }
+            if !self.memory.open.is_empty() {
+                self.next_look();
+                return true;
+            }
+        }
+        self.is_cut |= !self.caches.slots[step.kind].finish();
+        false
+    }
+
+    fn next_look(&mut self) {
+        self.memory.still_open.clear();
+        self.enter(Round::Look, (self.memory.open.len() as u32).div_ceil(PLACES_PER_JOB));
+    }
+
+    /// The places of one round: the first open ones that are not too close to each other; `false` if none are open.
+    fn choose(&mut self) -> bool {
+        let Some((step, effort)) = self.at_hand() else { return false };
+        let Memory { wanted, open, chosen, estimates, higher, .. } = &mut self.memory;
+        let settings = &self.caches.settings;
+        let slot = &self.caches.slots[step.kind];
+        let wanted = wanted.as_slice();
+        chosen.clear();
+        for &number in open.as_slice() {
+            if chosen.len() >= settings.round as usize {
+                break;
+            }
+            let place = wanted[number as usize].place;
+            let near = |&(other, radius): &(u32, f32)| {
+                let other = wanted[other as usize].place;
+                let same_side = match (place.normal, other.normal) {
+                    // Records whose normals differ by more than this do not cover each other's places.
+                    (Some(a), Some(b)) => a.dot(b) > 0.7,
+                    _ => true,
+                };
+                same_side && other.point.distance_squared(place.point) < radius * radius
+            };
+            if chosen.as_slice().iter().any(near) {
+                continue;
+            }
+            let guess = slot.radius_near(place.point).unwrap_or(0.5 * effort.limits.max);
+            if chosen.push((number, guess * (1.0 - settings.margin))).is_err() {
+                break;
+            }
+        }
+        if chosen.is_empty() {
+            return false;
+        }
+        estimates.clear();
+        higher.clear();
+        // Of a new record only the bound of its radius is known: twice as strict with it as with radii.
+        self.usual = 3.0 * usual_radius(slot.records());
+        let jobs = chosen.len() as u32;
+        self.enter(Round::Make, jobs);
+        true
+    }
+
+    /// Stores the records of a round in order; how many.
+    fn insert(&mut self) -> u32 {
+        let Some((step, effort)) = self.at_hand() else { return 0 };
+        let Some(reading) = self.strict(step.kind) else { return 0 };
+        let slot = &mut self.caches.slots[step.kind];
+        let stride = slot.stride();
+        let mut added = 0;
+        for (i, estimate) in self.memory.estimates.as_slice().iter().enumerate() {
+            self.computed += 1;
+            self.all_computed[step.kind] += 1;
+            let Estimate { place, sums, limits, .. } = estimate;
+            let Some(record) = Record::new(place.point, sums, effort.tolerance, *limits) else { continue };
+            if slot.covers(place, &reading) {
+                continue;
+            }
+            let attached = attached(step.kind, estimate, self.memory.higher.as_slice(), i, stride);
+            match slot.insert(record, attached) {
+                Inserted::Added => {
+                    self.is_cut |= self.memory.guides[step.kind].push(estimate.learnt).is_err();
+                    added += 1;
+                }
+                Inserted::LeftOut => {}
+                Inserted::Full => self.is_cut = true,
+            }
+        }
+        added
+    }
+
+    /// Mixes the estimates of a round into the records from a number on, and adds to what was learnt.
+    fn blend(&mut self, from: usize) {
+        let Some((step, effort)) = self.at_hand() else { return };
+        let Pass::Again { share, .. } = step.pass else { return };
+        let slot = &mut self.caches.slots[step.kind];
+        let stride = slot.stride();
+        for (i, estimate) in self.memory.estimates.as_slice().iter().enumerate() {
+            self.all_computed[step.kind] += 1;
+            // More of an estimate that took more samples.
+            let share = 1.0 - (1.0 - share) / estimate.effort;
+            let attached = attached(step.kind, estimate, self.memory.higher.as_slice(), i, stride);
+            slot.blend(from + i, effort.tolerance, &estimate.sums, attached, share);
+            if let Some(guide) = self.memory.guides[step.kind].as_mut_slice().get_mut(i) {
+                guide.merge(&estimate.learnt, 1.0);
+            }
+        }
+    }
+}
+
+fn attached<'a>(kind: Kind, estimate: &Estimate, higher: &'a [Coefficient], i: usize, stride: usize) -> Attached<'a> {
+    if kind.is_on_surfaces() {
+        Attached::Facing(estimate.facing)
+    } else {
+        Attached::Higher(higher.get(i * stride..(i + 1) * stride).unwrap_or(&[]))
+    }
+}
+
+impl<M, S, F> Rounds<World<'_, M, S>> for Filling<'_, F>
+where
+    M: Medium + ?Sized,
+    S: Scene + ?Sized,
+    F: Fn([f32; 2]) -> Ray,
+{
+    type Output<'o> = Output<'o>;
+
+    fn jobs(&self) -> Range<u32> {
+        self.taken..self.jobs
+    }
+
+    fn run(&self, job: u32, world: &World<'_, M, S>, output: &mut Output<'_>) {
+        output.wanted.clear();
+        output.open.clear();
+        output.higher.clear();
+        (output.estimate, output.is_cut) = (None, false);
+        match self.round {
+            Round::Search => self.search(job, world, output),
+            Round::Look => self.look(job, output),
+            Round::Make => self.make(job, world, output),
+            Round::Again { from } => self.again((from + job) as usize, world, output),
+            Round::Done => {}
+        }
+    }
+
+    fn accept(&mut self, output: &Output<'_>) {
+        if self.taken >= self.jobs {
+            return;
+        }
+        let memory = &mut self.memory;
+        let mut kept = memory.wanted.extend_from_slice(output.wanted.as_slice());
+        kept = kept.and(memory.still_open.extend_from_slice(output.open.as_slice()));
+        if let Some(estimate) = output.estimate {
+            kept = kept.and(memory.estimates.push(estimate));
+            kept = kept.and(memory.higher.extend_from_slice(output.higher.as_slice()));
+        }
+        self.is_cut |= kept.is_err() | output.is_cut;
+        self.taken += 1;
+        if self.taken == self.jobs {
+            self.advance();
+        }
+    }
+
+    fn stage(&self) -> &'static str {
+        match self.round {
+            Round::Search => "fill search",
+            Round::Done => "",
+            Round::Look | Round::Make | Round::Again { .. } => match STEPS[self.step].kind {
+                Kind::Single => "fill single",
+                Kind::Surface => "fill surface",
+                Kind::Multiple | Kind::CoarseMultiple => "fill multiple",
+                Kind::Irradiance | Kind::CoarseIrradiance => "fill irradiance",
+            },
+        }
+    }
+}

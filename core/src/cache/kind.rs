@@ -1,0 +1,145 @@
+//! The kinds of caches: what each holds, where it has records, what lights it, and in which order they are made.
+
+/// What a cache holds. A further kind is a variant, a row of the table of kinds and the steps that make it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[repr(usize)]
+pub enum Kind {
+    /// Light of the lights, scattered once.
+    Single,
+    /// Light of surfaces and of a sky, scattered once.
+    Surface,
+    /// Light scattered more than once.
+    Multiple,
+    /// Indirect irradiance on surfaces that eye rays see.
+    Irradiance,
+    /// Light scattered more than once, coarsely: where the walks of [`Kind::Multiple`] end.
+    CoarseMultiple,
+    /// Indirect irradiance on all surfaces, coarsely: lights all other kinds.
+    CoarseIrradiance,
+}
+
+impl Kind {
+    /// How many there are.
+    pub const COUNT: usize = 6;
+
+    /// All, in the order of their numbers.
+    pub const ALL: [Self; Self::COUNT] =
+        [Self::Single, Self::Surface, Self::Multiple, Self::Irradiance, Self::CoarseMultiple, Self::CoarseIrradiance];
+
+    /// Those that pictures are made from; the others serve their making.
+    pub const FINAL: [Self; 4] = [Self::Single, Self::Surface, Self::Multiple, Self::Irradiance];
+
+    /// In words.
+    ///
+    /// ```
+    /// # use fogbow::cache::Kind;
+    /// assert_eq!(Kind::CoarseMultiple.name(), "coarse multiple");
+    /// ```
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        self.row().name
+    }
+
+    /// Whether its records lie on surfaces; if not, in the medium.
+    ///
+    /// ```
+    /// # use fogbow::cache::Kind;
+    /// assert!(Kind::Irradiance.is_on_surfaces() && !Kind::Multiple.is_on_surfaces());
+    /// ```
+    #[must_use]
+    pub const fn is_on_surfaces(self) -> bool {
+        !matches!(self.row().places, Places::InMedium)
+    }
+
+    pub(super) const fn row(self) -> &'static Row {
+        &TABLE[self as usize]
+    }
+}
+
+/// Where a kind has records.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Places {
+    InMedium,
+    /// On surfaces that eye rays see.
+    InSight,
+    /// On surfaces that eye rays see or that light what they see.
+    OnSurfaces,
+}
+
+/// What is known of a kind beforehand.
+#[derive(Debug)]
+pub(super) struct Row {
+    name: &'static str,
+    pub(super) places: Places,
+    /// Stream of random numbers of new records. Of estimates anew: [`Pass::Again`].
+    pub(super) stream: u64,
+    /// Relative variance of samples ([`Guide::relative_variance`](super::Guide::relative_variance)) up to which the usual
+    /// number of them will do. Where fog fills a room the means are about 1 for light of surfaces, 5 for multiple scattering
+    /// and 2 for irradiance; where light falls through windows ten times that. Smaller: more samples everywhere; larger: noise where light is hard to find.
+    pub(super) spread: f32,
+    /// Whether all other records stand on these, so that the first of them get more samples.
+    pub(super) is_ground: bool,
+}
+
+const TABLE: [Row; Kind::COUNT] = {
+    use Places::{InMedium, InSight, OnSurfaces};
+    [
+        Row { name: "single", places: InMedium, stream: 0, spread: f32::INFINITY, is_ground: false },
+        Row { name: "surface", places: InMedium, stream: 1, spread: 3.0, is_ground: false },
+        Row { name: "multiple", places: InMedium, stream: 2, spread: 12.0, is_ground: false },
+        Row { name: "irradiance", places: InSight, stream: 3, spread: 6.0, is_ground: false },
+        Row { name: "coarse multiple", places: InMedium, stream: 5, spread: 12.0, is_ground: true },
+        Row { name: "coarse irradiance", places: OnSurfaces, stream: 4, spread: 6.0, is_ground: true },
+    ]
+};
+
+/// What a step does to a kind.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Pass {
+    /// New records wherever they are missing.
+    Make,
+    /// All records of this fill estimated anew, with their radii held and random numbers of `stream`; the new estimate
+    /// counts by `share`.
+    Again { stream: u64, share: f32 },
+}
+
+/// One step of a fill.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Step {
+    pub(super) kind: Kind,
+    pub(super) pass: Pass,
+    /// Multiple scattering, beside light of surfaces, that walks end at; `None`: whole walks. All steps are lit by coarse irradiance.
+    pub(super) ends_at: Option<Kind>,
+}
+
+/// Share of the second estimate in a final record. The first, from which the radius comes, had to draw its samples
+/// blindly: larger, and it is wasted; smaller, and its noise, which has a say in the radius, makes light too dark.
+const SECOND: f32 = 0.67;
+
+/// Steps in their order: first coarse records, made of whole walks; these estimated anew, twice, each from what was revised before
+/// it, so that one far too bright does not stay in the others; then the final ones, whose walks have one segment.
+pub(super) const STEPS: [Step; 14] = {
+    use Kind::{CoarseIrradiance, CoarseMultiple, Irradiance, Multiple, Single, Surface};
+    const fn make(kind: Kind, ends_at: Option<Kind>) -> Step {
+        Step { kind, pass: Pass::Make, ends_at }
+    }
+    const fn again(kind: Kind, stream: u64, share: f32, ends_at: Kind) -> Step {
+        Step { kind, pass: Pass::Again { stream, share }, ends_at: Some(ends_at) }
+    }
+    [
+        make(CoarseIrradiance, None),
+        make(Surface, None),
+        make(CoarseMultiple, Some(CoarseMultiple)),
+        again(CoarseIrradiance, 0, 1.0, CoarseMultiple),
+        again(Surface, 1, 1.0, CoarseMultiple),
+        again(CoarseMultiple, 2, 1.0, CoarseMultiple),
+        again(CoarseIrradiance, 3, 1.0, CoarseMultiple),
+        again(Surface, 4, 1.0, CoarseMultiple),
+        again(CoarseMultiple, 5, 1.0, CoarseMultiple),
+        make(Single, None),
+        make(Multiple, Some(CoarseMultiple)),
+        again(Multiple, 100, SECOND, Multiple),
+        make(Irradiance, Some(Multiple)),
+        again(Irradiance, 101, SECOND, Multiple),
+    ]
+};

@@ -1,0 +1,143 @@
+//! How caches are filled and read: every number of the method.
+
+use super::extrapolate::Extrapolation;
+use super::eye::EyeSettings;
+use super::kind::Kind;
+use super::lookup::Reading;
+use super::radius::Limits;
+use crate::multiple_scatter;
+use crate::path;
+use crate::transmittance::thickness::Steps;
+
+/// One cache's share of quality and effort.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Effort {
+    /// `ε` of J's Eq. 34: larger is coarser.
+    pub tolerance: f32,
+    /// Directions or random walks of each of the two estimates of a record; fewer where it reaches less far than
+    /// others do, and in the second up to four times as many where they differ much.
+    pub samples: u32,
+    /// Degree of the expansions; 0 in isotropic media and on surfaces.
+    pub degree: usize,
+    /// Bounds of radii in the world (m).
+    pub limits: Limits,
+    /// Greatest radius as a multiple of the distance to the nearest surface ([`clearance`](super::clearance)), wherever
+    /// that is more than [`Settings::finest`] and [`Effort::limits`] allow it; infinite for no such bound.
+    pub clearance: f32,
+}
+
+impl Effort {
+    /// For records that serve the making of others: tolerance times a factor, samples divided by a number.
+    fn coarser(self, tolerance: f32, fewer: u32) -> Self {
+        Self { tolerance: tolerance * self.tolerance, samples: (self.samples / fewer).max(16), ..self }
+    }
+}
+
+/// How caches are filled and read.
+///
+/// ```
+/// use fogbow::cache::{Effort, Kind, Limits, Settings};
+/// let limits = Limits { min: 0.01, max: 1.0 };
+/// let effort = Effort { tolerance: 0.5, samples: 1024, degree: 2, limits, clearance: 2.0 };
+/// let settings = Settings { multiple: Some(effort), ..Settings::default() };
+/// // The records at which walks end follow from those of the picture.
+/// assert_eq!(settings.effort(Kind::CoarseMultiple).unwrap().samples, 128);
+/// assert!(settings.effort(Kind::Single).is_none());
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Settings {
+    /// Light of the lights, scattered once; `None` to leave it to connections.
+    pub single: Option<Effort>,
+    /// Light of surfaces, scattered once.
+    pub surface: Option<Effort>,
+    /// Light scattered more than once.
+    pub multiple: Option<Effort>,
+    /// Indirect irradiance on surfaces.
+    pub irradiance: Option<Effort>,
+    /// How records are carried to other points.
+    pub extrapolation: Extrapolation,
+    /// Eye rays that say where records are needed.
+    pub rays: u32,
+    /// Share of every radius that spheres overlap by.
+    pub margin: f32,
+    /// Least and greatest radius in pixels.
+    pub pixels: [f32; 2],
+    /// Records computed per round at most. Part of the result: larger rounds know less of each other.
+    pub round: u32,
+    /// How eye rays look at the world.
+    pub eye: EyeSettings,
+    /// How random walks are made, and light marched to.
+    pub walk: multiple_scatter::Settings,
+    /// How paths are traced where nothing is cached.
+    pub paths: path::Settings,
+    /// Samples of every light with extent for a record of single scattering.
+    pub light_samples: u32,
+    /// Length (m) below which changes of light are noise: see [`Estimator::finest`](super::Estimator::finest).
+    pub finest: f32,
+    /// Changes all random numbers.
+    pub seed: u64,
+}
+
+impl Default for Settings {
+    /// No caches; what else is good for pictures of a world some metres large.
+    fn default() -> Self {
+        Self {
+            single: None,
+            surface: None,
+            multiple: None,
+            irradiance: None,
+            extrapolation: Extrapolation::default(),
+            rays: LEAST_RAYS,
+            margin: 0.15,
+            pixels: [1.5, 64.0],
+            round: 64,
+            eye: EyeSettings::default(),
+            walk: multiple_scatter::Settings {
+                lengths: multiple_scatter::Lengths::Marched,
+                ..multiple_scatter::Settings::new(Steps::Length(0.03))
+            },
+            paths: path::Settings::default(),
+            light_samples: 16,
+            finest: 0.01,
+            seed: 0,
+        }
+    }
+}
+
+/// Eye rays of a fill at least, and at most: fewer, and small things in sight have no records; more, and places take
+/// memory that pictures do not repay.
+pub(super) const LEAST_RAYS: u32 = 16384;
+
+/// See [`LEAST_RAYS`].
+pub(super) const MOST_RAYS: u32 = 131_072;
+
+impl Settings {
+    /// The effort of a kind; `None` if it is not cached.
+    #[must_use]
+    pub fn effort(&self, kind: Kind) -> Option<Effort> {
+        match kind {
+            Kind::Single => self.single,
+            Kind::Surface => self.surface,
+            Kind::Multiple => self.multiple,
+            Kind::Irradiance => self.irradiance,
+            // As fine as the final ones, with an eighth of the samples. What they get wrong is what all walks bring along,
+            // more of it with every scattering, and in corners most: so none reaches past a surface.
+            Kind::CoarseMultiple => {
+                self.multiple.map(|e| Effort { clearance: e.clearance.min(1.0), ..e.coarser(1.0, 8) })
+            }
+            Kind::CoarseIrradiance => self.irradiance.map(|e| e.coarser(3.0, 8)),
+        }
+    }
+
+    /// How the cache of a kind is read; `None` if there is none.
+    ///
+    /// ```
+    /// # use fogbow::cache::{Kind, Settings};
+    /// assert_eq!(Settings::default().reading(Kind::Multiple), None);
+    /// ```
+    #[must_use]
+    pub fn reading(&self, kind: Kind) -> Option<Reading> {
+        let tolerance = self.effort(kind)?.tolerance;
+        Some(Reading { extrapolation: self.extrapolation, ..Reading::new(tolerance) })
+    }
+}

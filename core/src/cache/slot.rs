@@ -1,0 +1,209 @@
+//! A cache of either sort, as filling needs it.
+
+use super::guide::Guide;
+use super::kind::Kind;
+use super::lookup::Reading;
+use super::radius::clamp_gradient;
+use super::store::Cache;
+use super::{Facing, Place, Record, SurfaceCache, VolumeCache};
+use crate::math::Vec3;
+use crate::sh::Coefficient;
+use crate::single_scatter::Sums;
+use crate::spectrum::Spectrum;
+
+/// A cache of one kind.
+#[derive(Debug)]
+pub(super) enum Slot<'s> {
+    /// The kind is not used.
+    Off,
+    Volume(VolumeCache<'s>),
+    Surface(SurfaceCache<'s>),
+}
+
+/// What is attached to one estimate.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Attached<'a> {
+    Higher(&'a [Coefficient]),
+    Facing(Facing),
+}
+
+impl<'s> Slot<'s> {
+    pub(super) fn is_off(&self) -> bool {
+        matches!(self, Self::Off)
+    }
+
+    pub(super) fn volume(&self) -> Option<&VolumeCache<'s>> {
+        match self {
+            Self::Volume(cache) => Some(cache),
+            Self::Off | Self::Surface(_) => None,
+        }
+    }
+
+    pub(super) fn surface(&self) -> Option<&SurfaceCache<'s>> {
+        match self {
+            Self::Surface(cache) => Some(cache),
+            Self::Off | Self::Volume(_) => None,
+        }
+    }
+
+    pub(super) fn records(&self) -> &[Record] {
+        match self {
+            Self::Off => &[],
+            Self::Volume(cache) => cache.records(),
+            Self::Surface(cache) => cache.records(),
+        }
+    }
+
+    pub(super) fn len(&self) -> usize {
+        self.records().len()
+    }
+
+    pub(super) fn bytes(&self) -> usize {
+        match self {
+            Self::Off => 0,
+            Self::Volume(cache) => cache.bytes(),
+            Self::Surface(cache) => cache.bytes(),
+        }
+    }
+
+    /// Attachments of a record.
+    pub(super) fn stride(&self) -> usize {
+        match self {
+            Self::Off => 0,
+            Self::Volume(cache) => cache.stride(),
+            Self::Surface(cache) => cache.stride(),
+        }
+    }
+
+    /// Whether a place has a record, or no such cache could have one there.
+    pub(super) fn covers(&self, place: &Place, reading: &Reading) -> bool {
+        match (self, place.normal) {
+            (Self::Volume(cache), None) => cache.covers(place.point, reading),
+            (Self::Surface(cache), Some(normal)) => cache.covers(place.point, normal, reading),
+            _ => true,
+        }
+    }
+
+    /// About how large the radius of a record at a point would be.
+    pub(super) fn radius_near(&self, point: Vec3) -> Option<f32> {
+        match self {
+            Self::Off => None,
+            Self::Volume(cache) => cache.radius_near(point),
+            Self::Surface(cache) => cache.radius_near(point),
+        }
+    }
+
+    /// Where a record is.
+    pub(super) fn place(&self, number: usize) -> Option<Place> {
+        let point = self.records().get(number)?.position;
+        Some(match self {
+            Self::Surface(cache) => {
+                let normal = cache.attached(number as u32).first().map(|facing| facing.normal);
+                Place { point, normal, is_seen: false }
+            }
+            Self::Off | Self::Volume(_) => Place { point, normal: None, is_seen: true },
+        })
+    }
+
+    /// Calls `visit(number, weight)` for the records that reach `point`.
+    pub(super) fn visit(&self, point: Vec3, mut visit: impl FnMut(usize, f32)) {
+        let mut each = |number: u32, _: &Record, share: f32| visit(number as usize, 1.0 - share);
+        match self {
+            Self::Off => {}
+            Self::Volume(cache) => cache.visit(point, &mut each),
+            Self::Surface(cache) => cache.visit(point, &mut each),
+        }
+    }
+
+    /// What [`Slot::insert`] has done.
+    pub(super) fn insert(&mut self, record: Record, attached: Attached<'_>) -> Inserted {
+        let result = match (self, attached) {
+            (Self::Volume(cache), Attached::Higher(higher)) => cache.insert(record, higher),
+            (Self::Surface(cache), Attached::Facing(facing)) => cache.insert(record, &[facing]),
+            _ => Ok(false),
+        };
+        match result {
+            Ok(true) => Inserted::Added,
+            Ok(false) => Inserted::LeftOut,
+            Err(_) => Inserted::Full,
+        }
+    }
+
+    /// Mixes a new estimate, of which the share `share` stays, into a record. `tolerance` is that of its radius.
+    pub(super) fn blend(&mut self, number: usize, tolerance: f32, sums: &Sums, new: Attached<'_>, share: f32) {
+        let Some(&record) = self.records().get(number) else { return };
+        // Within its radius a record changes by a factor of e to the tolerance at most.
+        let gradient = clamp_gradient(&sums.gradient, sums.value, record.radius / tolerance);
+        let value = sums.value * share + record.value * (1.0 - share);
+        let gradient = gradient * share + record.gradient * (1.0 - share);
+        let mix = |a: Spectrum, b: Spectrum| a * share + b * (1.0 - share);
+        match (self, new) {
+            (Self::Volume(cache), Attached::Higher(higher)) => {
+                let mut mixed = [Coefficient::ZERO; crate::sh::MAX_COEFFICIENTS];
+                let stride = higher.len().min(mixed.len());
+                for ((mixed, new), old) in mixed.iter_mut().zip(higher).zip(cache.attached(number as u32)) {
+                    mixed.value = mix(new.value, old.value);
+                    mixed.gradient = new.gradient * share + old.gradient * (1.0 - share);
+                }
+                cache.revise(number as u32, value, &gradient, &mixed[..stride]);
+            }
+            (Self::Surface(cache), Attached::Facing(mut facing)) => {
+                if let Some(old) = cache.attached(number as u32).first() {
+                    facing.turn = facing.turn * share + old.turn * (1.0 - share);
+                }
+                cache.revise(number as u32, value, &gradient, &[facing]);
+            }
+            _ => {}
+        }
+    }
+
+    /// Brings all records into the indices; whether these have room for them.
+    pub(super) fn finish(&mut self) -> bool {
+        fn of<E: bytemuck::Pod>(cache: &mut Cache<'_, E>) -> bool {
+            cache.is_finished() || cache.finish().is_ok()
+        }
+        match self {
+            Self::Off => true,
+            Self::Volume(cache) => of(cache),
+            Self::Surface(cache) => of(cache),
+        }
+    }
+}
+
+/// What became of a record.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Inserted {
+    Added,
+    /// It is no number.
+    LeftOut,
+    /// There is no memory for it.
+    Full,
+}
+
+/// Caches by kind, and what is the same for one of each.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct ByKind<T>(pub(super) [T; Kind::COUNT]);
+
+impl<T> core::ops::Index<Kind> for ByKind<T> {
+    type Output = T;
+    fn index(&self, kind: Kind) -> &T {
+        &self.0[kind as usize]
+    }
+}
+
+impl<T> core::ops::IndexMut<Kind> for ByKind<T> {
+    fn index_mut(&mut self, kind: Kind) -> &mut T {
+        &mut self.0[kind as usize]
+    }
+}
+
+/// Guides of the records from a number on: those made or estimated anew by the fill at hand.
+pub(super) fn learnt_near(slot: &Slot<'_>, guides: &[Guide], from: usize, point: Vec3) -> Guide {
+    let mut around = Guide::default();
+    slot.visit(point, |number, weight| {
+        if let Some(guide) = number.checked_sub(from).and_then(|i| guides.get(i)) {
+            around.merge(guide, weight);
+        }
+    });
+    around
+}
