@@ -29,3 +29,4 @@ pub mod storage;
 pub mod surface;
 pub mod transmittance;
 pub mod vpl;
+pub mod world;

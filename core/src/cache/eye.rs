@@ -9,7 +9,6 @@ use crate::host::{Hit, Medium, Properties, Rng, Scene};
 use crate::light::{Falloff, Light, Source};
 use crate::march::scattering_points;
 use crate::math::{Frame, Ray};
-use crate::path::World;
 use crate::path::trace::leave;
 use crate::phase::deflection;
 use crate::sampling::discrete::choose;
@@ -19,6 +18,7 @@ use crate::single_scatter::shadow_ray;
 use crate::spectrum::Spectrum;
 use crate::surface::{Surface, lambert};
 use crate::transmittance::thickness::{Marching, transmittance, until_the_end};
+use crate::world::World;
 
 /// Mirrors and panes of glass an eye ray follows: a hall of mirrors must end.
 const MAX_BOUNCES: u32 = 32;

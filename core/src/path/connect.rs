@@ -2,7 +2,6 @@
 
 use glam::{Vec2, Vec3};
 
-use super::World;
 use crate::host::{Medium, Scene};
 use crate::light::{Falloff, Incident, Light, LightSample, Source};
 use crate::math::Ray;
@@ -11,6 +10,7 @@ use crate::sampling::distance::Equiangular;
 use crate::sampling::{Generator, discrete, mis};
 use crate::spectrum::Spectrum;
 use crate::transmittance::{Flight, transmittance};
+use crate::world::World;
 
 /// A shadow ray ends this share of its length before the light's own surface.
 const SHADOW_MARGIN: f32 = 1e-4;

@@ -6,10 +6,11 @@ use super::scatterer::Receiver;
 use crate::host::{Hit, Medium, Rng, Scene};
 use crate::march::scattering_points;
 use crate::math::{Ray, float};
-use crate::path::{self, Delegate, InScattered, Radiance, World};
+use crate::path::{self, Delegate, InScattered, Radiance};
 use crate::sampling::{Generator, uniform};
 use crate::spectrum::Spectrum;
 use crate::transmittance::thickness::{Marching, optical_thickness};
+use crate::world::World;
 
 /// Points on a segment of an eye ray that are held at once, 40 KB of stack; lights beyond half as many get points of
 /// their own, by another march along the segment.

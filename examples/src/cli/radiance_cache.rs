@@ -9,10 +9,11 @@ use fogbow::host::Medium;
 use fogbow::light::Light;
 use fogbow::math::{Ray, Vec2};
 use fogbow::multiple_scatter::{self, Lengths};
-use fogbow::path::{self, World as PathWorld};
+use fogbow::path;
 use fogbow::phase::Phase;
 use fogbow::sampling::uniform2;
 use fogbow::transmittance::thickness::Steps;
+use fogbow::world::World as LitWorld;
 use fogbow_std::film::Film;
 use fogbow_std::image_sampling::Plan;
 use fogbow_std::progress::Control;
@@ -284,7 +285,7 @@ impl WithMedium for CacheJob<'_> {
         };
         let steps = Steps::Length(3.0 * medium.resolution());
         let estimator = Estimator {
-            world: PathWorld { medium, scene: self.world, lights: self.lights },
+            world: LitWorld { medium, scene: self.world, lights: self.lights },
             surfaces: None,
             scattered: None,
             walk: multiple_scatter::Settings {
@@ -311,7 +312,7 @@ impl WithMedium for CacheJob<'_> {
         let has_layers = self.film.layers().len() > 1;
         let reader = caches.reader();
         let render = tiles::render(self.film, self.settings, self.control, |sample, rng, layers| {
-            let world = PathWorld {
+            let world = LitWorld {
                 medium: &CountingMedium { medium, tally: sample.tally },
                 scene: &CountingScene { scene: self.world, tally: sample.tally },
                 lights: self.lights,
