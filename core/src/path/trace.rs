@@ -10,21 +10,11 @@ use crate::sampling::{Generator, mis, uniform, uniform2};
 use crate::spectrum::Spectrum;
 use crate::surface::Surface;
 use crate::transmittance::{Flight, flight, transmittance};
-use crate::world::World;
-
-/// Rays leave a surface this far above it, relative to the size of the coordinates: 64 roundings.
-const OFFSET: f32 = 64.0 * f32::EPSILON;
+use crate::world::{World, leave};
 
 /// A path longer than this ends, whatever the settings say: a guard against worlds without
 /// absorption, where roulette may never come up.
 const MAX_SEGMENTS: u32 = 100_000;
-
-/// `point` moved off its surface to the side of `direction`.
-#[inline]
-pub(crate) fn leave(point: Vec3, normal: Vec3, direction: Vec3, distance: f32) -> Vec3 {
-    let size = point.abs().max_element().max(distance) * OFFSET;
-    point + normal * size.copysign(normal.dot(direction))
-}
 
 /// The last scattering event, as far as weights of what the path hits next depend on it.
 #[derive(Clone, Copy)]

@@ -4,12 +4,11 @@ use super::Event;
 use crate::host::{Hit, Medium, Rng, Scene};
 use crate::math::{Bounds, Ray};
 use crate::path::Settings;
-use crate::path::trace::leave;
 use crate::sampling::{Generator, discrete, uniform, uniform2};
 use crate::spectrum::Spectrum;
 use crate::surface::{Surface, SurfaceSample};
 use crate::transmittance::flight;
-use crate::world::World;
+use crate::world::{World, leave};
 
 /// A walk longer than this ends: a guard against worlds that absorb nothing.
 const MAX_SEGMENTS: u32 = 100_000;

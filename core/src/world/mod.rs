@@ -6,6 +6,11 @@
 //! | file | holds |
 //! |---|---|
 //! | `mod` | [`World`]: medium, surfaces and lights |
+//! | `rays` | rays that leave surfaces, meet the next one, or ask whether a light is hidden |
+
+mod rays;
+
+pub use rays::{leave, nearest_surface, shadow_ray, short_of_end};
 
 use crate::light::Light;
 
