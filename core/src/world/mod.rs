@@ -7,9 +7,12 @@
 //! |---|---|
 //! | `mod` | [`World`]: medium, surfaces and lights |
 //! | `rays` | rays that leave surfaces, meet the next one, or ask whether a light is hidden |
+//! | `outline` | [`Outline`]: what methods must know beforehand |
 
+mod outline;
 mod rays;
 
+pub use outline::{LightCounts, Outline};
 pub use rays::{leave, nearest_surface, shadow_ray, short_of_end};
 
 use crate::light::Light;
