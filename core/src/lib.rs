@@ -30,3 +30,4 @@ pub mod surface;
 pub mod transmittance;
 pub mod vpl;
 pub mod work;
+pub mod world;

@@ -8,8 +8,9 @@ use fogbow::covariance::bytes::{self, BytesError};
 use fogbow::covariance::{FrequencyPhotons, Grid, Lattice, LatticeError, OccluderCell, Occluders, Voxel, merge};
 use fogbow::host::{Medium, Scene};
 use fogbow::math::Bounds;
-use fogbow::path::{self, World};
+use fogbow::path;
 use fogbow::photon;
+use fogbow::world::World;
 use rayon::prelude::*;
 
 use crate::files;
@@ -107,7 +108,7 @@ fn cells<T: Copy>(count: usize, empty: T) -> Result<Vec<T>, FillError> {
 ///
 /// ```
 /// use fogbow::{host::Empty, light::{Light, PhongLight}, math::{Bounds, Vec3}, medium::Homogeneous};
-/// use fogbow::{path::{self, World}, phase::Lobe, spectrum::Spectrum};
+/// use fogbow::{path, phase::Lobe, spectrum::Spectrum, world::World};
 /// use fogbow_std::{covariance::{Settings, fill}, progress::Control};
 /// let fog = Homogeneous::new(Spectrum::splat(0.1), Spectrum::splat(0.1), Lobe::Isotropic)?;
 /// let spot = [Light::Phong(PhongLight::new(Vec3::ZERO, Vec3::Z, 200.0, Spectrum::ONE)?)];

@@ -10,11 +10,12 @@ use core::num::NonZero;
 use fogbow::beams::{self, Beams, Piece, kernel};
 use fogbow::host::{Medium, Scene};
 use fogbow::math::{Bounds, Ray, Vec3};
-use fogbow::path::{self, InScattered, Radiance, World};
+use fogbow::path::{self, InScattered, Radiance};
 use fogbow::sampling::uniform::mix;
 use fogbow::sampling::{Generator, uniform};
 use fogbow::spectrum::Spectrum;
 use fogbow::storage::Full;
+use fogbow::world::World;
 use rayon::iter::{IndexedParallelIterator, IntoParallelIterator, ParallelIterator};
 
 use crate::film::Film;
@@ -116,7 +117,7 @@ const JOB: u32 = 64;
 /// [`BeamsError::TooMany`].
 ///
 /// ```
-/// use fogbow::{host::Empty, light::{Light, PointLight}, math::*, medium::Homogeneous, path::World, phase::Phase, spectrum::Spectrum};
+/// use fogbow::{host::Empty, light::{Light, PointLight}, math::*, medium::Homogeneous, phase::Phase, spectrum::Spectrum, world::World};
 /// use fogbow_std::photon_beams::{Settings, View, shoot};
 /// let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::ONE, Phase::ISOTROPIC)?;
 /// let lamps = [Light::Point(PointLight::from_flux(Vec3::ZERO, Spectrum::ONE)?)];
@@ -179,7 +180,7 @@ where
 /// [`BeamsError::TooMany`].
 ///
 /// ```
-/// use fogbow::{host::Empty, light::{Light, PointLight}, math::*, medium::Homogeneous, path::World, phase::Phase, spectrum::Spectrum};
+/// use fogbow::{host::Empty, light::{Light, PointLight}, math::*, medium::Homogeneous, phase::Phase, spectrum::Spectrum, world::World};
 /// use fogbow_std::photon_beams::{Settings, View, paths_for, shoot};
 /// let fog = Homogeneous::new(Spectrum::ONE, Spectrum::ONE, Phase::ISOTROPIC)?;
 /// let lamps = [Light::Point(PointLight::from_flux(Vec3::ZERO, Spectrum::ONE)?)];

@@ -11,11 +11,11 @@ use core::num::NonZero;
 use fogbow::host::{Medium, Scene};
 use fogbow::math::{Bounds, Ray, Vec3};
 use fogbow::medium::{MediumError, Pyramid};
-use fogbow::path::World;
 use fogbow::sampling::uniform;
 use fogbow::sampling::uniform::mix;
 use fogbow::spectrum::Spectrum;
 use fogbow::vpl::{self, Bound, Compensation, EyeSettings, Gatherer, Receiver, Seen, VirtualLight};
+use fogbow::world::World;
 use rayon::iter::{IndexedParallelIterator, IntoParallelIterator, ParallelIterator};
 
 use crate::film::Film;
@@ -160,7 +160,7 @@ where
 /// tell what matters, about [`Settings::lights`] of them. Uses the threads of the rayon pool it is called in.
 ///
 /// ```
-/// use fogbow::{host::Empty, light::{Light, PointLight}, math::*, medium::Homogeneous, path::World, phase::Phase, spectrum::Spectrum};
+/// use fogbow::{host::Empty, light::{Light, PointLight}, math::*, medium::Homogeneous, phase::Phase, spectrum::Spectrum, world::World};
 /// use fogbow::vpl::Bound;
 /// use fogbow_std::{photon_beams::View, virtual_lights::{Settings, lights, paths_for}};
 /// let fog = Homogeneous::new(Spectrum::ONE, Spectrum::ONE, Phase::ISOTROPIC)?;

@@ -6,18 +6,18 @@ use std::path::{Path, PathBuf};
 use fogbow::bytes::Crc;
 use fogbow::cache::bytes::{self, Attachment, BytesError, HEADER_BYTES, Header, Kind, byte_count, read_into};
 use fogbow::cache::{
-    Asked, Basis, Block, Cache, CachesError, Effort, Facing, Index, Kind as Caching, Limits, Node, Output, RadianceCaches,
-    Reading, Record, Settings, SurfaceCache, VolumeCache,
+    Asked, Basis, Block, Cache, CachesError, Effort, Facing, Index, Kind as Caching, Limits, Node, Output,
+    RadianceCaches, Reading, Record, Settings, SurfaceCache, VolumeCache,
 };
 use fogbow::light::{Light, PointLight};
 use fogbow::math::{Ray, Vec3};
 use fogbow::medium::Homogeneous;
-use fogbow::path::World;
 use fogbow::phase::Lobe;
 use fogbow::sh::Coefficient;
 use fogbow::spectrum::{Gradient, Spectrum};
 use fogbow::surface::Surface;
 use fogbow::work::finish;
+use fogbow::world::World;
 use fogbow_std::radiance_cache::{load, save};
 use fogbow_tests::hosts::Ball;
 use proptest::prelude::*;

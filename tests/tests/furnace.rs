@@ -4,11 +4,12 @@ use fogbow::host::{Empty, Hit, Medium, Properties, Scene, Stretch};
 use fogbow::light::{Light, PointLight, QuadLight, SphereLight, SpotLight, Sun};
 use fogbow::math::{Ray, Vec2, Vec3, float::PI};
 use fogbow::medium::Homogeneous;
-use fogbow::path::{self, Radiance, Settings, World};
+use fogbow::path::{self, Radiance, Settings};
 use fogbow::phase::{Lobe, Phase};
 use fogbow::sampling::{Generator, uniform2, warp};
 use fogbow::spectrum::Spectrum;
 use fogbow::surface::Surface;
+use fogbow::world::World;
 use fogbow_tests::estimate::estimate;
 
 /// A ball of fog around the origin whose density falls off towards its border, or not.

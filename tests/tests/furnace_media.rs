@@ -4,13 +4,14 @@ use fogbow::host::{Empty, Hit, Medium, Scene};
 use fogbow::light::{EnvironmentMap, Light, MeshLight, PointLight, QuadLight, SphereLight, Triangle};
 use fogbow::math::{Affine3, Mat3, Ray, Vec2, Vec3, float::PI};
 use fogbow::medium::{Density, FractalNoise, Grid, Homogeneous, MinMax, Noise, Overlap, Placed, Region};
-use fogbow::path::{self, Settings, World};
+use fogbow::path::{self, Settings};
 use fogbow::phase::{Lobe, Phase};
 use fogbow::sampling::{Generator, distance::Equiangular, uniform, uniform2, warp};
 use fogbow::spectrum::Spectrum;
 use fogbow::surface::Surface;
 use fogbow::transmittance::thickness::{Marching, optical_thickness};
 use fogbow::transmittance::{flight, transmittance};
+use fogbow::world::World;
 use fogbow_tests::estimate::{Estimate, estimate};
 
 const SIZE: [u32; 3] = [12, 10, 9];

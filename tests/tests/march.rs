@@ -5,10 +5,11 @@ use fogbow::light::{Light, PointLight};
 use fogbow::march;
 use fogbow::math::{Ray, Vec3};
 use fogbow::medium::{Placed, Region};
-use fogbow::path::{self, InScattered, Settings, World};
+use fogbow::path::{self, InScattered, Settings};
 use fogbow::phase::Lobe;
 use fogbow::sampling::{Generator, uniform};
 use fogbow::spectrum::Spectrum;
+use fogbow::world::World;
 use fogbow_tests::estimate::{Estimate, estimate};
 use fogbow_tests::hosts::{Analytic, Field};
 

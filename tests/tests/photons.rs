@@ -7,13 +7,14 @@ use fogbow::light::{
 };
 use fogbow::math::{Bounds, Mat3, Ray, Vec3, float::PI};
 use fogbow::medium::{Homogeneous, Placed, Region};
-use fogbow::path::{Settings, World};
+use fogbow::path::Settings;
 use fogbow::phase::{Lobe, Phase};
 use fogbow::photon::{self, Event};
 use fogbow::sampling::warp::{cosine_hemisphere_pdf, cosine_power_pdf, uniform_cone_pdf};
 use fogbow::sampling::{Generator, uniform2};
 use fogbow::spectrum::Spectrum;
 use fogbow::surface::Surface;
+use fogbow::world::World;
 use fogbow_tests::chi_square;
 use fogbow_tests::estimate::estimate;
 

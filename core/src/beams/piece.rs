@@ -5,10 +5,11 @@ use glam::Vec3;
 
 use crate::host::{Medium, Rng, Scene};
 use crate::math::{Bounds, Ray, float};
-use crate::path::{Settings, World};
+use crate::path::Settings;
 use crate::photon::{self, Event};
 use crate::sampling::{Generator, uniform};
 use crate::spectrum::Spectrum;
+use crate::world::World;
 
 /// Below this share of a beam's power at its start, roulette ends it with probability one half.
 const ROULETTE_BELOW: f32 = 0.05;
@@ -191,7 +192,7 @@ pub fn pieces(
 ///
 /// ```
 /// # use fogbow::{beams, host::Empty, light::{Light, PointLight}, math::*, medium::Homogeneous, phase::Lobe};
-/// # use fogbow::{path::{Settings, World}, sampling::Generator, spectrum::Spectrum};
+/// # use fogbow::{path::Settings, sampling::Generator, spectrum::Spectrum, world::World};
 /// let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::ONE, Lobe::Isotropic)?;
 /// let lamps = [Light::Point(PointLight::from_flux(Vec3::ZERO, Spectrum::ONE)?)];
 /// let world = World { medium: &fog, scene: &Empty, lights: &lamps };

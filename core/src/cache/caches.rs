@@ -8,8 +8,8 @@ use super::slot::{ByKind, Slot};
 use super::{Estimator, SurfaceCache, VolumeCache};
 use crate::host::{Medium, Rng, Scene};
 use crate::math::Ray;
-use crate::path::World;
 use crate::storage::List;
+use crate::world::World;
 
 /// The caches of a world, by kind. They may be filled again for another view ([`RadianceCaches::fill`]), and then gain
 /// what is missing.

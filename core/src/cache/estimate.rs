@@ -12,16 +12,16 @@ use crate::host::{Hit, Medium, Properties, Rng, Scene};
 use crate::light::{Light, sky};
 use crate::math::{Frame, Ray, float};
 use crate::multiple_scatter::{self, Collision, Cones, Incoming, Walk};
-use crate::path::trace::leave;
-use crate::path::{self, World};
+use crate::path;
 use crate::phase::Phase;
 use crate::sampling::discrete::choose;
 use crate::sampling::{Generator, uniform, uniform2, warp};
 use crate::sh::{Coefficient, MAX_DEGREE};
-use crate::single_scatter::{self, Arrival, Contribution, Directional, Sums, nearest_surface, shadow_ray};
+use crate::single_scatter::{self, Arrival, Contribution, Directional, Sums};
 use crate::spectrum::{Gradient, Spectrum};
 use crate::surface::{Surface, lambert};
 use crate::transmittance::thickness::{Marching, Transmittance, transmittance, transmittance_with_gradients};
+use crate::world::{World, leave, nearest_surface, shadow_ray};
 
 /// Least cosine in the gradient of an irradiance sample: at grazing directions `1/cos` has a
 /// variance without bound.

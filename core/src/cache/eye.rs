@@ -9,16 +9,14 @@ use crate::host::{Hit, Medium, Properties, Rng, Scene};
 use crate::light::{Falloff, Light, Source};
 use crate::march::scattering_points;
 use crate::math::{Frame, Ray};
-use crate::path::World;
-use crate::path::trace::leave;
 use crate::phase::deflection;
 use crate::sampling::discrete::choose;
 use crate::sampling::distance::Equiangular;
 use crate::sampling::{Generator, uniform, uniform2, warp};
-use crate::single_scatter::shadow_ray;
 use crate::spectrum::Spectrum;
 use crate::surface::{Surface, lambert};
 use crate::transmittance::thickness::{Marching, transmittance, until_the_end};
+use crate::world::{World, leave, nearest_surface, shadow_ray};
 
 /// Mirrors and panes of glass an eye ray follows: a hall of mirrors must end.
 const MAX_BOUNCES: u32 = 32;
@@ -235,7 +233,7 @@ struct Wanted<'a, M: ?Sized, S: ?Sized, F> {
 
 impl<M: Medium + ?Sized, S: Scene + ?Sized, F: FnMut(Place)> Wanted<'_, M, S, F> {
     fn beyond(&mut self, ray: &Ray) {
-        if let Some(hit) = crate::single_scatter::nearest_surface(ray, self.world.scene) {
+        if let Some(hit) = nearest_surface(ray, self.world.scene) {
             self.on_surface(ray, &hit, false);
         }
     }

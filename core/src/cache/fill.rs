@@ -21,13 +21,13 @@ use super::{Estimator, Facing, Record};
 use crate::bytes::Crc;
 use crate::host::{Medium, Scene};
 use crate::math::{Bounds, Ray, Vec3};
-use crate::path::World;
 use crate::sampling::uniform::mix;
 use crate::sampling::{Generator, uniform2, warp};
 use crate::sh::Coefficient;
 use crate::single_scatter::Sums;
 use crate::storage::List;
 use crate::work::Rounds;
+use crate::world::World;
 
 /// Eye rays of the first batch; each next one has twice as many, up to [`LAST_BATCH`]: what first rays ask for lies far apart,
 /// and what later ones find are the gaps.
@@ -147,7 +147,9 @@ enum Round {
     /// Estimates for new records.
     Make,
     /// Estimates anew for records from a number on.
-    Again { from: u32 },
+    Again {
+        from: u32,
+    },
     Done,
 }
 
@@ -230,7 +232,15 @@ impl<F: Fn([f32; 2]) -> Ray> Asked<F> {
         let pixel = if let Self::View { pixel, .. } = self { *pixel } else { 0.0 };
         let mut crc = Crc::new();
         let mut add = |numbers: &[f32]| numbers.iter().for_each(|n| crc.add(&n.to_bits().to_le_bytes()));
-        add(&[margin, pixels[0], pixels[1], pixel, eye.density, f32::from(eye.lights_visible), f32::from(eye.indirect)]);
+        add(&[
+            margin,
+            pixels[0],
+            pixels[1],
+            pixel,
+            eye.density,
+            f32::from(eye.lights_visible),
+            f32::from(eye.indirect),
+        ]);
         match self {
             Self::View { ray, .. } => {
                 for at in [[0.5, 0.5], [0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.3, 0.6]] {
@@ -284,7 +294,8 @@ fn usual_radius(records: &[Record]) -> f32 {
     if records.len() < FEW {
         return 0.0;
     }
-    let sums = |(sum, squares): (f32, f32), record: &Record| (sum + record.radius, squares + record.radius * record.radius);
+    let sums =
+        |(sum, squares): (f32, f32), record: &Record| (sum + record.radius, squares + record.radius * record.radius);
     let (sum, squares) = records.iter().fold((0.0, 0.0), sums);
     squares / sum
 }
@@ -386,7 +397,8 @@ impl<'s, F> Filling<'s, F> {
     }
 
     fn look(&self, job: u32, output: &mut Output<'_>) {
-        let Some(((step, _), open)) = self.at_hand().zip(self.memory.open.as_slice().chunks(PLACES_PER_JOB as usize).nth(job as usize))
+        let Some(((step, _), open)) =
+            self.at_hand().zip(self.memory.open.as_slice().chunks(PLACES_PER_JOB as usize).nth(job as usize))
         else {
             return;
         };
@@ -409,7 +421,9 @@ impl<'s, F> Filling<'s, F> {
         let Wanted { place, distance, .. } = self.memory.wanted.as_slice()[wanted as usize];
         let settings = self.settings();
         let limits = match &self.asked {
-            Asked::View { pixel, .. } => effort.limits.on_screen(settings.pixels[0], settings.pixels[1], *pixel, distance),
+            Asked::View { pixel, .. } => {
+                effort.limits.on_screen(settings.pixels[0], settings.pixels[1], *pixel, distance)
+            }
             Asked::Box(_) => effort.limits,
         };
         let limits = limits.within(self.reach(&effort, &place, world.scene));
@@ -423,7 +437,12 @@ impl<'s, F> Filling<'s, F> {
         output.estimate = Some(estimate);
     }
 
-    fn again<M: Medium + ?Sized, S: Scene + ?Sized>(&self, number: usize, world: &World<'_, M, S>, output: &mut Output<'_>) {
+    fn again<M: Medium + ?Sized, S: Scene + ?Sized>(
+        &self,
+        number: usize,
+        world: &World<'_, M, S>,
+        output: &mut Output<'_>,
+    ) {
         let Some((step, effort)) = self.at_hand() else { return };
         let Pass::Again { stream, .. } = step.pass else { return };
         let (slot, row) = (&self.caches.slots[step.kind], step.kind.row());
@@ -434,7 +453,14 @@ impl<'s, F> Filling<'s, F> {
         let count = (samples(&effort, radius, self.usual) as f32 * more) as u32;
         let mut rng = Generator::new(mix(self.settings().seed ^ mix(stream + 16)) ^ number as u64);
         let mut estimate = Estimate { place, effort: more, ..Estimate::default() };
-        self.estimate(step, world, Looks { count, guide: guide.as_ref(), learnt: None }, &mut estimate, &mut rng, output);
+        self.estimate(
+            step,
+            world,
+            Looks { count, guide: guide.as_ref(), learnt: None },
+            &mut estimate,
+            &mut rng,
+            output,
+        );
         output.estimate = Some(estimate);
     }
 
@@ -568,7 +594,8 @@ impl<'s, F> Filling<'s, F> {
         let rays = self.settings().rays;
         let wanted = self.memory.wanted.as_slice();
         while self.batch[1] < rays {
-            let size = if self.batch[1] == 0 { FIRST_BATCH } else { LAST_BATCH.min(2 * (self.batch[1] - self.batch[0])) };
+            let size =
+                if self.batch[1] == 0 { FIRST_BATCH } else { LAST_BATCH.min(2 * (self.batch[1] - self.batch[0])) };
             self.batch = [self.batch[1], rays.min(self.batch[1].saturating_add(size))];
             let at = |ray: u32| wanted.partition_point(|wanted| wanted.ray < ray);
             self.memory.open.clear();

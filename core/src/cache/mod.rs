@@ -41,6 +41,7 @@ mod guide;
 mod index;
 mod kind;
 mod lookup;
+mod presets;
 mod radius;
 mod record;
 mod set_bytes;

@@ -4,10 +4,10 @@ use glam::{Vec2, Vec3};
 
 use crate::host::Scene;
 use crate::math::Ray;
-use crate::path::trace::leave;
 use crate::sampling::warp;
-use crate::single_scatter::{Sums, lattice, nearest_surface};
+use crate::single_scatter::{Sums, lattice};
 use crate::spectrum::{Gradient, Spectrum};
+use crate::world::{leave, nearest_surface};
 
 /// Bounds of radii (m), in the world.
 ///

@@ -111,7 +111,9 @@ impl fmt::Display for CachesError {
             Self::Checksum => f.write_str("is damaged: the checksum of its header is another"),
             Self::Parts => f.write_str("names caches that are not known, or one of them twice"),
             Self::Tag { found, due } => write!(f, "was made for something else (tag {found:016x}, not {due:016x})"),
-            Self::Absent { part, is_asked_for: true } => write!(f, "has no cache \"{}\", which is asked for", part.name()),
+            Self::Absent { part, is_asked_for: true } => {
+                write!(f, "has no cache \"{}\", which is asked for", part.name())
+            }
             Self::Absent { part, .. } => write!(f, "has a cache \"{}\", which is not asked for", part.name()),
             Self::Setting { part, what, found, due } => {
                 write!(f, "its cache \"{}\" was made with {what} {found}; {due} is asked for", part.name())
@@ -229,7 +231,12 @@ impl RadianceCaches<'_> {
     /// # Errors
     /// The first check that fails; of what was there some may be lost then.
     pub fn read(&mut self, bytes: &[u8], tag: u64) -> Result<(), CachesError> {
-        fn fill<E: Attachment>(cache: &mut Cache<'_, E>, bytes: &[u8], tag: u64, part: Kind) -> Result<(), CachesError> {
+        fn fill<E: Attachment>(
+            cache: &mut Cache<'_, E>,
+            bytes: &[u8],
+            tag: u64,
+            part: Kind,
+        ) -> Result<(), CachesError> {
             bytes::read_into(bytes, tag, cache).map_err(|problem| CachesError::Part { part, problem })
         }
         let (rows, views) = rows(bytes, tag)?;

@@ -16,9 +16,9 @@ use super::metrics::{Voxel, divergence};
 use super::occluders::Occluders;
 use crate::host::{Hit, Medium, Scene};
 use crate::math::{Ray, Symmetric3, float};
-use crate::path::World;
 use crate::photon::Event;
 use crate::surface::Surface;
+use crate::world::World;
 
 /// What frequency photons fly through and where they leave what they carry.
 #[derive(Debug)]

@@ -11,11 +11,12 @@ use crate::phase::{Phase, deflection};
 use crate::sampling::discrete::choose;
 use crate::sampling::distance::Equiangular;
 use crate::sampling::{Generator, uniform, uniform2, warp};
-use crate::single_scatter::{Arrival, Contribution, nearest_surface, shadow_ray};
+use crate::single_scatter::{Arrival, Contribution};
 use crate::spectrum::{Gradient, Spectrum};
 use crate::transmittance::thickness::{
     Marching, Steps, optical_thickness_with_gradients, transmittance_with_gradients, until_the_end,
 };
+use crate::world::{nearest_surface, shadow_ray};
 
 /// Beyond this many distances to the light an endless segment is not sampled equiangularly: 10⁻⁴ of
 /// the angle lies there, and `tan` loses its digits.

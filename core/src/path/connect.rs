@@ -2,7 +2,6 @@
 
 use glam::{Vec2, Vec3};
 
-use super::World;
 use crate::host::{Medium, Scene};
 use crate::light::{Falloff, Incident, Light, LightSample, Source};
 use crate::math::Ray;
@@ -11,9 +10,7 @@ use crate::sampling::distance::Equiangular;
 use crate::sampling::{Generator, discrete, mis};
 use crate::spectrum::Spectrum;
 use crate::transmittance::{Flight, transmittance};
-
-/// A shadow ray ends this share of its length before the light's own surface.
-const SHADOW_MARGIN: f32 = 1e-4;
+use crate::world::{World, short_of_end};
 
 /// How important a light is for next-event estimation at `point`. In the medium, a light's near
 /// field is left to [`along`].
@@ -90,8 +87,7 @@ pub(super) fn reach<M: Medium + ?Sized, S: Scene + ?Sized>(
     way: &Ray,
     rng: &mut Generator,
 ) -> Spectrum {
-    let shadow = way.with_length(way.length * (1.0 - SHADOW_MARGIN));
-    if world.scene.is_blocked(&shadow) { Spectrum::ZERO } else { transmittance(world.medium, way, rng) }
+    if world.scene.is_blocked(&short_of_end(way)) { Spectrum::ZERO } else { transmittance(world.medium, way, rng) }
 }
 
 /// Next-event estimation: `value(to_light)` gives the scattering function (with the cosine, at a

@@ -2,12 +2,13 @@
 
 use glam::{Vec2, Vec3};
 
-use super::{InScattered, Settings, World, connect, trace};
+use super::{InScattered, Settings, connect, trace};
 use crate::host::{Medium, Rng, Scene};
 use crate::math::Ray;
 use crate::phase::{Phase, deflection};
 use crate::sampling::{Generator, uniform, uniform2};
 use crate::spectrum::Spectrum;
+use crate::world::World;
 
 /// Up to this number every light is connected to. More: choosing one at random would be cheaper, but which was chosen
 /// is the most part of the noise.
@@ -55,8 +56,8 @@ fn connected<M: Medium + ?Sized, S: Scene + ?Sized>(
 /// connection's `1/r²` has no bound. Light that a glowing medium sends here straight is left out.
 ///
 /// ```
-/// # use fogbow::{host::Empty, light::{Light, PointLight}, math::*, path::{self, Settings, World}};
-/// # use fogbow::{phase::Phase, sampling::Generator, spectrum::Spectrum};
+/// # use fogbow::{host::Empty, light::{Light, PointLight}, math::*, path::{self, Settings}};
+/// # use fogbow::{phase::Phase, sampling::Generator, spectrum::Spectrum, world::World};
 /// let lamp = [Light::Point(PointLight::new(Vec3::X * 2.0, Spectrum::ONE)?)];
 /// let world = World { medium: &Empty, scene: &Empty, lights: &lamp };
 /// let one = Settings { max_scatterings: 1, ..Settings::default() };

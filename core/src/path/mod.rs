@@ -2,7 +2,7 @@
 //!
 //! | file | holds |
 //! |---|---|
-//! | `mod` | [`World`], [`Settings`], [`Radiance`] by component |
+//! | `mod` | [`Settings`], [`Radiance`] by component |
 //! | [`trace`](mod@trace) | [`radiance`]: the walk |
 //! | `in_scatter` | [`in_scattered`]: light scattered towards the eye at one point |
 //! | `connect` | next-event estimation, equiangular connections, their MIS weights |
@@ -28,26 +28,7 @@ pub(crate) use in_scatter::direct;
 pub use in_scatter::in_scattered;
 pub use trace::{Delegate, radiance, radiance_beyond};
 
-use crate::light::Light;
 use crate::spectrum::Spectrum;
-
-/// What a path travels through.
-#[derive(Debug)]
-pub struct World<'a, M: ?Sized, S: ?Sized> {
-    /// The medium; [`Empty`](crate::host::Empty) for none.
-    pub medium: &'a M,
-    /// The surfaces; [`Empty`](crate::host::Empty) for none.
-    pub scene: &'a S,
-    /// The lights; [`Hit::light`](crate::host::Hit::light) counts in this order.
-    pub lights: &'a [Light<'a>],
-}
-
-impl<M: ?Sized, S: ?Sized> Clone for World<'_, M, S> {
-    fn clone(&self) -> Self {
-        *self
-    }
-}
-impl<M: ?Sized, S: ?Sized> Copy for World<'_, M, S> {}
 
 /// How long paths may grow.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use super::{InScattered, Radiance, Settings, World, connect};
+use super::{InScattered, Radiance, Settings, connect};
 use crate::host::{Hit, Medium, Rng, Scene};
 use crate::math::Ray;
 use crate::phase::deflection;
@@ -10,20 +10,11 @@ use crate::sampling::{Generator, mis, uniform, uniform2};
 use crate::spectrum::Spectrum;
 use crate::surface::Surface;
 use crate::transmittance::{Flight, flight, transmittance};
-
-/// Rays leave a surface this far above it, relative to the size of the coordinates: 64 roundings.
-const OFFSET: f32 = 64.0 * f32::EPSILON;
+use crate::world::{World, leave};
 
 /// A path longer than this ends, whatever the settings say: a guard against worlds without
 /// absorption, where roulette may never come up.
 const MAX_SEGMENTS: u32 = 100_000;
-
-/// `point` moved off its surface to the side of `direction`.
-#[inline]
-pub(crate) fn leave(point: Vec3, normal: Vec3, direction: Vec3, distance: f32) -> Vec3 {
-    let size = point.abs().max_element().max(distance) * OFFSET;
-    point + normal * size.copysign(normal.dot(direction))
-}
 
 /// The last scattering event, as far as weights of what the path hits next depend on it.
 #[derive(Clone, Copy)]
@@ -82,7 +73,7 @@ impl Path {
 ///
 /// ```
 /// # use fogbow::{host::Empty, light::Light, math::*, medium::Homogeneous, phase::Lobe};
-/// # use fogbow::{path::{self, Settings, World}, sampling::Generator, spectrum::Spectrum};
+/// # use fogbow::{path::{self, Settings}, sampling::Generator, spectrum::Spectrum, world::World};
 /// // Fog that glows and absorbs: from within, everything looks like ε/σₐ.
 /// let fog = Homogeneous::new(Spectrum::splat(2.0), Spectrum::ZERO, Lobe::Isotropic)?
 ///     .with_emission(Spectrum::splat(6.0))?;
@@ -142,7 +133,7 @@ impl<F: FnMut(&Ray, u32, &mut Generator) -> InScattered> Delegate for F {
 ///
 /// ```
 /// # use fogbow::{host::Empty, math::*, medium::Homogeneous, phase::Lobe, spectrum::Spectrum};
-/// # use fogbow::{path::{self, InScattered, Settings, World}, sampling::Generator};
+/// # use fogbow::{path::{self, InScattered, Settings}, sampling::Generator, world::World};
 /// let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::ONE, Lobe::Isotropic)?;
 /// let world = World { medium: &fog, scene: &Empty, lights: &[] };
 /// let ray = Ray::new(Vec3::ZERO, Vec3::Z);

@@ -3,12 +3,12 @@
 use super::Event;
 use crate::host::{Hit, Medium, Rng, Scene};
 use crate::math::{Bounds, Ray};
-use crate::path::trace::leave;
-use crate::path::{Settings, World};
+use crate::path::Settings;
 use crate::sampling::{Generator, discrete, uniform, uniform2};
 use crate::spectrum::Spectrum;
 use crate::surface::{Surface, SurfaceSample};
 use crate::transmittance::flight;
+use crate::world::{World, leave};
 
 /// A walk longer than this ends: a guard against worlds that absorb nothing.
 const MAX_SEGMENTS: u32 = 100_000;
@@ -42,7 +42,7 @@ const MAX_SURVIVAL: f32 = 0.99;
 ///
 /// ```
 /// # use fogbow::{host::Empty, light::{Light, PointLight}, math::*, medium::Homogeneous, phase::Lobe};
-/// # use fogbow::{path::{Settings, World}, photon::{self, Event}, sampling::Generator, spectrum::Spectrum};
+/// # use fogbow::{path::Settings, photon::{self, Event}, sampling::Generator, spectrum::Spectrum, world::World};
 /// // A lamp in fog that absorbs: of its power, all is absorbed, after 1/σₐ on average.
 /// let fog = Homogeneous::new(Spectrum::splat(2.0), Spectrum::ZERO, Lobe::Isotropic)?;
 /// let lamps = [Light::Point(PointLight::from_flux(Vec3::ZERO, Spectrum::ONE)?)];

@@ -22,7 +22,6 @@ mod sums;
 pub use arrival::{Arrival, Contribution, connect, moments};
 pub(crate) use sample::lattice;
 pub use sample::{
-    Directional, nearest_surface, sample, sample_directional, sample_surfaces, sample_surfaces_directional, shadow_ray,
-    visit_lights, visit_surfaces,
+    Directional, sample, sample_directional, sample_surfaces, sample_surfaces_directional, visit_lights, visit_surfaces,
 };
 pub use sums::Sums;

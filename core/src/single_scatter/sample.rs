@@ -4,22 +4,15 @@ use glam::{Vec2, Vec3};
 
 use super::{Arrival, Sums};
 use crate::host::{Hit, Medium, Rng, Scene};
-use crate::light::{Falloff, Light, Source};
+use crate::light::{Light, Source};
 use crate::math::Ray;
 use crate::phase::Phase;
 use crate::sampling::uniform::ONE_MINUS_EPSILON;
 use crate::sampling::{uniform, uniform2, warp};
 use crate::sh::Coefficient;
 use crate::spectrum::Spectrum;
-use crate::surface::Surface;
 use crate::transmittance::thickness::{Marching, Steps};
-
-/// Shadow rays end this share of their length before the light, so that its own surface casts no
-/// shadow; smaller than this, rounding in the host's intersection tests shows.
-const SHORTENED: f32 = 1.0 - 1e-4;
-
-/// Null interfaces passed by one ray; a handful of nested ones is a lot.
-const MAX_INTERFACES: usize = 64;
+use crate::world::{nearest_surface, shadow_ray};
 
 /// Where an expansion goes: Legendre moments of the phase function, and the caller's coefficients.
 #[derive(Debug)]
@@ -28,40 +21,6 @@ pub struct Directional<'a> {
     pub moments: &'a [Spectrum],
     /// `(L + 1)²` coefficients, to which the estimate is added.
     pub coefficients: &'a mut [Coefficient],
-}
-
-/// The ray that asks whether `source` is hidden from `point`.
-///
-/// ```
-/// # use fogbow::{light::PointLight, math::Vec3, single_scatter::shadow_ray, spectrum::Spectrum};
-/// let lamp = PointLight::new(Vec3::X * 2.0, Spectrum::ONE).unwrap().source();
-/// let ray = shadow_ray(Vec3::ZERO, &lamp);
-/// assert!(ray.length < 2.0 && ray.length > 1.999);   // not into the lamp's own housing
-/// ```
-#[inline]
-#[must_use]
-pub fn shadow_ray(point: Vec3, source: &Source) -> Ray {
-    if source.falloff == Falloff::Distant {
-        return Ray { origin: point, direction: -source.normal, length: f32::INFINITY };
-    }
-    let ray = Ray::between(point, source.position);
-    ray.with_length(ray.length * SHORTENED)
-}
-
-/// The nearest surface along `ray` that is no null interface, at its distance from the ray's origin.
-#[must_use]
-pub fn nearest_surface(ray: &Ray, scene: &(impl Scene + ?Sized)) -> Option<Hit> {
-    let mut passed = 0.0;
-    for _ in 0..MAX_INTERFACES {
-        let rest = Ray { origin: ray.at(passed), direction: ray.direction, length: ray.length - passed };
-        let hit = scene.closest_hit(&rest)?;
-        let distance = passed + hit.distance;
-        if hit.surface != Surface::Null {
-            return Some(Hit { distance, ..hit });
-        }
-        passed = distance + 1e-4 * hit.distance.max(1e-3);
-    }
-    None
 }
 
 /// A point of the lattice `(j/n, jφ)`, shifted: each is uniform by itself, together they are even.

@@ -4,12 +4,11 @@ use super::bound::Bound;
 use super::scatterer::{Receiver, Scatterer};
 use crate::host::{Medium, Scene};
 use crate::math::{Ray, float};
-use crate::path::World;
 use crate::sampling::distance::truncated_exponential;
 use crate::sampling::{Generator, uniform, uniform2};
-use crate::single_scatter::nearest_surface;
 use crate::spectrum::Spectrum;
 use crate::transmittance::{flight, transmittance};
+use crate::world::{World, nearest_surface};
 
 /// Probability, at least, that a vertex drawn within the ball is looked at. Larger: more vertices that hardly count. Smaller:
 /// surfaces make outliers.

@@ -6,10 +6,11 @@ use super::scatterer::Receiver;
 use crate::host::{Hit, Medium, Rng, Scene};
 use crate::march::scattering_points;
 use crate::math::{Ray, float};
-use crate::path::{self, Delegate, InScattered, Radiance, World};
+use crate::path::{self, Delegate, InScattered, Radiance};
 use crate::sampling::{Generator, uniform};
 use crate::spectrum::Spectrum;
 use crate::transmittance::thickness::{Marching, optical_thickness};
+use crate::world::{World, short_of_end};
 
 /// Points on a segment of an eye ray that are held at once, 40 KB of stack; lights beyond half as many get points of
 /// their own, by another march along the segment.
@@ -167,7 +168,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Eye<'_, M, S> {
     fn single(&self, segment: &Ray, rng: &mut Generator) -> Spectrum {
         let once = path::Settings { max_scatterings: 1, lights_visible: false, ..self.settings.paths };
         // It ends before the surface.
-        let way = segment.with_length(segment.length * (1.0 - 1e-4));
+        let way = short_of_end(segment);
         let count = self.settings.single.max(1);
         let sum: Spectrum =
             (0..count).map(|_| path::radiance(&way, &self.gatherer.world, &once, rng).medium_single).sum();

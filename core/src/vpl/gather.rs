@@ -6,12 +6,11 @@ use super::light::VirtualLight;
 use super::scatterer::{Receiver, Scatterer};
 use crate::host::{Medium, Scene};
 use crate::math::{Ray, float};
-use crate::path::trace::leave;
-use crate::path::{self, World};
+use crate::path;
 use crate::sampling::{Generator, uniform, uniform2};
-use crate::single_scatter::nearest_surface;
 use crate::spectrum::Spectrum;
 use crate::transmittance::transmittance;
+use crate::world::{World, leave, nearest_surface};
 
 /// Steps of compensation that are told apart; what later ones add goes to the last.
 pub const LEVELS: usize = 4;

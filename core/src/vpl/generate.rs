@@ -3,8 +3,9 @@
 use super::light::VirtualLight;
 use crate::host::{Medium, Rng, Scene};
 use crate::math::Bounds;
-use crate::path::{Settings, World};
+use crate::path::Settings;
 use crate::photon::{self, Event};
+use crate::world::World;
 
 /// Sends one path from the lights and keeps a virtual light wherever it is scattered, in the medium or on a
 /// surface that is neither mirror nor glass.
@@ -15,8 +16,8 @@ use crate::photon::{self, Event};
 /// lights: an animation that keeps them from frame to frame flickers less (Engelhardt et al. 2012, § 7).
 ///
 /// ```
-/// # use fogbow::{host::Empty, light::{Light, PointLight}, math::*, medium::Homogeneous, path::{Settings, World}};
-/// # use fogbow::{phase::Phase, sampling::Generator, spectrum::Spectrum, vpl};
+/// # use fogbow::{host::Empty, light::{Light, PointLight}, math::*, medium::Homogeneous, path::Settings};
+/// # use fogbow::{phase::Phase, sampling::Generator, spectrum::Spectrum, vpl, world::World};
 /// let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::ONE, Phase::ISOTROPIC)?;
 /// let lamps = [Light::Point(PointLight::from_flux(Vec3::ZERO, Spectrum::ONE)?)];
 /// let world = World { medium: &fog, scene: &Empty, lights: &lamps };

@@ -9,9 +9,7 @@ use crate::math::Ray;
 use crate::phase::{Lobe, MAX_LOBES, Phase};
 use crate::spectrum::Spectrum;
 use crate::surface::Surface;
-
-/// Shadow rays end this share of their length before the virtual light's own surface.
-const MARGIN: f32 = 1e-4;
+use crate::world::short_of_end;
 
 /// What a virtual light may be: [`VirtualLight::kind`].
 mod kind {
@@ -219,6 +217,6 @@ impl Connection {
     #[inline]
     #[must_use]
     pub fn shadow_ray(&self) -> Ray {
-        self.way.with_length(self.way.length * (1.0 - MARGIN))
+        short_of_end(&self.way)
     }
 }

@@ -6,6 +6,7 @@ use crate::host::{Hit, Properties};
 use crate::phase::{Phase, deflection};
 use crate::spectrum::Spectrum;
 use crate::surface::Surface;
+use crate::world::leave;
 
 /// What scatters light at a point: `f̂` of Engelhardt et al. 2012, with its cosine `D`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -114,6 +115,6 @@ impl Receiver {
 pub(super) fn origin(point: Vec3, scatterer: &Scatterer, direction: Vec3) -> Vec3 {
     match scatterer {
         Scatterer::Medium { .. } => point,
-        Scatterer::Surface { normal, .. } => crate::path::trace::leave(point, *normal, direction, 0.0),
+        Scatterer::Surface { normal, .. } => leave(point, *normal, direction, 0.0),
     }
 }

@@ -108,7 +108,7 @@ impl WithMedium for GridJob<'_> {
                 _ => error.to_string(),
             })?
         } else {
-            let world = path::World { medium, scene: self.world, lights: self.lights };
+            let world = fogbow::world::World { medium, scene: self.world, lights: self.lights };
             let settings = Settings {
                 paths: arguments.grid_paths.unwrap_or(self.usual_paths),
                 edge: arguments.grid_cells,

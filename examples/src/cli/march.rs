@@ -3,9 +3,10 @@
 use fogbow::host::Medium;
 use fogbow::march;
 use fogbow::math::Ray;
-use fogbow::path::{self, InScattered, World as PathWorld};
+use fogbow::path::{self, InScattered};
 use fogbow::sampling::{Generator, uniform};
 use fogbow::spectrum::Spectrum;
+use fogbow::world::World as LitWorld;
 use fogbow_std::film::Film;
 use fogbow_std::stats::{CountingMedium, CountingScene};
 use fogbow_std::tiles::{self, Outcome};
@@ -33,7 +34,7 @@ impl WithMedium for MarchJob<'_> {
         let (width, height) = (self.film.width(), self.film.height());
         let stride = self.arguments.stride(shot.world.bounds().size().length(), shot.grid);
         let outcome = tiles::render(self.film, shot.settings, shot.control, |sample, rng, layers| {
-            let world = PathWorld {
+            let world = LitWorld {
                 medium: &CountingMedium { medium, tally: sample.tally },
                 scene: &CountingScene { scene: shot.world, tally: sample.tally },
                 lights: shot.lights,

@@ -7,7 +7,6 @@ use fogbow::beams::kernel;
 use fogbow::covariance::Radii;
 use fogbow::host::Medium;
 use fogbow::math::Vec3;
-use fogbow::path;
 use fogbow_std::film::Film;
 use fogbow_std::photon_beams::{self, Settings, View};
 use fogbow_std::tiles::Outcome;
@@ -87,7 +86,7 @@ impl WithMedium for BeamJob<'_> {
         let shot = self.shot;
         let (width, height) = (self.film.width(), self.film.height());
         let view = View {
-            world: path::World { medium, scene: shot.world, lights: shot.lights },
+            world: fogbow::world::World { medium, scene: shot.world, lights: shot.lights },
             bounds: shot.world.bounds(),
             paths: shot.paths,
         };

@@ -4,17 +4,13 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use fogbow::bytes::Crc;
-use fogbow::cache::{
-    self, Asked, CachesError, Effort, Extrapolation, EyeSettings, Limits, RadianceCaches, Seen,
-};
+use fogbow::cache::{self, Asked, CachesError, Extrapolation, EyeSettings, RadianceCaches, Seen};
 use fogbow::host::Medium;
 use fogbow::light::Light;
 use fogbow::math::{Ray, Vec2};
-use fogbow::multiple_scatter::{self, Lengths};
-use fogbow::path::{self, World as PathWorld};
-use fogbow::phase::Phase;
+use fogbow::path;
 use fogbow::sampling::uniform2;
-use fogbow::transmittance::thickness::Steps;
+use fogbow::world::{Outline, World as LitWorld};
 use fogbow_std::film::Film;
 use fogbow_std::image_sampling::Plan;
 use fogbow_std::progress::Control;
@@ -136,6 +132,17 @@ pub enum Kind {
     Irradiance,
 }
 
+impl From<Kind> for cache::Kind {
+    fn from(kind: Kind) -> Self {
+        match kind {
+            Kind::Single => Self::Single,
+            Kind::Surface => Self::Surface,
+            Kind::Multiple => Self::Multiple,
+            Kind::Irradiance => Self::Irradiance,
+        }
+    }
+}
+
 /// What becomes of single scattering.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum Single {
@@ -165,18 +172,6 @@ pub(super) fn check_depth(paths: &path::Settings) -> Result<(), String> {
         )),
     }
 }
-
-/// Random walks per record of multiple scattering, unless the user says otherwise.
-const PATHS: u32 = 2048;
-
-/// Samples of all lights with extent together, for a record of single scattering.
-const LIGHT_SAMPLES: u32 = 128;
-
-/// Changes of light below this share of the scene's size are noise.
-const FINEST: f32 = 0.01;
-
-/// Number of lights from which on single scattering is cached.
-const MANY_LIGHTS: usize = 12;
 
 /// A render by radiance caching, to be done with a medium of any type.
 pub(super) struct CacheJob<'a> {
@@ -208,97 +203,56 @@ pub(super) struct Cached {
 }
 
 impl CacheJob<'_> {
-    fn settings(&self, phase: &Phase, resolution: f32) -> cache::Settings {
-        let size = self.world.bounds().size().max_element();
+    /// What suits the world, with what the user says otherwise.
+    fn settings(&self, outline: &Outline) -> cache::Settings {
         let arguments = self.arguments;
-        let scale = f64::from(arguments.paths.unwrap_or(PATHS)) / 1024.0;
-        let effort = |kind: Kind, tolerance: f64, samples: f64, degree: usize, most: f32| {
-            let named = arguments.tolerance_of.iter().rev().find(|(k, _)| *k == kind).map(|(_, e)| *e);
-            let effort = Effort {
-                tolerance: named.or(arguments.tolerance).unwrap_or(tolerance) as f32,
-                samples: ((samples * scale) as u32).max(1),
-                degree: arguments.degree.map_or(degree, |d| d as usize),
-                limits: Limits { min: 1e-3 * size, max: most * size },
-                // Farther, and dark corners turn out too bright; nearer, and records cost more than they mend.
-                clearance: match kind {
-                    Kind::Irradiance => 0.3,
-                    Kind::Surface => 1.0,
-                    Kind::Single | Kind::Multiple => f32::INFINITY,
-                },
-            };
-            (!arguments.uncached.contains(&kind) && self.paths.max_scatterings > 1).then_some(effort)
+        let preset = cache::Settings::for_outline(outline).for_pixels(self.film.width() * self.film.height());
+        let mut settings = match arguments.single {
+            Single::Auto => preset,
+            Single::Direct => preset.with_single_cached(outline, false),
+            Single::Cached => preset.with_single_cached(outline, true),
         };
-        let degree = |power: i32, damping: f32| degree_for(phase, power, damping);
-        let cached = match arguments.single {
-            Single::Auto => self.lights.len() >= MANY_LIGHTS,
-            Single::Direct => false,
-            Single::Cached => true,
-        };
-        // Expansions change faster than the mean over directions, from which radii come. Above 0.8 light that falls off
-        // like 1/r is carried too far: fog around a lamp turns out too dark.
-        let breadth = (1.0 - f64::from(phase.mean_cosine().map(f32::abs).max_element())).clamp(0.1, 0.8);
+        if let Some(walks) = arguments.paths {
+            settings = settings.with_walks(walks);
+        }
+        for kind in Kind::value_variants() {
+            let Some(effort) = settings.effort_mut((*kind).into()) else { continue };
+            let named = arguments.tolerance_of.iter().rev().find(|(k, _)| k == kind).map(|(_, e)| *e);
+            if let Some(tolerance) = named.or(arguments.tolerance) {
+                effort.tolerance = tolerance as f32;
+            }
+            if let Some(degree) = arguments.degree {
+                effort.degree = degree as usize;
+            }
+        }
+        let scatters_on = self.paths.max_scatterings > 1;
+        let kept = |kind: Kind| scatters_on && !arguments.uncached.contains(&kind);
         cache::Settings {
-            single: if cached { effort(Kind::Single, 0.2, 16.0, degree(1, 0.0), 0.1) } else { None },
-            surface: effort(Kind::Surface, 2.0, 256.0, degree(1, 1.5), 0.06),
-            multiple: effort(Kind::Multiple, breadth, 1024.0, degree(2, 0.0), (breadth as f32 / 8.0).max(0.05)),
-            irradiance: effort(Kind::Irradiance, 0.35, 512.0, 0, 0.1),
-            // Small things are seen in large pictures; places take memory.
-            rays: (self.film.width() * self.film.height() / 4).clamp(16384, 131_072),
-            extrapolation: arguments.extrapolation.map_or_else(Extrapolation::default, Into::into),
-            eye: EyeSettings {
-                lights_visible: self.paths.lights_visible,
-                indirect: self.paths.max_scatterings > 1,
-                ..EyeSettings::default()
-            },
-            walk: multiple_scatter::Settings {
-                one_light: self.lights.len() > 1,
-                lengths: Lengths::Marched,
-                ..multiple_scatter::Settings::new(Steps::Length(3.0 * resolution))
-            },
+            single: settings.single.filter(|_| kept(Kind::Single)),
+            surface: settings.surface.filter(|_| kept(Kind::Surface)),
+            multiple: settings.multiple.filter(|_| kept(Kind::Multiple)),
+            irradiance: settings.irradiance.filter(|_| kept(Kind::Irradiance)),
+            extrapolation: arguments.extrapolation.map_or(settings.extrapolation, Into::into),
+            eye: EyeSettings { lights_visible: self.paths.lights_visible, indirect: scatters_on, ..settings.eye },
             paths: self.paths,
-            light_samples: (LIGHT_SAMPLES / self.lights.len().max(1) as u32).clamp(1, 16),
-            finest: FINEST * size,
             seed: self.settings.seed,
-            ..cache::Settings::default()
+            ..settings
         }
     }
-}
-
-/// The least degree beyond which an expansion holds less than a sixtieth of the phase function, applied
-/// `power` times, to light whose own expansion falls off like `1/(l + 1)^damping`.
-fn degree_for(phase: &Phase, power: i32, damping: f32) -> usize {
-    let energy = |l: usize| {
-        let moment = phase.moment(l).max_element().abs().powi(power) / (l as f32 + 1.0).powf(damping);
-        (2 * l + 1) as f32 * moment * moment
-    };
-    let total: f32 = (0..=fogbow::sh::MAX_DEGREE).map(energy).sum();
-    let mut rest = total;
-    for l in 0..=fogbow::sh::MAX_DEGREE {
-        rest -= energy(l);
-        if rest <= 2.5e-4 * total {
-            return l;
-        }
-    }
-    fogbow::sh::MAX_DEGREE
 }
 
 impl WithMedium for CacheJob<'_> {
     type Output = Result<Cached, Failure>;
 
     fn with<M: Medium + Sync>(self, medium: &M) -> Self::Output {
-        let phases = self.world.media().phases();
-        let sharpest = phases.iter().copied().max_by(|a, b| {
-            let mean = |p: &Phase| p.moment(1).max_element().abs();
-            mean(a).total_cmp(&mean(b))
-        });
-        let settings = self.settings(&sharpest.unwrap_or(Phase::ISOTROPIC), medium.resolution());
+        let world = LitWorld { medium, scene: self.world, lights: self.lights };
+        let settings = self.settings(&self.world.outline(&world));
         let (width, height) = (self.film.width() as f32, self.film.height() as f32);
         let ray = |at: [f32; 2]| -> Ray { self.camera.ray(Vec2::from(at)) };
         let apart = ray([0.5, 0.5]).direction.angle_between(ray([0.5 + 1.0 / width, 0.5]).direction);
         let clock = Stopwatch::start();
         let caches = self.arguments.load(settings, self.tag)?;
         let loaded = clock.elapsed();
-        let world = PathWorld { medium, scene: self.world, lights: self.lights };
         let mut filling = caches.fill(Asked::View { ray, pixel: apart });
         let pool = Threads::new(self.settings.threads)?;
         let filled = threads::run(&mut filling, &world, &pool, self.control, None, |_| {}).stages;
@@ -311,7 +265,7 @@ impl WithMedium for CacheJob<'_> {
         let files = [loaded, clock.elapsed()];
         let has_layers = self.film.layers().len() > 1;
         let render = tiles::render(self.film, self.settings, self.control, |sample, rng, layers| {
-            let world = PathWorld {
+            let world = LitWorld {
                 medium: &CountingMedium { medium, tally: sample.tally },
                 scene: &CountingScene { scene: self.world, tally: sample.tally },
                 lights: self.lights,

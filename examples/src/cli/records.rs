@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use fogbow::cache::{self, RadianceCaches, Record};
+use fogbow::cache::{RadianceCaches, Record};
 use fogbow::host::Scene;
 use fogbow::math::{Ray, Vec2, Vec3};
 use fogbow::spectrum::Spectrum;
@@ -145,12 +145,7 @@ struct Shown<'a> {
 }
 
 fn records<'a>(caches: &'a RadianceCaches<'_>, kind: Kind) -> &'a [Record] {
-    caches.records(match kind {
-        Kind::Single => cache::Kind::Single,
-        Kind::Surface => cache::Kind::Surface,
-        Kind::Multiple => cache::Kind::Multiple,
-        Kind::Irradiance => cache::Kind::Irradiance,
-    })
+    caches.records(kind.into())
 }
 
 /// The picture, darkened, with a disc for every record that no surface hides.

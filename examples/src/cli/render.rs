@@ -10,10 +10,11 @@ use fogbow::covariance::Grid;
 use fogbow::host::Medium;
 use fogbow::light::Light;
 use fogbow::math::{Ray, Vec2};
-use fogbow::path::{self, InScattered, Radiance, World as PathWorld};
+use fogbow::path::{self, InScattered, Radiance};
 use fogbow::sampling::{Generator, uniform2};
 use fogbow::spectrum::Spectrum;
 use fogbow::vpl::VirtualLight;
+use fogbow::world::World as LitWorld;
 use fogbow_std::covariance::{CovarianceGrid, FillError};
 use fogbow_std::film::Film;
 use fogbow_std::image::write_film;
@@ -477,7 +478,7 @@ impl WithMedium for Job<'_> {
         let shot = self.shot;
         let (width, height) = (self.film.width(), self.film.height());
         tiles::render(self.film, shot.settings, shot.control, |sample, rng, layers| {
-            let world = PathWorld {
+            let world = LitWorld {
                 medium: &CountingMedium { medium, tally: sample.tally },
                 scene: &CountingScene { scene: shot.world, tally: sample.tally },
                 lights: shot.lights,

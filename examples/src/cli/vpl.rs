@@ -6,7 +6,6 @@ use core::str::FromStr;
 use clap::{Args, ValueEnum};
 use fogbow::host::Medium;
 use fogbow::math::Bounds;
-use fogbow::path;
 use fogbow::spectrum::Spectrum;
 use fogbow::vpl::{self, Bound, Compensation, LEVELS, Seen};
 use fogbow_std::film::Film;
@@ -196,8 +195,11 @@ impl WithMedium for VplJob<'_> {
             has_mirrors: shot.world.has_mirrors(),
             ..usual
         };
-        let view =
-            View { world: path::World { medium, scene: shot.world, lights: shot.lights }, bounds, paths: shot.paths };
+        let view = View {
+            world: fogbow::world::World { medium, scene: shot.world, lights: shot.lights },
+            bounds,
+            paths: shot.paths,
+        };
         let outcome = virtual_lights::render(
             self.film,
             shot.settings,

@@ -18,10 +18,11 @@ use fogbow::host::Empty;
 use fogbow::light::{Light, PhongLight, PointLight};
 use fogbow::math::{Bounds, Vec3};
 use fogbow::medium::Homogeneous;
-use fogbow::path::{Settings, World};
+use fogbow::path::Settings;
 use fogbow::phase::Lobe;
 use fogbow::photon;
 use fogbow::spectrum::Spectrum;
+use fogbow::world::World;
 use fogbow_std::seed::independent;
 
 use super::plot::{BLUE, GREEN, Line, ORANGE, Plot};

@@ -6,10 +6,11 @@ use fogbow::host::Medium;
 use fogbow::light::Light;
 use fogbow::math::Vec2;
 use fogbow::medium::Pyramid;
-use fogbow::path::{self, World as PathWorld};
+use fogbow::path;
 use fogbow::sampling::uniform2;
 use fogbow::spectrum::Spectrum;
 use fogbow::vpl::{self, Bound, Compensation, EyeSettings, Flights, Gatherer};
+use fogbow::world::World as LitWorld;
 use fogbow_std::film::{Film, Image};
 use fogbow_std::photon_beams::View;
 use fogbow_std::progress::Control;
@@ -64,12 +65,12 @@ impl WithMedium for Job<'_> {
         let size = (bounds.size() * (2.0 / RADIUS)).to_array().map(|side| (side.ceil() as u32).clamp(1, 128));
         let mut means = vec![Spectrum::ZERO; Pyramid::<()>::cell_count(size)];
         let medium = Pyramid::new(medium, bounds, size, &mut means).map_err(|e| e.to_string())?;
-        let lit = PathWorld { medium: &medium, scene: self.world, lights: self.lamps };
+        let lit = LitWorld { medium: &medium, scene: self.world, lights: self.lamps };
         let view = View { world: lit, bounds, paths };
         let count = virtual_lights::paths_for(&view, self.wanted, self.run);
         let lights = virtual_lights::lights(&view, &Settings::new(bound), count, &[], 0, self.run);
         // The lamps are off: what comes straight from them is the same for all strategies.
-        let world = PathWorld { lights: &[], ..view.world };
+        let world = LitWorld { lights: &[], ..view.world };
         let gatherer = Gatherer { world, bound, compensation: Some(self.compensation), has_mirrors: false };
         let eye = EyeSettings { single: 1, primary: 1, ..EyeSettings::new(paths) };
         let camera = self.world.camera_for(self.film.width(), self.film.height());

@@ -19,10 +19,12 @@ mod media;
 mod tests;
 mod triangles;
 
-use fogbow::host::{Hit, Scene};
+use fogbow::host::{Hit, Medium, Scene};
 use fogbow::light::Light;
 use fogbow::math::{Bounds, Ray, Symmetric3, Vec3};
+use fogbow::phase::Phase;
 use fogbow::surface::Surface;
+use fogbow::world::{Outline, World as LitWorld};
 
 pub use build::bounds_of;
 pub use lights::Storage;
@@ -155,6 +157,15 @@ impl<'a> World<'a> {
     pub fn has_mirrors(&self) -> bool {
         let sends_on = |surface| matches!(surface, Surface::Mirror { .. } | Surface::Dielectric { .. });
         self.materials.iter().any(|material| sends_on(material.surface))
+    }
+
+    /// What methods must know beforehand of this world with one of its media: seen, but for what the scene says outright.
+    #[must_use]
+    pub fn outline<M: Medium + ?Sized>(&self, world: &LitWorld<'_, M, Self>) -> Outline {
+        let sharpness = |phase: &Phase| phase.moment(1).max_element().abs();
+        let sharpest = self.media().phases().iter().copied().max_by(|a, b| sharpness(a).total_cmp(&sharpness(b)));
+        let seen = Outline::of(world, self.bounds);
+        Outline { phase: sharpest.unwrap_or(seen.phase), has_mirrors: self.has_mirrors(), ..seen }
     }
 
     /// How many flat pieces, spheres and boxes there are, and how many triangles.

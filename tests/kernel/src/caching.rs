@@ -8,12 +8,13 @@ use fogbow::host::Medium;
 use fogbow::light::Light;
 use fogbow::math::{Ray, Vec3};
 use fogbow::multiple_scatter;
-use fogbow::path::{self, World};
+use fogbow::path;
 use fogbow::sampling::Generator;
 use fogbow::sh::{Coefficient, coefficient_count};
 use fogbow::spectrum::Spectrum;
 use fogbow::storage::Full;
 use fogbow::transmittance::thickness::Steps;
+use fogbow::world::World;
 
 use crate::sections::{direction, point};
 use crate::walks::{Balls, with_lights};

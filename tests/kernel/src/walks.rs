@@ -4,10 +4,11 @@ use fogbow::host::{Hit, Scene};
 use fogbow::light::{Light, PointLight, QuadLight, SphereLight};
 use fogbow::math::{Ray, Vec3, float};
 use fogbow::medium::MediumError;
-use fogbow::path::{self, Settings, World};
+use fogbow::path::{self, Settings};
 use fogbow::sampling::Generator;
 use fogbow::spectrum::Spectrum;
 use fogbow::surface::Surface;
+use fogbow::world::World;
 
 use crate::sections::point;
 use crate::{Digest, media};

@@ -1,0 +1,178 @@
+//! Every tuned number of radiance caching, from an outline of the world.
+
+use super::kind::Kind;
+use super::radius::Limits;
+use super::settings::{Effort, LEAST_RAYS, MOST_RAYS, Settings};
+use crate::multiple_scatter::{self, Lengths};
+use crate::phase::Phase;
+use crate::sh;
+use crate::transmittance::thickness::Steps;
+use crate::world::Outline;
+
+/// Random walks of each of the two estimates of a record of multiple scattering. The error that noise leaves in a picture falls with the
+/// root of it, and time goes with it.
+pub(super) const WALKS: u32 = 2048;
+
+/// Directions of the other kinds, as a share of [`WALKS`]. Light of surfaces varies least from direction to direction; of single
+/// scattering only lights with extent need any.
+const SHARES: [(Kind, f64); 4] =
+    [(Kind::Single, 1.0 / 64.0), (Kind::Surface, 0.25), (Kind::Multiple, 1.0), (Kind::Irradiance, 0.5)];
+
+/// `ε` of Eq. 34 for single scattering, light of surfaces, and irradiance. Larger: borders of shadows blur, corners turn too
+/// bright. Smaller: records, and time, by the square.
+const TOLERANCES: [f32; 3] = [0.2, 2.0, 0.35];
+
+/// Bounds of the tolerance of multiple scattering, which is one less the absolute mean cosine of the phase function: expansions change faster than the
+/// mean over directions, from which radii come. Above the upper bound light that falls off like 1/r is carried too
+/// far, and fog around a lamp turns out too dark; below the lower one records are more than they mend.
+const BREADTH: [f64; 2] = [0.1, 0.8];
+
+/// Greatest radius as a share of the size of the bounds, for single scattering and irradiance, and for light of surfaces. Larger: light is carried round
+/// corners that no gradient knows; smaller: more records where nothing changes.
+const REACHES: [f32; 2] = [0.1, 0.06];
+
+/// The same for multiple scattering: a share of its tolerance, and at least.
+const MULTIPLE_REACH: [f32; 2] = [0.125, 0.05];
+
+/// Least radius as a share of the size of the bounds. Smaller: borders of shadows swallow records.
+const LEAST_REACH: f32 = 1e-3;
+
+/// Reach over the distance to the nearest other surface, of irradiance and of light of surfaces. Larger: dark
+/// corners turn out too bright. Smaller: records cost more than they mend.
+const CLEARANCES: [f32; 2] = [0.3, 1.0];
+
+/// Changes of light over less than this share of the size of the bounds are noise of single samples. Larger: light near walls and lamps
+/// is flattened; smaller: their noise makes radii tiny.
+const FINEST: f32 = 0.01;
+
+/// Lights from which on single scattering is cached rather than connected to. Fewer: sharp shadows blur for no gain in time; more: every
+/// point of an eye ray chooses among lights that it mostly does not see.
+const MANY_LIGHTS: usize = 12;
+
+/// Samples of all lights with extent together, for a record of single scattering, and the most of one.
+const LIGHT_SAMPLES: [u32; 2] = [128, 16];
+
+/// Steps of marching over the resolution of the medium. Longer: rays see less of what varies, and transmittance is slightly too bright; shorter: time.
+const STEP: f32 = 3.0;
+
+/// Share of the energy of an expansion that may be left out. Larger: scattering looks more even than it is; smaller: degrees that no eye sees.
+const LEFT_OUT: f32 = 2.5e-4;
+
+/// Light of surfaces has an expansion of its own that falls off like this power of the degree: directions to walls are no points.
+const SURFACE_FALL_OFF: f32 = 1.5;
+
+impl Settings {
+    /// What suits a world, at about 2 % of error where fog fills a room; seed 0. See the constants of this module for what each
+    /// number does, and change fields at will.
+    ///
+    /// ```
+    /// # use fogbow::{cache::Settings, host::Empty, light::{Light, PointLight}, math::{Bounds, Vec3}};
+    /// # use fogbow::{medium::Homogeneous, phase::Lobe, spectrum::Spectrum, world::{Outline, World}};
+    /// let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::ONE, Lobe::HenyeyGreenstein { g: 0.6 })?;
+    /// let lamps = [Light::Point(PointLight::new(Vec3::Z, Spectrum::ONE)?)];
+    /// let world = World { medium: &fog, scene: &Empty, lights: &lamps };
+    /// let bounds = Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE };
+    /// let settings = Settings::for_outline(&Outline::of(&world, bounds));
+    /// // One lamp is connected to; the sharper fog scatters, the finer are records of light scattered often.
+    /// assert!(settings.single.is_none());
+    /// assert!((settings.multiple.unwrap().tolerance - 0.4).abs() < 1e-6);
+    /// # Ok::<(), Box<dyn core::error::Error>>(())
+    /// ```
+    #[must_use]
+    pub fn for_outline(outline: &Outline) -> Self {
+        let size = outline.bounds.size().max_element();
+        let phase = &outline.phase;
+        let sharpness = f64::from(phase.mean_cosine().map(f32::abs).max_element());
+        let breadth = (1.0 - sharpness).clamp(BREADTH[0], BREADTH[1]) as f32;
+        let effort = |kind: Kind, tolerance: f32, degree: usize, most: f32, clearance: f32| Effort {
+            tolerance,
+            samples: samples(kind, WALKS),
+            degree,
+            limits: Limits { min: LEAST_REACH * size, max: most * size },
+            clearance,
+        };
+        let degree = |power: u32, fall_off: f32| degree_for(phase, power, fall_off);
+        let single = effort(Kind::Single, TOLERANCES[0], degree(1, 0.0), REACHES[0], f32::INFINITY);
+        let multiple_reach = (breadth * MULTIPLE_REACH[0]).max(MULTIPLE_REACH[1]);
+        Self {
+            single: (outline.lights.all >= MANY_LIGHTS).then_some(single),
+            surface: Some(effort(Kind::Surface, TOLERANCES[1], degree(1, SURFACE_FALL_OFF), REACHES[1], CLEARANCES[1])),
+            multiple: Some(effort(Kind::Multiple, breadth, degree(2, 0.0), multiple_reach, f32::INFINITY)),
+            irradiance: Some(effort(Kind::Irradiance, TOLERANCES[2], 0, REACHES[0], CLEARANCES[0])),
+            walk: multiple_scatter::Settings {
+                one_light: outline.lights.all > 1,
+                lengths: Lengths::Marched,
+                ..multiple_scatter::Settings::new(Steps::Length(STEP * outline.resolution))
+            },
+            light_samples: (LIGHT_SAMPLES[0] / outline.lights.all.max(1) as u32).clamp(1, LIGHT_SAMPLES[1]),
+            finest: FINEST * size,
+            ..Self::default()
+        }
+    }
+
+    /// Single scattering cached, or connected to (`false`), whatever the number of lights.
+    #[must_use]
+    pub fn with_single_cached(self, outline: &Outline, cached: bool) -> Self {
+        let lights = if cached { MANY_LIGHTS } else { 0 };
+        let outline = Outline { lights: crate::world::LightCounts { all: lights, ..outline.lights }, ..*outline };
+        Self { single: Self::for_outline(&outline).single, ..self }
+    }
+
+    /// With so many walks for each record of multiple scattering, and samples of the others in proportion.
+    #[must_use]
+    pub fn with_walks(mut self, walks: u32) -> Self {
+        for (kind, _) in SHARES {
+            if let Some(effort) = self.effort_mut(kind) {
+                effort.samples = samples(kind, walks);
+            }
+        }
+        self
+    }
+
+    /// With as many eye rays that look for places as a picture of so many pixels needs: a quarter, because small things are seen in large pictures.
+    ///
+    /// ```
+    /// # use fogbow::cache::Settings;
+    /// assert_eq!(Settings::default().for_pixels(640 * 480).rays, 76_800);
+    /// ```
+    #[must_use]
+    pub fn for_pixels(self, pixels: u32) -> Self {
+        Self { rays: (pixels / 4).clamp(LEAST_RAYS, MOST_RAYS), ..self }
+    }
+
+    /// The effort of a final kind, to be changed.
+    pub fn effort_mut(&mut self, kind: Kind) -> Option<&mut Effort> {
+        match kind {
+            Kind::Single => self.single.as_mut(),
+            Kind::Surface => self.surface.as_mut(),
+            Kind::Multiple => self.multiple.as_mut(),
+            Kind::Irradiance => self.irradiance.as_mut(),
+            Kind::CoarseMultiple | Kind::CoarseIrradiance => None,
+        }
+    }
+}
+
+/// Samples of a kind, for so many walks of multiple scattering.
+fn samples(kind: Kind, walks: u32) -> u32 {
+    let share = SHARES.iter().find(|(k, _)| *k == kind).map_or(1.0, |(_, share)| *share);
+    ((f64::from(walks) * share) as u32).max(1)
+}
+
+/// The least degree beyond which an expansion holds less than a sixtieth (in amplitude) of the phase function, applied
+/// `power` times, to light whose own expansion falls off like `1/(l + 1)^fall_off`.
+fn degree_for(phase: &Phase, power: u32, fall_off: f32) -> usize {
+    let energy = |l: usize| {
+        let once = phase.moment(l).max_element().abs();
+        let moment = (1..power).fold(once, |m, _| m * once) / libm::powf(l as f32 + 1.0, fall_off);
+        (2 * l + 1) as f32 * moment * moment
+    };
+    let total: f32 = (0..=sh::MAX_DEGREE).map(energy).sum();
+    let mut rest = total;
+    for l in 0..=sh::MAX_DEGREE {
+        rest -= energy(l);
+        if rest <= LEFT_OUT * total {
+            return l;
+        }
+    }
+    sh::MAX_DEGREE
+}

@@ -1,0 +1,48 @@
+//! Layer 4b: the world as light sees it.
+//!
+//! What a host brings is three things, a medium, surfaces and lights; whoever follows light needs all of them, so they
+//! go together as one [`World`].
+//!
+//! | file | holds |
+//! |---|---|
+//! | `mod` | [`World`]: medium, surfaces and lights |
+//! | `rays` | rays that leave surfaces, meet the next one, or ask whether a light is hidden |
+//! | `outline` | [`Outline`]: what methods must know beforehand |
+
+mod outline;
+mod rays;
+
+pub use outline::{LightCounts, Outline};
+pub use rays::{leave, nearest_surface, shadow_ray, short_of_end};
+
+use crate::light::Light;
+
+/// What light travels through, and where it comes from.
+///
+/// ```
+/// # use fogbow::{host::Empty, light::{Light, PointLight}, math::Vec3, medium::Homogeneous, phase::Phase};
+/// # use fogbow::{spectrum::Spectrum, world::World};
+/// let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::splat(0.1), Phase::ISOTROPIC)?;
+/// let lamps = [Light::Point(PointLight::new(Vec3::Z, Spectrum::ONE)?)];
+/// // Fog without end and a lamp, but no surfaces.
+/// let world = World { medium: &fog, scene: &Empty, lights: &lamps };
+/// assert_eq!(world.lights.len(), 1);
+/// # Ok::<(), Box<dyn core::error::Error>>(())
+/// ```
+#[doc(alias = "scene")]
+#[derive(Debug)]
+pub struct World<'a, M: ?Sized, S: ?Sized> {
+    /// The medium; [`Empty`](crate::host::Empty) for none.
+    pub medium: &'a M,
+    /// The surfaces; [`Empty`](crate::host::Empty) for none.
+    pub scene: &'a S,
+    /// The lights; [`Hit::light`](crate::host::Hit::light) counts in this order.
+    pub lights: &'a [Light<'a>],
+}
+
+impl<M: ?Sized, S: ?Sized> Clone for World<'_, M, S> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+impl<M: ?Sized, S: ?Sized> Copy for World<'_, M, S> {}
