@@ -349,7 +349,7 @@ fn a_fill_cancelled_on_its_way_leaves_caches_that_serve_and_goes_on_to_the_same_
         // What was made by then is in the bytes, which remember that it is still to be estimated anew.
         let mut loaded = RadianceCaches::new(settled());
         loaded.read(&filling.caches().to_bytes(7), 7).unwrap();
-        assert!(loaded.is_open());
+        assert_eq!(loaded.is_open(), Kind::ALL.iter().any(|kind| !loaded.records(*kind).is_empty()));
         let (film, _, misses) = picture(&loaded, 2);
         // What is missing is sampled: noise of 4 samples in 256 pixels.
         assert!((mean(&film) / expected - 1.0).abs() < 0.2, "{questions}: {} for {expected}", mean(&film));
