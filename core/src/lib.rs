@@ -21,6 +21,7 @@ pub mod multiple_scatter;
 pub mod path;
 pub mod phase;
 pub mod photon;
+pub mod picture;
 pub mod sampling;
 pub mod sh;
 pub mod single_scatter;

@@ -155,6 +155,23 @@ impl<'s, T> From<&'s mut [T]> for List<'s, T> {
 }
 
 #[cfg(feature = "alloc")]
+impl<T: Copy> List<'_, T> {
+    /// The elements as a `Vec` of their own: the memory itself if it grew, a copy if it was lent.
+    ///
+    /// ```
+    /// # use fogbow::storage::List;
+    /// assert_eq!(List::from(vec![1, 2]).into_vec(), [1, 2]);
+    /// ```
+    #[must_use]
+    pub fn into_vec(self) -> alloc::vec::Vec<T> {
+        match self.0 {
+            Storage::Lent { slots, used } => slots[..used].to_vec(),
+            Storage::Grown(vec) => vec,
+        }
+    }
+}
+
+#[cfg(feature = "alloc")]
 impl<T> Default for List<'_, T> {
     /// Nothing, in memory that grows.
     fn default() -> Self {

@@ -2,6 +2,7 @@
 
 use core::fmt;
 
+use fogbow::picture::accumulate;
 use fogbow::spectrum::Spectrum;
 
 /// Number of pixels beyond which no picture is made.
@@ -214,37 +215,18 @@ impl Film {
         Ok(film)
     }
 
-    /// Sums and count of row `y`, columns `from..to`; the caller stays inside.
-    pub(crate) fn row(&self, y: u32, from: u32, to: u32) -> (&[[f64; 3]], &[u32]) {
-        let (a, b) = self.span(y, from, to);
-        let layers = self.names.len();
-        (&self.sums[a * layers..b * layers], &self.counts[a..b])
+    /// Takes sums and counts out, to be added to elsewhere; [`Film::restore`] puts them back.
+    pub(crate) fn take(&mut self) -> (Vec<[f64; 3]>, Vec<u32>) {
+        (core::mem::take(&mut self.sums), core::mem::take(&mut self.counts))
     }
 
-    /// As [`Film::row`], to change in place.
-    pub(crate) fn row_mut(&mut self, y: u32, from: u32, to: u32) -> (&mut [[f64; 3]], &mut [u32]) {
-        let (a, b) = self.span(y, from, to);
-        let layers = self.names.len();
-        (&mut self.sums[a * layers..b * layers], &mut self.counts[a..b])
-    }
-
-    fn span(&self, y: u32, from: u32, to: u32) -> (usize, usize) {
-        let start = y as usize * self.width as usize;
-        (start + from as usize, start + to as usize)
+    /// Puts back what [`Film::take`] has taken out.
+    pub(crate) fn restore(&mut self, (sums, counts): (Vec<[f64; 3]>, Vec<u32>)) {
+        (self.sums, self.counts) = (sums, counts);
     }
 
     fn index(&self, x: u32, y: u32) -> Option<usize> {
         (x < self.width && y < self.height).then(|| y as usize * self.width as usize + x as usize)
-    }
-}
-
-/// Adds a sample to the sums of one pixel.
-#[inline]
-pub(crate) fn accumulate(sums: &mut [[f64; 3]], colours: &[Spectrum]) {
-    for (sum, colour) in sums.iter_mut().zip(colours) {
-        for (s, c) in sum.iter_mut().zip(colour.0) {
-            *s += f64::from(c);
-        }
     }
 }
 

@@ -44,7 +44,6 @@ mod files;
 pub mod film;
 pub mod image;
 pub mod image_sampling;
-mod noise;
 pub mod photon_beams;
 pub mod progress;
 pub mod radiance_cache;

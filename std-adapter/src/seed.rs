@@ -2,9 +2,10 @@
 
 use core::convert::Infallible;
 
+pub use fogbow::picture::pixel_key;
 use fogbow::rand_core::TryRng;
-use fogbow::sampling::Generator;
 use fogbow::sampling::uniform::mix;
+use fogbow::sampling::{Generator, Source};
 use sobol_burley::parts::{Int4, hash, hash_int4, owen_scramble_int4_rev, owen_scramble_rev, sobol_int4_rev};
 
 /// Which random numbers a picture is made of.
@@ -38,11 +39,13 @@ impl Sequence {
     }
 }
 
-/// One number for a pixel, whatever the size of the picture.
-#[inline]
-#[must_use]
-pub fn pixel_key(x: u32, y: u32) -> u64 {
-    u64::from(y) << 32 | u64::from(x)
+impl Source for Sequence {
+    type Rng = SampleRng;
+
+    #[inline]
+    fn start(&self, seed: u64, key: u64, sample: u32) -> SampleRng {
+        (*self).start(seed, key, sample)
+    }
 }
 
 /// A generator whose numbers have nothing to do with those of any other pixel, sample or seed.

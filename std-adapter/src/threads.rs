@@ -70,9 +70,6 @@ impl Threads {
     pub fn new(count: usize) -> Result<Self, ThreadsError> {
         #[cfg(feature = "threads")]
         {
-            if count == 1 {
-                return Ok(Self { pool: None });
-            }
             let pool = rayon::ThreadPoolBuilder::new().num_threads(count).build();
             Ok(Self { pool: Some(pool.map_err(|error| ThreadsError(error.to_string()))?) })
         }
@@ -92,6 +89,15 @@ impl Threads {
         }
         #[cfg(not(feature = "threads"))]
         1
+    }
+
+    /// Does `work` where all threads stand by.
+    pub(crate) fn within<T: Send>(&self, work: impl FnOnce() -> T + Send) -> T {
+        #[cfg(feature = "threads")]
+        if let Some(pool) = &self.pool {
+            return pool.install(work);
+        }
+        work()
     }
 
     /// Calls `work(index, element)` for every element, on all threads.

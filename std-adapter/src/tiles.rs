@@ -7,17 +7,16 @@
 use core::fmt;
 use core::num::NonZero;
 use core::time::Duration;
-use std::sync::{Mutex, PoisonError};
 
+pub use fogbow::picture::Goal;
+use fogbow::picture::{self, Integrand, Tiles};
 use fogbow::spectrum::Spectrum;
-use rayon::iter::{IndexedParallelIterator, IntoParallelIterator, ParallelIterator};
 
-use crate::film::{Film, accumulate};
-pub use crate::noise::Goal;
-use crate::noise::Noise;
+use crate::film::Film;
 use crate::progress::{Control, Reporter};
-use crate::seed::{SampleRng, Sequence, pixel_key};
+use crate::seed::{SampleRng, Sequence};
 use crate::stats::{Counters, Seconds, Stopwatch, Tally};
+use crate::threads::{Ending, Threads, ThreadsError, run};
 
 /// How to render.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -48,18 +47,9 @@ impl Default for Settings {
     }
 }
 
-/// What the integrand is asked for: one sample of one pixel.
-#[derive(Debug, Clone, Copy)]
-pub struct Sample<'t> {
-    /// Column, from the left.
-    pub x: u32,
-    /// Row, from the top.
-    pub y: u32,
-    /// Index of the sample in its pixel.
-    pub index: u32,
-    /// Counters of this tile, for [`crate::stats::CountingScene`] and [`crate::stats::CountingMedium`].
-    pub tally: &'t Tally,
-}
+/// What the integrand is asked for: one sample of one pixel, with counters for [`crate::stats::CountingScene`] and
+/// [`crate::stats::CountingMedium`].
+pub type Sample<'t> = picture::Sample<'t, Tally>;
 
 /// Why a render ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -93,8 +83,14 @@ pub enum RenderError {
     NoSamples,
     /// The side of a tile is zero.
     NoTile,
-    /// The system gave no threads; what it said.
-    Threads(String),
+    /// The system gave no threads.
+    Threads(ThreadsError),
+}
+
+impl From<ThreadsError> for RenderError {
+    fn from(error: ThreadsError) -> Self {
+        Self::Threads(error)
+    }
 }
 
 impl fmt::Display for RenderError {
@@ -102,15 +98,12 @@ impl fmt::Display for RenderError {
         match self {
             Self::NoSamples => f.write_str("no samples were asked for"),
             Self::NoTile => f.write_str("the side of a tile is zero"),
-            Self::Threads(why) => write!(f, "cannot start threads: {why}"),
+            Self::Threads(error) => error.fmt(f),
         }
     }
 }
 
 impl core::error::Error for RenderError {}
-
-/// Samples per pixel of the longest pass: longer ones would keep a cancelled picture uneven.
-const LONGEST_PASS: u32 = 32;
 
 /// Adds samples to `film` until every pixel has [`Settings::samples`] or its tile reaches [`Settings::goal`], or time or
 /// host end it.
@@ -144,12 +137,9 @@ pub fn render<F>(
 where
     F: Fn(&Sample<'_>, &mut SampleRng, &mut [Spectrum]) + Sync,
 {
-    let pool = settings.pool()?;
-    let clock = Stopwatch::start();
-    let reporter = settings.reporter(film, control);
-    let (reason, counters) = pool.install(|| passes(film, settings, control, &reporter, &integrand));
-    reporter.finish();
-    Ok(Outcome { samples: film.min_count(), reason, counters, seconds: clock.elapsed() })
+    let mut render = Render::new(film, settings, control)?;
+    let reason = render.passes(&integrand);
+    Ok(render.outcome(reason))
 }
 
 /// Passes of samples that share something.
@@ -193,124 +183,188 @@ pub fn render_prepared<T, E, P, F>(
     integrand: F,
 ) -> Result<Outcome, E>
 where
-    T: Sync,
+    T: Sync + Send,
     E: From<RenderError> + Send,
     P: FnMut(u32) -> Result<T, E> + Send,
     F: Fn(&T, &Sample<'_>, &mut SampleRng, &mut [Spectrum]) + Sync,
 {
-    let pool = settings.pool()?;
-    let clock = Stopwatch::start();
-    let reporter = settings.reporter(film, control);
-    let (reason, counters) = pool.install(|| -> Result<_, E> {
-        let mut counters = Counters::default();
+    let settings = &Settings { goal: None, ..*settings };
+    let mut render = Render::new(film, settings, control)?;
+    let reason = render.prepared_passes(passes, &mut prepare, &integrand)?;
+    Ok(render.outcome(reason))
+}
+
+/// An integrand whose queries of the world are counted.
+struct Counted<F>(F);
+
+impl<F: Fn(&Sample<'_>, &mut SampleRng, &mut [Spectrum])> Integrand<SampleRng> for Counted<F> {
+    type Tally = Tally;
+
+    #[inline]
+    fn sample(&self, sample: &Sample<'_>, rng: &mut SampleRng, layers: &mut [Spectrum]) {
+        (self.0)(sample, rng, layers);
+    }
+}
+
+impl picture::Tally for Tally {
+    type Total = Counters;
+
+    fn add_to(&self, total: &mut Counters) {
+        *total += self.counters();
+    }
+}
+
+/// A render on its way; the film gets its samples back when it is dropped.
+struct Render<'a> {
+    film: &'a mut Film,
+    settings: &'a Settings,
+    control: &'a Control<'a>,
+    threads: Threads,
+    tiles: Option<Tiles<'static, Sequence, Counters>>,
+    clock: Stopwatch,
+    reporter: Reporter<'a>,
+}
+
+impl Drop for Render<'_> {
+    fn drop(&mut self) {
+        if let Some(tiles) = self.tiles.take() {
+            self.film.restore(tiles.into_sums());
+        }
+    }
+}
+
+impl<'a> Render<'a> {
+    fn new(film: &'a mut Film, settings: &'a Settings, control: &'a Control<'a>) -> Result<Self, RenderError> {
+        if settings.samples == 0 {
+            return Err(RenderError::NoSamples);
+        }
+        if settings.tile == 0 {
+            return Err(RenderError::NoTile);
+        }
+        let threads = Threads::new(settings.threads)?;
+        let clock = Stopwatch::start();
+        let pixels = u64::from(film.width()) * u64::from(film.height());
+        let total = pixels * u64::from(settings.samples);
+        let reporter = Reporter::new(control, film.total_count(), total, settings.time);
+        let of = picture::Settings {
+            size: [film.width(), film.height()],
+            layers: film.layers().len() as u32,
+            samples: settings.samples,
+            goal: settings.goal,
+            seed: settings.seed,
+            tile: settings.tile,
+        };
+        let (sums, counts) = film.take();
+        let tiles = Some(Tiles::of(of, settings.sequence, sums, counts).by_pass());
+        Ok(Self { film, settings, control, threads, tiles, clock, reporter })
+    }
+
+    fn outcome(mut self, reason: Reason) -> Outcome {
+        self.reporter.finish();
+        let counters = self.tiles.as_ref().map_or_else(Counters::default, |tiles| {
+            let picture::Counts { samples, non_finite } = tiles.counts();
+            Counters { samples, non_finite, ..*tiles.total() }
+        });
+        if let Some(tiles) = self.tiles.take() {
+            self.film.restore(tiles.into_sums());
+        }
+        Outcome { samples: self.film.min_count(), reason, counters, seconds: self.clock.elapsed() }
+    }
+
+    fn done(&self) -> u32 {
+        self.tiles.as_ref().map_or(0, Tiles::least_count)
+    }
+
+    /// Takes every pixel to `until` samples; whether it was not stopped.
+    fn pass<F>(&mut self, until: u32, integrand: &Counted<F>) -> bool
+    where
+        F: Fn(&Sample<'_>, &mut SampleRng, &mut [Spectrum]) + Sync,
+    {
+        let Some(tiles) = &mut self.tiles else { return false };
+        tiles.begin(until);
+        let mut before = tiles.counts().samples;
+        let reporter = &self.reporter;
+        let ran = run(tiles, integrand, &self.threads, self.control, None, |tiles| {
+            reporter.add(tiles.counts().samples - before);
+            before = tiles.counts().samples;
+        });
+        ran.ending == Ending::Done
+    }
+
+    fn passes<F>(&mut self, integrand: &F) -> Reason
+    where
+        F: Fn(&Sample<'_>, &mut SampleRng, &mut [Spectrum]) + Sync,
+    {
+        let integrand = Counted(integrand);
+        let mut done = self.done();
+        if done >= self.settings.samples {
+            return Reason::Done;
+        }
+        let mut until = done.saturating_add(1).min(self.settings.samples);
         loop {
-            let done = film.min_count();
-            if done >= settings.samples {
-                return Ok((Reason::Done, counters));
+            let before = self.reporter.elapsed();
+            if self.control.is_cancelled() || !self.pass(until, &integrand) {
+                return Reason::Cancelled;
             }
-            if control.is_cancelled() {
-                return Ok((Reason::Cancelled, counters));
-            }
-            let before = reporter.elapsed();
-            let pass = done / passes.length;
-            let prepared = prepare(pass)?;
-            let integrand = |sample: &Sample<'_>, rng: &mut SampleRng, layers: &mut [Spectrum]| {
-                integrand(&prepared, sample, rng, layers);
+            let Some(tiles) = self.tiles.as_ref().filter(|tiles| !tiles.is_done()) else { return Reason::Done };
+            let now = self.reporter.elapsed();
+            let Some(most) = affordable(self.settings, now, now - before, until - done) else {
+                return Reason::TimeUp;
             };
+            done = until;
+            until = tiles.next_until(most).min(self.settings.samples);
+        }
+    }
+
+    fn prepared_passes<T, E, F>(
+        &mut self,
+        passes: Passes,
+        prepare: &mut (impl FnMut(u32) -> Result<T, E> + Send),
+        integrand: &F,
+    ) -> Result<Reason, E>
+    where
+        T: Sync + Send,
+        E: Send,
+        F: Fn(&T, &Sample<'_>, &mut SampleRng, &mut [Spectrum]) + Sync,
+    {
+        let settings = self.settings;
+        loop {
+            let done = self.done();
+            if done >= settings.samples {
+                return Ok(Reason::Done);
+            }
+            if self.control.is_cancelled() {
+                return Ok(Reason::Cancelled);
+            }
+            let before = self.reporter.elapsed();
+            let pass = done / passes.length;
+            let prepared = self.threads.within(|| prepare(pass))?;
+            let integrand = Counted(|sample: &Sample<'_>, rng: &mut SampleRng, layers: &mut [Spectrum]| {
+                integrand(&prepared, sample, rng, layers);
+            });
             let end = (pass * passes.length.get()).saturating_add(passes.length.get()).min(settings.samples);
             let mut until = if passes.may_break && settings.time.is_some() { done + 1 } else { end };
             loop {
-                let (from, start) = (film.min_count(), reporter.elapsed());
-                let (reporter, film_of) = (&reporter, Mutex::new(&mut *film));
-                let pass =
-                    Pass { film: film_of, settings, control, reporter, integrand: &integrand, until, noise: None };
-                let (counted, is_complete) = pass.run();
-                counters += counted;
-                if !is_complete {
-                    return Ok((Reason::Cancelled, counters));
+                let (from, start) = (self.done(), self.reporter.elapsed());
+                if !self.pass(until, &integrand) {
+                    return Ok(Reason::Cancelled);
                 }
-                let now = reporter.elapsed();
+                let now = self.reporter.elapsed();
                 if until == end {
                     // The next pass will take about as long as this one.
                     let next = if passes.may_break { Duration::ZERO } else { now - before };
                     if settings.time.is_some_and(|budget| until < settings.samples && now + next > budget) {
-                        return Ok((Reason::TimeUp, counters));
+                        return Ok(Reason::TimeUp);
                     }
                     break;
                 }
                 let (Some(affordable), true) = (affordable(settings, now, now - start, until - from), until < end)
                 else {
-                    return Ok((Reason::TimeUp, counters));
+                    return Ok(Reason::TimeUp);
                 };
                 until = until.saturating_add(affordable.min(until)).min(end);
             }
         }
-    })?;
-    reporter.finish();
-    Ok(Outcome { samples: film.min_count(), reason, counters, seconds: clock.elapsed() })
-}
-
-impl Settings {
-    fn pool(&self) -> Result<rayon::ThreadPool, RenderError> {
-        if self.samples == 0 {
-            return Err(RenderError::NoSamples);
-        }
-        if self.tile == 0 {
-            return Err(RenderError::NoTile);
-        }
-        rayon::ThreadPoolBuilder::new()
-            .num_threads(self.threads)
-            .build()
-            .map_err(|error| RenderError::Threads(error.to_string()))
-    }
-
-    fn reporter<'a>(&self, film: &Film, control: &'a Control<'a>) -> Reporter<'a> {
-        let pixels = u64::from(film.width()) * u64::from(film.height());
-        Reporter::new(control, film.total_count(), pixels * u64::from(self.samples), self.time)
-    }
-}
-
-fn passes<F>(
-    film: &mut Film,
-    settings: &Settings,
-    control: &Control<'_>,
-    reporter: &Reporter<'_>,
-    integrand: &F,
-) -> (Reason, Counters)
-where
-    F: Fn(&Sample<'_>, &mut SampleRng, &mut [Spectrum]) + Sync,
-{
-    let (mut counters, mut length, mut done) = (Counters::default(), 1, film.min_count());
-    let tiles = film.width().div_ceil(settings.tile) * film.height().div_ceil(settings.tile);
-    let mut noise = settings.goal.map(|goal| Noise::new(goal, tiles as usize));
-    loop {
-        if done >= settings.samples {
-            return (Reason::Done, counters);
-        }
-        if control.is_cancelled() {
-            return (Reason::Cancelled, counters);
-        }
-        let until = done.saturating_add(length).min(settings.samples);
-        let before = reporter.elapsed();
-        let noise_of = noise.as_ref();
-        let pass = Pass { film: Mutex::new(film), settings, control, reporter, integrand, until, noise: noise_of };
-        let (counted, is_complete) = pass.run();
-        counters += counted;
-        if !is_complete {
-            return (Reason::Cancelled, counters);
-        }
-        if noise.as_mut().is_some_and(|noise| noise.judge(until)) {
-            return (Reason::Done, counters);
-        }
-        let now = reporter.elapsed();
-        length = until.min(LONGEST_PASS);
-        if until < settings.samples {
-            match affordable(settings, now, now - before, until - done) {
-                Some(affordable) => length = length.min(affordable),
-                None => return (Reason::TimeUp, counters),
-            }
-        }
-        done = until;
     }
 }
 
@@ -324,102 +378,4 @@ fn affordable(settings: &Settings, now: Duration, taken: Duration, samples: u32)
     }
     // Passes vary in speed: most of what is left now, the rest by a better estimate.
     Some(((0.75 * affordable) as u32).max(1))
-}
-
-/// One pass: every pixel gets its samples up to `until`, but in tiles whose noise is little enough.
-struct Pass<'a, F> {
-    film: Mutex<&'a mut Film>,
-    settings: &'a Settings,
-    control: &'a Control<'a>,
-    reporter: &'a Reporter<'a>,
-    integrand: &'a F,
-    until: u32,
-    noise: Option<&'a Noise>,
-}
-
-/// Columns and rows of a tile: from (inclusive) and to (exclusive).
-struct Tile {
-    index: u32,
-    x: [u32; 2],
-    y: [u32; 2],
-}
-
-impl<F> Pass<'_, F>
-where
-    F: Fn(&Sample<'_>, &mut SampleRng, &mut [Spectrum]) + Sync,
-{
-    /// What was done, and whether all of it.
-    fn run(&self) -> (Counters, bool) {
-        let (width, height) = self.with_film(|film| (film.width(), film.height()));
-        let side = self.settings.tile;
-        let (columns, rows) = (width.div_ceil(side), height.div_ceil(side));
-        // At most MAX_PIXELS tiles, so the product fits.
-        (0..columns * rows)
-            .into_par_iter()
-            .with_max_len(1)
-            .map(|i| {
-                let span = |at: u32, end: u32| [at * side, (at * side).saturating_add(side).min(end)];
-                let tile = Tile { index: i, x: span(i % columns, width), y: span(i / columns, height) };
-                self.tile(&tile).map_or((Counters::default(), false), |counters| (counters, true))
-            })
-            // Integers: their sum is the same in any order.
-            .reduce(|| (Counters::default(), true), |a, b| (a.0 + b.0, a.1 && b.1))
-    }
-
-    /// Works on a copy of the tile's sums and puts it back when complete; `None` if cancelled.
-    fn tile(&self, tile: &Tile) -> Option<Counters> {
-        let mut noise = self.noise.map(|noise| noise.tile(tile.index));
-        if noise.as_ref().is_some_and(|noise| noise.is_enough()) {
-            return Some(Counters::default());
-        }
-        let (mut sums, mut counts) = (Vec::new(), Vec::new());
-        let layers = self.with_film(|film| {
-            for y in tile.y[0]..tile.y[1] {
-                let (row_sums, row_counts) = film.row(y, tile.x[0], tile.x[1]);
-                sums.extend_from_slice(row_sums);
-                counts.extend_from_slice(row_counts);
-            }
-            film.layers().len()
-        });
-        if let Some(noise) = &mut noise {
-            noise.begin(sums.iter().step_by(layers).zip(counts.iter().copied()));
-        }
-        let (tally, mut colours) = (Tally::default(), vec![Spectrum::ZERO; layers]);
-        let (mut samples, mut non_finite) = (0, 0);
-        let width = (tile.x[1] - tile.x[0]) as usize;
-        for (i, (sums, count)) in sums.chunks_exact_mut(layers).zip(&mut counts).enumerate() {
-            let (x, y) = (tile.x[0] + (i % width) as u32, tile.y[0] + (i / width) as u32);
-            for index in *count..self.until {
-                if self.control.is_cancelled() {
-                    return None;
-                }
-                let mut rng = self.settings.sequence.start(self.settings.seed, pixel_key(x, y), index);
-                colours.fill(Spectrum::ZERO);
-                (self.integrand)(&Sample { x, y, index, tally: &tally }, &mut rng, &mut colours);
-                if colours.iter().all(|colour| colour.0.iter().all(|c| c.is_finite())) {
-                    accumulate(sums, &colours);
-                } else {
-                    non_finite += 1;
-                }
-                samples += 1;
-            }
-            *count = self.until.max(*count);
-        }
-        if let Some(noise) = &mut noise {
-            noise.end(sums.iter().step_by(layers).zip(counts.iter().copied()));
-        }
-        self.with_film(|film| {
-            for (i, y) in (tile.y[0]..tile.y[1]).enumerate() {
-                let (row_sums, row_counts) = film.row_mut(y, tile.x[0], tile.x[1]);
-                row_sums.copy_from_slice(&sums[i * width * layers..][..width * layers]);
-                row_counts.copy_from_slice(&counts[i * width..][..width]);
-            }
-        });
-        self.reporter.add(samples);
-        Some(Counters { samples, non_finite, ..tally.counters() })
-    }
-
-    fn with_film<T>(&self, work: impl FnOnce(&mut Film) -> T) -> T {
-        work(&mut self.film.lock().unwrap_or_else(PoisonError::into_inner))
-    }
 }

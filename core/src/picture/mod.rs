@@ -1,0 +1,15 @@
+//! Layer 7: pictures, sample by sample, as work in rounds.
+//!
+//! A round is a pass: some more samples of every pixel. Tiles that have little enough noise are left out. What a
+//! sample is, the host says with an [`Integrand`]; where random numbers come from, with a [`Source`](crate::sampling::Source).
+//!
+//! | file | holds |
+//! |---|---|
+//! | `tiles` | [`Tiles`]: passes over all pixels |
+//! | `noise` | [`Goal`]: how many samples are enough, by the noise they still have |
+
+mod noise;
+mod tiles;
+
+pub use noise::Goal;
+pub use tiles::{Counts, Integrand, Output, Sample, Settings, Tally, Tiles, accumulate, pixel_key};

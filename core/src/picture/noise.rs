@@ -1,0 +1,268 @@
+//! How many samples are enough, by the noise they still have.
+
+use crate::storage::{Full, List};
+
+/// Share of the picture's mean that is added, in square, to what a pixel's noise is measured against: black
+/// corners need not be known to their own precision.
+const FLOOR: f64 = 0.1;
+
+/// When a tile has enough samples before it has [`Settings::samples`](super::Settings::samples).
+///
+/// ```text
+/// ‖error‖ / √(mean² + (0.1 mean of the picture)²) ≤ noise,   root mean square over the pixels of the tile
+/// ```
+///
+/// of layer 0, mean of the channels. The error is told by how far the mean of `m` samples lies from that of
+/// the `n` before them, times `√(nm)/(n + m)`. For independent samples that is exact in the mean square. Of an even sequence,
+/// as one of low discrepancy, the halves differ by more than that: if doubling divides the variance `V` by `q`, then
+///
+/// ```text
+/// ⟨(half − other half)²⟩/4 = V(n) − V(2n) = (q − 1) V(2n)
+/// ```
+///
+/// as long as the halves are exchangeable, as those of an Owen-scrambled net are. So when samples have been doubled,
+/// the square is divided by `q − 1`; `q`, from 2 (independent) to 4, is how much less the halves differ than at the doubling
+/// before, over all tiles that still got samples.
+///
+/// Tiles that a rare bright sample has not met yet stop early: where light has such samples the picture gets darker
+/// by what they would bring, so that methods without them profit most.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Goal {
+    /// Relative standard error of a pixel; at 0 or less only tiles without any noise have enough.
+    pub noise: f32,
+    /// Samples of every pixel in any case: fewer do not tell their noise. Black tiles get eight times as many.
+    pub least: u32,
+}
+
+/// Sum over some samples of a pixel.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Part {
+    sum: f64,
+    count: u32,
+}
+
+impl Part {
+    /// Of the sums of a pixel (layer 0) over so many samples.
+    pub(super) fn of(sum: &[f64; 3], count: u32) -> Self {
+        Self { sum: sum.iter().sum::<f64>() / 3.0, count }
+    }
+
+    fn mean(self) -> f64 {
+        if self.count == 0 { 0.0 } else { self.sum / f64::from(self.count) }
+    }
+}
+
+/// What a pixel had before some passes, and has after them.
+#[derive(Debug, Clone, Copy, Default)]
+struct Pixel {
+    before: Part,
+    after: Part,
+}
+
+impl Pixel {
+    /// Variance of the mean after them: if a sample has variance `σ²`, the two parts' means are apart by
+    /// `σ² (1/n + 1/m)` in square, and the whole's varies by `σ²/(n + m)`.
+    fn error_squared(&self) -> f64 {
+        let Self { before, after } = *self;
+        let new = Part { sum: after.sum - before.sum, count: after.count - before.count };
+        if before.count == 0 || new.count == 0 {
+            return f64::INFINITY;
+        }
+        let (n, m) = (f64::from(before.count), f64::from(new.count));
+        let apart = before.mean() - new.mean();
+        apart * apart * n * m / ((n + m) * (n + m))
+    }
+
+    fn is_doubled(&self) -> bool {
+        self.before.count > 0 && self.after.count - self.before.count == self.before.count
+    }
+}
+
+/// What is known of a tile.
+#[derive(Debug, Clone, Copy, Default)]
+struct Tile {
+    is_enough: bool,
+    /// Its pixels: from, and to.
+    pixels: [u32; 2],
+    /// Noise squared when the samples were last doubled, as if they were independent.
+    when_doubled: Option<f64>,
+}
+
+/// Variance that falls with the square of the number of samples is as even as pictures get.
+const EVENNEST: f64 = 3.0;
+
+/// Black tiles get so many times [`Goal::least`]: nothing tells how rarely light comes there.
+const BLACK: u32 = 8;
+
+/// The noise of a picture's tiles.
+#[derive(Debug)]
+pub(super) struct Noise<'s> {
+    goal: Goal,
+    tiles: List<'s, Tile>,
+    pixels: List<'s, Pixel>,
+}
+
+#[cfg(feature = "alloc")]
+impl Noise<'_> {
+    pub(super) fn new(goal: Goal) -> Self {
+        Self { goal, tiles: List::default(), pixels: List::default() }
+    }
+}
+
+impl Noise<'_> {
+    pub(super) fn is_enough(&self, tile: u32) -> bool {
+        self.tiles.as_slice().get(tile as usize).is_some_and(|tile| tile.is_enough)
+    }
+
+    /// Adds the next tile, with so many pixels.
+    pub(super) fn add_tile(&mut self, count: u32) -> Result<(), Full> {
+        let from = self.pixels.len() as u32;
+        (0..count).try_for_each(|_| self.pixels.push(Pixel::default()))?;
+        self.tiles.push(Tile { pixels: [from, from + count], ..Tile::default() })
+    }
+
+    fn pixels_of(&mut self, tile: u32) -> (&mut [Pixel], bool) {
+        let Some(tile) = self.tiles.as_slice().get(tile as usize) else { return (&mut [], true) };
+        let ([from, to], is_enough) = (tile.pixels, tile.is_enough);
+        (&mut self.pixels.as_mut_slice()[from as usize..to as usize], is_enough)
+    }
+
+    /// A pass begins, and a tile's pixels are these. What was before stays what there was at the last power of
+    /// two, so that samples are doubled again however long passes are.
+    pub(super) fn begin(&mut self, tile: u32, parts: impl Iterator<Item = Part>) {
+        let (pixels, is_enough) = self.pixels_of(tile);
+        let mut parts = parts.peekable();
+        let is_new = pixels.first().is_some_and(|pixel| pixel.after.count == 0);
+        if !is_enough && (is_new || parts.peek().is_some_and(|part| part.count.is_power_of_two())) {
+            pixels.iter_mut().zip(parts).for_each(|(pixel, before)| *pixel = Pixel { before, after: before });
+        }
+    }
+
+    /// A pass ends.
+    pub(super) fn end(&mut self, tile: u32, parts: impl Iterator<Item = Part>) {
+        let (pixels, is_enough) = self.pixels_of(tile);
+        if !is_enough {
+            pixels.iter_mut().zip(parts).for_each(|(pixel, after)| pixel.after = after);
+        }
+    }
+
+    /// Decides for every tile, after a pass that left all others with `samples`; whether all have enough.
+    pub(super) fn judge(&mut self, samples: u32) -> bool {
+        let goal = f64::from(self.goal.noise.max(0.0));
+        let pixels = self.pixels.as_slice();
+        let total: f64 = pixels.iter().map(|pixel| pixel.after.mean()).sum();
+        let floor = FLOOR * total.abs() / pixels.len().max(1) as f64;
+        let of = |tile: &Tile| &pixels[tile.pixels[0] as usize..tile.pixels[1] as usize];
+        let noise_of = |tile: &Tile| {
+            let of_pixel = |pixel: &Pixel| match pixel.error_squared() {
+                0.0 => 0.0,
+                error => error / (pixel.after.mean() * pixel.after.mean() + floor * floor),
+            };
+            let pixels = of(tile);
+            pixels.iter().map(of_pixel).sum::<f64>() / pixels.len().max(1) as f64
+        };
+        let (mut last, mut now) = (0.0, 0.0);
+        for tile in self.tiles.as_mut_slice().iter_mut().filter(|tile| !tile.is_enough) {
+            if of(tile).iter().all(Pixel::is_doubled) {
+                let noise = noise_of(tile);
+                if let Some(before) = tile.when_doubled.replace(noise) {
+                    last += before;
+                    now += noise;
+                }
+            }
+        }
+        if samples < self.goal.least {
+            return false;
+        }
+        let evenness = if now > 0.0 { (last / now - 1.0_f64).clamp(1.0, EVENNEST) } else { 1.0 };
+        for tile in self.tiles.as_mut_slice().iter_mut().filter(|tile| !tile.is_enough) {
+            let pixels = of(tile);
+            let is_known = samples / BLACK >= self.goal.least || pixels.iter().any(|pixel| pixel.after.sum != 0.0);
+            let evenness = if pixels.iter().all(Pixel::is_doubled) { evenness } else { 1.0 };
+            tile.is_enough = is_known && noise_of(tile) <= goal * goal * evenness;
+        }
+        self.tiles.as_slice().iter().all(|tile| tile.is_enough)
+    }
+}
+
+#[cfg(all(test, feature = "alloc"))]
+mod tests {
+    use super::*;
+
+    fn noise(goal: Goal, tiles: &[u32]) -> Noise<'static> {
+        let mut noise = Noise::new(goal);
+        tiles.iter().for_each(|count| noise.add_tile(*count).unwrap());
+        noise
+    }
+
+    /// Pixels with these means before and in a pass of as many samples.
+    fn pass(noise: &mut Noise<'_>, tile: u32, pixels: &[(f64, f64)]) {
+        noise.begin(tile, pixels.iter().map(|p| Part::of(&[4.0 * p.0; 3], 4)));
+        noise.end(tile, pixels.iter().map(|p| Part::of(&[4.0 * (p.0 + p.1); 3], 8)));
+    }
+
+    #[test]
+    fn a_tile_is_enough_from_the_noise_asked_for() {
+        let of = |noise| {
+            let mut all = self::noise(Goal { noise, least: 8 }, &[2]);
+            // Means of the pixels 1 and 1, errors ½·0.4 and ½·0.2.
+            pass(&mut all, 0, &[(0.8, 1.2), (0.9, 1.1)]);
+            (all.judge(4), all.judge(8))
+        };
+        let noise = libm::sqrtf((0.04_f32 + 0.01) / 2.0 / 1.01);
+        assert_eq!(of(noise * 1.0001), (false, true));
+        assert_eq!(of(noise * 0.9999), (false, false));
+    }
+
+    #[test]
+    fn samples_that_are_even_are_less_noisy_than_their_halves_say() {
+        // Halves that differ as if the variance fell by `ratio` from pass to pass, the last by 2·0.1.
+        let of = |ratio: f64, noise: f32| {
+            let mut all = self::noise(Goal { noise, least: 8 }, &[1]);
+            for (count, error) in [(2, 0.1 * libm::sqrt(ratio)), (4, 0.1)] {
+                let parts = [(1.0 - error) * f64::from(count), 2.0 * f64::from(count)];
+                all.begin(0, core::iter::once(Part::of(&[parts[0]; 3], count)));
+                all.end(0, core::iter::once(Part::of(&[parts[1]; 3], 2 * count)));
+                let is_enough = all.judge(2 * count);
+                if count == 4 {
+                    return is_enough;
+                }
+            }
+            false
+        };
+        // What 2, 3 and 4 say, and that less and more than these are not believed.
+        for (ratio, divisor) in [(0.5, 1.0), (2.0, 1.0), (3.0, 2.0), (4.0, 3.0), (9.0, 3.0)] {
+            let noise = libm::sqrtf(0.01_f32 / 1.01 / divisor);
+            assert!(of(ratio, noise * 1.0001), "{ratio}");
+            assert!(!of(ratio, noise * 0.9999), "{ratio}");
+        }
+    }
+
+    #[test]
+    fn the_error_of_uneven_parts_is_that_of_their_whole() {
+        // Independent samples: the mean square of the estimate is the variance of the mean, 1/12/n.
+        let mut rng = crate::sampling::Generator::new(5);
+        let mut draw = |n: u32| (0..n).map(|_| f64::from(crate::sampling::uniform(&mut rng))).sum::<f64>();
+        let runs = 20_000;
+        let mut total = 0.0;
+        for _ in 0..runs {
+            let before = Part { sum: draw(6), count: 6 };
+            let after = Part { sum: before.sum + draw(3), count: 9 };
+            total += Pixel { before, after }.error_squared();
+        }
+        let ratio = total / f64::from(runs) * 12.0 * 9.0;
+        // Relative standard deviation of a square of a normal number: √2.
+        assert!((ratio - 1.0).abs() < 4.0 * libm::sqrt(2.0 / f64::from(runs)), "{ratio}");
+    }
+
+    #[test]
+    fn black_tiles_are_enough_in_the_end_and_first_passes_are_not() {
+        let mut all = noise(Goal { noise: 0.01, least: 8 }, &[1, 1]);
+        pass(&mut all, 0, &[(0.0, 0.0)]);
+        all.begin(1, core::iter::once(Part::of(&[0.0; 3], 0)));
+        all.end(1, core::iter::once(Part::of(&[1.0; 3], 8)));
+        assert!(!all.judge(63) && !all.is_enough(0));
+        assert!(!all.judge(64));
+        assert!(all.is_enough(0) && !all.is_enough(1));
+    }
+}

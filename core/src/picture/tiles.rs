@@ -1,0 +1,443 @@
+//! Passes over all pixels, as work in rounds.
+
+use core::ops::Range;
+
+use super::noise::{Goal, Noise, Part};
+use crate::sampling::Source;
+use crate::spectrum::Spectrum;
+use crate::storage::List;
+use crate::work::Rounds;
+
+/// How a picture is sampled.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Settings {
+    /// Columns and rows.
+    pub size: [u32; 2],
+    /// Layers: colours that a sample writes.
+    pub layers: u32,
+    /// Samples that every pixel shall have in the end, those it has already included; at least 1.
+    pub samples: u32,
+    /// Ends a tile sooner, once its new samples leave less noise than this.
+    pub goal: Option<Goal>,
+    /// Changes all random numbers.
+    pub seed: u64,
+    /// Side of a tile in pixels, at least 1. Matters with a [`Settings::goal`], which each tile reaches by itself: larger, and an edge
+    /// is sampled with its surroundings; smaller, and noise is told from few pixels.
+    pub tile: u32,
+}
+
+/// One sample of one pixel.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Sample<'t, T> {
+    /// Column, from the left.
+    pub x: u32,
+    /// Row, from the top.
+    pub y: u32,
+    /// Index of the sample in its pixel.
+    pub index: u32,
+    /// What the integrand counts, job by job.
+    pub tally: &'t T,
+}
+
+/// What a sample of a picture is: writes a colour per layer into the slice it is given (black at first), from the random
+/// numbers it is given and nothing else that changes.
+pub trait Integrand<R> {
+    /// What it counts on its way; `()` for nothing.
+    type Tally: Tally;
+
+    /// Takes one sample.
+    fn sample(&self, sample: &Sample<'_, Self::Tally>, rng: &mut R, layers: &mut [Spectrum]);
+}
+
+/// What an [`Integrand`] counts, job by job: each starts with the default.
+pub trait Tally: Default {
+    /// The sum over all jobs.
+    type Total: Default;
+
+    /// Adds what a job has counted.
+    fn add_to(&self, total: &mut Self::Total);
+}
+
+impl Tally for () {
+    type Total = ();
+
+    fn add_to(&self, (): &mut ()) {}
+}
+
+impl<R, F: Fn(&Sample<'_, ()>, &mut R, &mut [Spectrum])> Integrand<R> for F {
+    type Tally = ();
+
+    fn sample(&self, sample: &Sample<'_, ()>, rng: &mut R, layers: &mut [Spectrum]) {
+        self(sample, rng, layers);
+    }
+}
+
+/// Samples that were taken.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Counts {
+    /// All of them.
+    pub samples: u64,
+    /// Of these, those that were no finite numbers and count as black: 0 unless something is wrong.
+    pub non_finite: u64,
+}
+
+/// What a job leaves: the new sums of some pixels.
+#[derive(Debug)]
+#[cfg_attr(feature = "alloc", derive(Default))]
+pub struct Output<'o, T> {
+    sums: List<'o, [f64; 3]>,
+    colours: List<'o, Spectrum>,
+    counts: Counts,
+    tally: T,
+}
+
+/// Samples per pixel of the longest pass: longer ones would keep a picture that was left uneven.
+const LONGEST_PASS: u32 = 32;
+
+/// Samples of a job, about: some milliseconds.
+const SAMPLES_PER_JOB: u32 = 64;
+
+/// Samples of a picture, pass by pass, each a round of [`Rounds`]: the same bits for any number of threads, tiles and
+/// lengths of passes (without a goal). The "world" of its jobs is the [`Integrand`].
+///
+/// ```
+/// # #[cfg(feature = "alloc")] {
+/// use fogbow::picture::{Output, Sample, Settings, Tiles};
+/// use fogbow::{sampling::{Generator, Independent, uniform}, spectrum::Spectrum, work};
+/// let settings = Settings { size: [4, 3], layers: 1, samples: 64, goal: None, seed: 0, tile: 8 };
+/// let mut tiles = Tiles::new(settings, Independent);
+/// let ramp = |sample: &Sample<'_, ()>, rng: &mut Generator, layers: &mut [Spectrum]| {
+///     layers[0] = Spectrum::splat((sample.x as f32 + uniform(rng)) / 4.0);
+/// };
+/// work::finish(&mut tiles, &ramp, &mut Output::default());
+/// assert_eq!((tiles.count(1, 0), tiles.counts().samples), (64, 64 * 12));
+/// assert!((tiles.mean(1, 0, 0).mean() - 1.5 / 4.0).abs() < 0.05);
+/// # }
+/// ```
+#[derive(Debug)]
+pub struct Tiles<'s, Q, C = ()> {
+    settings: Settings,
+    source: Q,
+    /// Pixel by pixel, within each layer by layer; and samples of each pixel.
+    sums: List<'s, [f64; 3]>,
+    counts: List<'s, u32>,
+    noise: Option<Noise<'s>>,
+    /// The pass at hand takes every pixel to so many samples, so many pixels a job.
+    until: u32,
+    pixels_per_job: u32,
+    /// Jobs whose results were taken.
+    taken: u32,
+    taken_samples: Counts,
+    total: C,
+    is_by_pass: bool,
+    is_enough: bool,
+}
+
+#[cfg(feature = "alloc")]
+impl<Q, C: Default> Tiles<'static, Q, C> {
+    /// A black picture.
+    #[must_use]
+    pub fn new(settings: Settings, source: Q) -> Self {
+        let pixels = settings.size[0] as usize * settings.size[1] as usize;
+        let sums = alloc::vec![[0.0; 3]; pixels * settings.layers as usize];
+        Self::of(settings, source, sums, alloc::vec![0; pixels])
+    }
+
+    /// Goes on with a picture of which there are sums (pixel by pixel from the top left, within each layer by layer) and
+    /// numbers of samples.
+    ///
+    /// # Panics
+    /// If there are not as many as the size says.
+    #[must_use]
+    pub fn of(settings: Settings, source: Q, sums: alloc::vec::Vec<[f64; 3]>, counts: alloc::vec::Vec<u32>) -> Self {
+        let pixels = settings.size[0] as usize * settings.size[1] as usize;
+        assert!(counts.len() == pixels && sums.len() == pixels * settings.layers as usize, "sums of another picture");
+        let noise = settings.goal.map(|goal| {
+            let mut noise = Noise::new(goal);
+            let [columns, rows] = settings.grid();
+            for tile in 0..columns * rows {
+                let [x, y] = settings.span(tile);
+                // Growing storage is never full.
+                let _ = noise.add_tile((x.end - x.start) * (y.end - y.start));
+            }
+            noise
+        });
+        let mut tiles = Self {
+            settings,
+            source,
+            sums: sums.into(),
+            counts: counts.into(),
+            noise,
+            until: 0,
+            pixels_per_job: 1,
+            taken: 0,
+            taken_samples: Counts::default(),
+            total: C::default(),
+            is_by_pass: false,
+            is_enough: settings.samples == 0,
+        };
+        let done = tiles.least_count();
+        tiles.begin(done.saturating_add(1));
+        tiles
+    }
+
+    /// Sums and numbers of samples, as [`Tiles::of`] takes them.
+    #[must_use]
+    pub fn into_sums(self) -> (alloc::vec::Vec<[f64; 3]>, alloc::vec::Vec<u32>) {
+        (self.sums.into_vec(), self.counts.into_vec())
+    }
+}
+
+impl Settings {
+    /// Columns and rows of tiles.
+    fn grid(&self) -> [u32; 2] {
+        self.size.map(|side| side.div_ceil(self.tile.max(1)))
+    }
+
+    /// Columns and rows of pixels of a tile.
+    fn span(&self, tile: u32) -> [Range<u32>; 2] {
+        let columns = self.grid()[0].max(1);
+        let side = self.tile.max(1);
+        let span = |at: u32, end: u32| at * side..(at * side).saturating_add(side).min(end);
+        [span(tile % columns, self.size[0]), span(tile / columns, self.size[1])]
+    }
+
+    fn pixels(&self) -> u32 {
+        self.size[0] * self.size[1]
+    }
+}
+
+impl<Q, C> Tiles<'_, Q, C> {
+    /// Ends after every pass, until [`Tiles::begin`]: for hosts that decide how long the next may be.
+    #[must_use]
+    pub fn by_pass(mut self) -> Self {
+        self.is_by_pass = true;
+        self
+    }
+
+    /// Begins a pass that takes every pixel of a tile without enough samples to `until` samples, or to
+    /// [`Settings::samples`] if that is less. A pass that is not done is left as it is.
+    pub fn begin(&mut self, until: u32) {
+        if self.is_enough {
+            return;
+        }
+        let from = self.least_count();
+        self.until = until.min(self.settings.samples);
+        self.pixels_per_job = (SAMPLES_PER_JOB / self.until.saturating_sub(from).max(1)).clamp(1, 8);
+        self.taken = 0;
+        if let Some(noise) = &mut self.noise {
+            each_tile(&self.settings, self.sums.as_slice(), self.counts.as_slice(), |tile, parts| {
+                noise.begin(tile, parts)
+            });
+        }
+    }
+
+    /// Samples to which the pass at hand takes pixels.
+    #[must_use]
+    pub fn until(&self) -> u32 {
+        self.until
+    }
+
+    /// Whether every pixel has its samples, or little enough noise.
+    #[must_use]
+    pub fn is_done(&self) -> bool {
+        self.is_enough
+    }
+
+    /// The smallest number of samples of any pixel.
+    #[must_use]
+    pub fn least_count(&self) -> u32 {
+        self.counts.as_slice().iter().copied().min().unwrap_or(0)
+    }
+
+    /// Samples of a pixel; 0 outside.
+    #[must_use]
+    pub fn count(&self, x: u32, y: u32) -> u32 {
+        let index = (y as usize * self.settings.size[0] as usize).saturating_add(x as usize);
+        if x < self.settings.size[0] { self.counts.as_slice().get(index).copied().unwrap_or(0) } else { 0 }
+    }
+
+    /// The mean of a pixel's samples in a layer; black without samples or outside.
+    #[must_use]
+    pub fn mean(&self, x: u32, y: u32, layer: u32) -> Spectrum {
+        let count = self.count(x, y);
+        let index = (y as usize * self.settings.size[0] as usize + x as usize) * self.settings.layers as usize;
+        match self.sums.as_slice().get(index + layer as usize) {
+            Some(sum) if count > 0 && layer < self.settings.layers => {
+                let weight = 1.0 / f64::from(count);
+                Spectrum(sum.map(|sum| (sum * weight) as f32))
+            }
+            _ => Spectrum::ZERO,
+        }
+    }
+
+    /// Samples taken so far, by these passes.
+    #[must_use]
+    pub fn counts(&self) -> Counts {
+        self.taken_samples
+    }
+
+    /// What integrands have counted.
+    #[must_use]
+    pub fn total(&self) -> &C {
+        &self.total
+    }
+
+    /// The pixels of a job: their numbers, row by row.
+    fn pixels_of(&self, job: u32) -> Range<u32> {
+        let from = job * self.pixels_per_job;
+        from..(from + self.pixels_per_job).min(self.settings.pixels())
+    }
+
+    fn is_open(&self, x: u32, y: u32) -> bool {
+        let Some(noise) = &self.noise else { return true };
+        let side = self.settings.tile.max(1);
+        !noise.is_enough(y / side * self.settings.grid()[0] + x / side)
+    }
+
+    fn end(&mut self) {
+        if let Some(noise) = &mut self.noise {
+            each_tile(&self.settings, self.sums.as_slice(), self.counts.as_slice(), |tile, parts| {
+                noise.end(tile, parts)
+            });
+            self.is_enough |= noise.judge(self.until);
+        }
+        self.is_enough |= self.until >= self.settings.samples;
+        if !self.is_enough && !self.is_by_pass {
+            self.begin(self.until.saturating_add(self.until.min(LONGEST_PASS)));
+        }
+    }
+
+    /// The samples that the next pass should take every pixel to, if it may take `most` more.
+    #[must_use]
+    pub fn next_until(&self, most: u32) -> u32 {
+        let done = if self.is_running() { self.until } else { self.until.max(self.least_count()) };
+        done.saturating_add(done.clamp(1, LONGEST_PASS).min(most.max(1)))
+    }
+
+    fn is_running(&self) -> bool {
+        !self.is_enough && self.taken < self.job_count()
+    }
+
+    fn job_count(&self) -> u32 {
+        self.settings.pixels().div_ceil(self.pixels_per_job)
+    }
+}
+
+/// Calls `each` with every tile and what its pixels have, row by row.
+fn each_tile(
+    settings: &Settings,
+    sums: &[[f64; 3]],
+    counts: &[u32],
+    mut each: impl FnMut(u32, &mut dyn Iterator<Item = Part>),
+) {
+    let [columns, rows] = settings.grid();
+    for tile in 0..columns * rows {
+        let [xs, ys] = settings.span(tile);
+        let mut parts = ys.flat_map(|y| xs.clone().map(move |x| (x, y))).map(|(x, y)| {
+            let index = y as usize * settings.size[0] as usize + x as usize;
+            Part::of(&sums[index * settings.layers as usize], counts[index])
+        });
+        each(tile, &mut parts);
+    }
+}
+
+impl<I, Q> Rounds<I> for Tiles<'_, Q, <I::Tally as Tally>::Total>
+where
+    Q: Source,
+    I: Integrand<Q::Rng> + ?Sized,
+{
+    type Output<'o> = Output<'o, I::Tally>;
+
+    fn jobs(&self) -> Range<u32> {
+        if self.is_enough { 0..0 } else { self.taken..self.job_count() }
+    }
+
+    fn run(&self, job: u32, integrand: &I, output: &mut Output<'_, I::Tally>) {
+        output.sums.clear();
+        output.colours.clear();
+        (output.counts, output.tally) = (Counts::default(), I::Tally::default());
+        let layers = self.settings.layers as usize;
+        for _ in 0..layers {
+            let _ = output.colours.push(Spectrum::ZERO);
+        }
+        let Output { sums: new, colours, counts, tally } = output;
+        for pixel in self.pixels_of(job) {
+            let (x, y) = (pixel % self.settings.size[0], pixel / self.settings.size[0]);
+            let from = pixel as usize * layers;
+            let start = new.len();
+            if new.extend_from_slice(&self.sums.as_slice()[from..from + layers]).is_err() || !self.is_open(x, y) {
+                continue;
+            }
+            let sums = &mut new.as_mut_slice()[start..];
+            let colours = colours.as_mut_slice();
+            for index in self.counts.as_slice()[pixel as usize]..self.until {
+                let mut rng = self.source.start(self.settings.seed, pixel_key(x, y), index);
+                colours.fill(Spectrum::ZERO);
+                integrand.sample(&Sample { x, y, index, tally: &*tally }, &mut rng, colours);
+                if colours.iter().all(|colour| colour.0.iter().all(|c| c.is_finite())) {
+                    accumulate(sums, colours);
+                } else {
+                    counts.non_finite += 1;
+                }
+                counts.samples += 1;
+            }
+        }
+    }
+
+    fn accept(&mut self, output: &Output<'_, I::Tally>) {
+        if !self.is_running() {
+            return;
+        }
+        let layers = self.settings.layers as usize;
+        let pixels = self.pixels_of(self.taken);
+        for (pixel, sums) in pixels.zip(output.sums.as_slice().chunks_exact(layers.max(1))) {
+            if !self.is_open(pixel % self.settings.size[0], pixel / self.settings.size[0]) {
+                continue;
+            }
+            self.sums.as_mut_slice()[pixel as usize * layers..][..layers].copy_from_slice(sums);
+            let count = &mut self.counts.as_mut_slice()[pixel as usize];
+            *count = self.until.max(*count);
+        }
+        self.taken_samples.samples += output.counts.samples;
+        self.taken_samples.non_finite += output.counts.non_finite;
+        output.tally.add_to(&mut self.total);
+        self.taken += 1;
+        if self.taken >= self.job_count() {
+            self.end();
+        }
+    }
+
+    fn stage(&self) -> &'static str {
+        "render"
+    }
+}
+
+/// One number for a pixel, whatever the size of the picture.
+///
+/// ```
+/// use fogbow::picture::pixel_key;
+/// assert_ne!(pixel_key(3, 4), pixel_key(4, 3));
+/// ```
+#[inline]
+#[must_use]
+pub fn pixel_key(x: u32, y: u32) -> u64 {
+    u64::from(y) << 32 | u64::from(x)
+}
+
+/// Adds a sample to the sums of one pixel, layer by layer.
+///
+/// ```
+/// use fogbow::{picture::accumulate, spectrum::Spectrum};
+/// let mut sums = [[1e9; 3]];
+/// accumulate(&mut sums, &[Spectrum::ONE]);
+/// assert_eq!(sums[0][0], 1_000_000_001.0);
+/// ```
+#[inline]
+pub fn accumulate(sums: &mut [[f64; 3]], colours: &[Spectrum]) {
+    for (sum, colour) in sums.iter_mut().zip(colours) {
+        for (s, c) in sum.iter_mut().zip(colour.0) {
+            *s += f64::from(c);
+        }
+    }
+}
