@@ -16,7 +16,7 @@ use crate::sampling::{Generator, uniform, uniform2, warp};
 use crate::spectrum::Spectrum;
 use crate::surface::{Surface, lambert};
 use crate::transmittance::thickness::{Marching, transmittance, until_the_end};
-use crate::world::{World, leave, nearest_surface, shadow_ray};
+use crate::world::{MAX_INTERFACES, World, beyond, leave, nearest_surface, shadow_ray};
 
 /// Mirrors and panes of glass an eye ray follows: a hall of mirrors must end.
 const MAX_BOUNCES: u32 = 32;
@@ -125,7 +125,8 @@ fn look<M: Medium + ?Sized, S: Scene + ?Sized>(
     let (mut lights_visible, mut lights_done) = (settings.lights_visible, false);
     let mut bounced = false;
     let mut ray = *ray;
-    for _ in 0..MAX_BOUNCES {
+    let (mut bounces, mut interfaces) = (0, 0);
+    while bounces < MAX_BOUNCES && interfaces <= MAX_INTERFACES {
         let hit = world.scene.closest_hit(&ray);
         let segment = hit.map_or(ray, |hit| ray.with_length(hit.distance));
         let (u, jitter, choice) = (uniform(rng), uniform(rng), uniform(rng));
@@ -156,8 +157,8 @@ fn look<M: Medium + ?Sized, S: Scene + ?Sized>(
         let hidden = !lights_visible && hit.light.is_some();
         let point = segment.at(hit.distance);
         if hidden || hit.surface == Surface::Null {
-            let origin = leave(point, hit.normal, ray.direction, hit.distance);
-            ray = Ray { origin, direction: ray.direction, length: ray.length - hit.distance };
+            ray = beyond(&ray, &hit);
+            interfaces += 1;
             continue;
         }
         if !lights_done && let Some(light) = hit.light.and_then(|i| world.lights.get(i as usize)) {
@@ -175,6 +176,7 @@ fn look<M: Medium + ?Sized, S: Scene + ?Sized>(
         lights_done = !hit.surface.is_discrete();
         throughput *= sample.weight;
         ray = Ray::new(leave(point, hit.normal, sample.to_light, hit.distance), sample.to_light);
+        (bounces, interfaces) = (bounces + 1, 0);
     }
 }
 

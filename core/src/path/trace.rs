@@ -10,7 +10,7 @@ use crate::sampling::{Generator, mis, uniform, uniform2};
 use crate::spectrum::Spectrum;
 use crate::surface::Surface;
 use crate::transmittance::{Flight, flight, transmittance};
-use crate::world::{World, leave};
+use crate::world::{World, beyond, leave};
 
 /// A path longer than this ends, whatever the settings say: a guard against worlds without
 /// absorption, where roulette may never come up.
@@ -245,8 +245,7 @@ fn walk<const BEYOND: bool, M: Medium + ?Sized, S: Scene + ?Sized>(
                 emitted(&mut path, world, &ray, &hit, point);
             }
             if hidden || hit.surface == Surface::Null {
-                let origin = leave(point, hit.normal, ray.direction, hit.distance);
-                ray = Ray { origin, direction: ray.direction, length: ray.length - hit.distance };
+                ray = beyond(&ray, &hit);
                 continue;
             }
             path.arrive(First::Surface);
