@@ -2,7 +2,7 @@
 
 use fogbow::cache::{Caches, Estimator, EyeSettings, Place, clearance, places, radiance};
 use fogbow::host::{Empty, Hit, Medium, Scene};
-use fogbow::light::{Light, PointLight, Sun};
+use fogbow::light::{Light, PointLight, QuadLight, Sun};
 use fogbow::math::{Bounds, Ray, Vec3};
 use fogbow::medium::{Homogeneous, Placed, Region};
 use fogbow::multiple_scatter;
@@ -159,4 +159,37 @@ fn rays_that_never_get_past_an_interface_end_as_at_a_black_wall() {
     let eye = EyeSettings { density: 8.0, connections: 1, lights_visible: true, indirect: true };
     let seen = radiance(&ray, &make, &Caches::default(), &eye, &mut Generator::new(1));
     assert_eq!(seen.total(), Spectrum::ZERO);
+}
+
+/// A rectangle that shines, and that light passes.
+struct Pane;
+
+impl Scene for Pane {
+    fn closest_hit(&self, ray: &Ray) -> Option<Hit> {
+        let distance = (1.0 - ray.origin.z) / ray.direction.z;
+        let is_within = ray.at(distance).abs().truncate().max_element() < 0.5;
+        let is_hit = distance > 0.0 && distance < ray.length && is_within;
+        is_hit.then_some(Hit { distance, normal: Vec3::NEG_Z, surface: Surface::Null, light: Some(0) })
+    }
+}
+
+#[test]
+fn lamps_on_null_interfaces_are_seen() {
+    let edge = |x: f32, y: f32| Vec3::new(x, y, 0.0);
+    let quad = QuadLight::new(Vec3::new(-0.5, -0.5, 1.0), edge(0.0, 1.0), edge(1.0, 0.0), Spectrum::ONE).unwrap();
+    let lights = [Light::Quad(quad)];
+    assert!(quad.normal().z < 0.0);
+    let world = World { medium: &Empty, scene: &Pane, lights: &lights };
+    let make = estimator(&Empty, &Pane, &lights);
+    let ray = Ray::new(Vec3::ZERO, Vec3::Z);
+    for lights_visible in [true, false] {
+        let settings = Settings { lights_visible, ..Settings::default() };
+        let eye = EyeSettings { density: 8.0, connections: 1, lights_visible, indirect: true };
+        let by_paths = path::radiance(&ray, &world, &settings, &mut Generator::new(1)).total();
+        let by_caches = radiance(&ray, &make, &Caches::default(), &eye, &mut Generator::new(1)).total();
+        assert_eq!(
+            (by_paths, by_caches),
+            if lights_visible { (Spectrum::ONE, Spectrum::ONE) } else { Default::default() }
+        );
+    }
 }

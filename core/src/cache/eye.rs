@@ -156,13 +156,16 @@ fn look<M: Medium + ?Sized, S: Scene + ?Sized>(
         };
         let hidden = !lights_visible && hit.light.is_some();
         let point = segment.at(hit.distance);
+        if !hidden
+            && !lights_done
+            && let Some(light) = hit.light.and_then(|i| world.lights.get(i as usize))
+        {
+            sight.emitted(throughput * light.radiance(hit.normal, to_eye));
+        }
         if hidden || hit.surface == Surface::Null {
             ray = beyond(&ray, &hit);
             interfaces += 1;
             continue;
-        }
-        if !lights_done && let Some(light) = hit.light.and_then(|i| world.lights.get(i as usize)) {
-            sight.emitted(throughput * light.radiance(hit.normal, to_eye));
         }
         if scatters && !hit.surface.is_discrete() {
             sight.surface(&segment, &hit, throughput);
