@@ -6,17 +6,16 @@ use super::estimate::Estimator;
 use super::lookup::{Basis, Reading};
 use super::store::{SurfaceCache, VolumeCache};
 use crate::host::{Hit, Medium, Properties, Rng, Scene};
-use crate::light::{Falloff, Light, Source};
+use crate::light::{Light, LightSample};
 use crate::march::scattering_points;
 use crate::math::{Frame, Ray};
 use crate::phase::deflection;
 use crate::sampling::discrete::choose;
-use crate::sampling::distance::Equiangular;
 use crate::sampling::{Generator, uniform, uniform2, warp};
 use crate::spectrum::Spectrum;
 use crate::surface::{Surface, lambert};
 use crate::transmittance::thickness::{Marching, transmittance, until_the_end};
-use crate::world::{MAX_INTERFACES, World, beyond, leave, nearest_surface, shadow_ray};
+use crate::world::{MAX_INTERFACES, NearLight, World, beyond, leave, nearest_surface, shadow_ray};
 
 /// Mirrors and panes of glass an eye ray follows: a hall of mirrors must end.
 const MAX_BOUNCES: u32 = 32;
@@ -340,36 +339,25 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Gather<'_, M, S> {
         let world = &self.estimator.world;
         let reached = world.lights.iter().filter_map(|light| {
             light.steep_field()?;
-            let interval = light.near_interval(segment, 0.0, segment.length)?;
-            Some((light.sent_along(segment, interval), (light, interval)))
+            let light = NearLight::of(light, segment, 0.0, segment.length)?;
+            Some((light.sent(segment), light))
         });
-        let ((light, interval), chosen) = choose(reached, choice)?;
-        let (pivot, source) = light.anchor(uniform2(&mut self.rng))?;
-        let law = Equiangular::new(segment.origin, segment.direction, pivot, interval.0, interval.1)?;
-        let distance = law.sample(u).clamp(interval.0, interval.1);
-        let point = segment.at(distance);
-        let properties = world.medium.properties(point);
+        let (light, chosen) = choose(reached, choice)?;
+        let joint = light.join(segment, u, uniform2(&mut self.rng))?;
+        let properties = world.medium.properties(joint.point);
         if properties.scattering.is_black() {
             return None;
         }
-        let source: Source = match source {
-            Some(source) => source,
-            None => light.sample(point, uniform2(&mut self.rng))?.source,
-        };
-        let incident = source.incident(point)?;
+        let LightSample { source, incident, .. } = joint.light(|| uniform2(&mut self.rng))?;
         let value = properties.phase.value(deflection(incident.to_light, -segment.direction));
-        let shadow = shadow_ray(point, &source);
+        let shadow = shadow_ray(joint.point, &source);
         if world.scene.is_blocked(&shadow) {
             return None;
         }
         let marching = Marching { steps: self.estimator.walk.steps, offset: uniform(&mut self.rng) };
-        let way = Ray {
-            length: if source.falloff == Falloff::Distant { f32::INFINITY } else { incident.distance },
-            ..shadow
-        };
-        let through = transmittance(&segment.with_length(distance), world.medium, marching)
-            * transmittance(&way, world.medium, marching);
-        let pdf = law.pdf(distance) * chosen.probability;
+        let through = transmittance(&segment.with_length(joint.distance), world.medium, marching)
+            * transmittance(&shadow.with_length(incident.distance), world.medium, marching);
+        let pdf = joint.pdf * chosen.probability;
         let light = properties.scattering * value * through * incident.irradiance / pdf;
         light.is_finite().then_some(light)
     }

@@ -196,9 +196,10 @@ fn walk<const BEYOND: bool, M: Medium + ?Sized, S: Scene + ?Sized>(
         if has_near_fields {
             let random = (uniform(rng), uniform(rng), uniform2(rng));
             if !is_seen && path.scatterings < max_scatterings && flown.span.1 > flown.span.0 {
-                let light = connect::along(world, &segment, &flown, random, &mut child);
                 let first = if path.first == First::Nothing { First::Medium } else { path.first };
-                path.add(path.throughput * light, first, path.scatterings + 1);
+                if let Some(light) = connect::along(world, &segment, &flown, random, &mut child) {
+                    path.add(path.throughput * light, first, path.scatterings + 1);
+                }
             }
         }
         path.throughput *= flown.weight;

@@ -8,12 +8,15 @@
 //! | `mod` | [`World`]: medium, surfaces and lights |
 //! | `host/passing` | [`leave`], [`beyond`], [`nearest_surface`]: from surface to surface, past null interfaces |
 //! | `rays` | [`shadow_ray`]: is a light hidden? |
+//! | `near` | [`NearLight`]: rays close by a light, joined to it |
 //! | `outline` | [`Outline`]: what methods must know beforehand |
 
+mod near;
 mod outline;
 mod rays;
 
 pub use crate::host::passing::{MAX_INTERFACES, beyond, leave, nearest_surface};
+pub use near::{Joint, NearLight};
 pub use outline::{LightCounts, Outline};
 pub use rays::{shadow_ray, short_of_end};
 
