@@ -3,6 +3,8 @@
 //! [`Medium`] and [`Scene`] are open sets and therefore traits: few methods, plain data in and
 //! out, usable as `&dyn`. All but the indispensable have honest defaults.
 
+pub(crate) mod passing;
+
 use glam::Vec3;
 pub use rand_core::Rng;
 
@@ -253,24 +255,10 @@ pub trait Scene {
         Symmetric3::ZERO
     }
 
-    /// Whether any surface other than a [`Surface::Null`] lies strictly between the ends of `ray`.
+    /// Whether any surface other than a [`Surface::Null`] lies strictly between the ends of `ray`. The default goes by
+    /// [`nearest_surface`](crate::world::nearest_surface).
     fn is_blocked(&self, ray: &Ray) -> bool {
-        let mut rest = *ray;
-        // Null interfaces let light through; a handful of nested ones is a lot.
-        for _ in 0..64 {
-            match self.closest_hit(&rest) {
-                None => return false,
-                Some(hit) if hit.surface != Surface::Null => return true,
-                Some(hit) => {
-                    let passed = hit.distance + 1e-4 * hit.distance.max(1e-3);
-                    rest = Ray { origin: rest.at(passed), direction: rest.direction, length: rest.length - passed };
-                }
-            }
-            if rest.length <= 0.0 {
-                return false;
-            }
-        }
-        true
+        passing::nearest_surface(ray, self).is_some()
     }
 }
 

@@ -6,17 +6,16 @@ use super::estimate::Estimator;
 use super::lookup::{Basis, Reading};
 use super::store::{SurfaceCache, VolumeCache};
 use crate::host::{Hit, Medium, Properties, Rng, Scene};
-use crate::light::{Falloff, Light, Source};
+use crate::light::{Light, LightSample};
 use crate::march::scattering_points;
 use crate::math::{Frame, Ray};
 use crate::phase::deflection;
 use crate::sampling::discrete::choose;
-use crate::sampling::distance::Equiangular;
 use crate::sampling::{Generator, uniform, uniform2, warp};
 use crate::spectrum::Spectrum;
 use crate::surface::{Surface, lambert};
 use crate::transmittance::thickness::{Marching, transmittance, until_the_end};
-use crate::world::{World, leave, nearest_surface, shadow_ray};
+use crate::world::{MAX_INTERFACES, NearLight, World, beyond, leave, nearest_surface, shadow_ray};
 
 /// Mirrors and panes of glass an eye ray follows: a hall of mirrors must end.
 const MAX_BOUNCES: u32 = 32;
@@ -133,7 +132,8 @@ fn look<M: Medium + ?Sized, S: Scene + ?Sized>(
     let (mut lights_visible, mut lights_done) = (settings.lights_visible, false);
     let mut bounced = false;
     let mut ray = *ray;
-    for _ in 0..MAX_BOUNCES {
+    let (mut bounces, mut interfaces) = (0, 0);
+    while bounces < MAX_BOUNCES && interfaces <= MAX_INTERFACES {
         let hit = world.scene.closest_hit(&ray);
         let segment = hit.map_or(ray, |hit| ray.with_length(hit.distance));
         let (u, jitter, choice) = (uniform(rng), uniform(rng), uniform(rng));
@@ -163,13 +163,16 @@ fn look<M: Medium + ?Sized, S: Scene + ?Sized>(
         };
         let hidden = !lights_visible && hit.light.is_some();
         let point = segment.at(hit.distance);
-        if hidden || hit.surface == Surface::Null {
-            let origin = leave(point, hit.normal, ray.direction, hit.distance);
-            ray = Ray { origin, direction: ray.direction, length: ray.length - hit.distance };
-            continue;
-        }
-        if !lights_done && let Some(light) = hit.light.and_then(|i| world.lights.get(i as usize)) {
+        if !hidden
+            && !lights_done
+            && let Some(light) = hit.light.and_then(|i| world.lights.get(i as usize))
+        {
             sight.emitted(throughput * light.radiance(hit.normal, to_eye));
+        }
+        if hidden || hit.surface == Surface::Null {
+            ray = beyond(&ray, &hit);
+            interfaces += 1;
+            continue;
         }
         if scatters && !hit.surface.is_discrete() {
             sight.surface(&segment, &hit, throughput);
@@ -183,6 +186,7 @@ fn look<M: Medium + ?Sized, S: Scene + ?Sized>(
         lights_done = !hit.surface.is_discrete();
         throughput *= sample.weight;
         ray = Ray::new(leave(point, hit.normal, sample.to_light, hit.distance), sample.to_light);
+        (bounces, interfaces) = (bounces + 1, 0);
     }
 }
 
@@ -358,36 +362,25 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Gather<'_, M, S> {
         let world = &self.estimator.world;
         let reached = world.lights.iter().filter_map(|light| {
             light.steep_field()?;
-            let interval = light.near_interval(segment, 0.0, segment.length)?;
-            Some((light.sent_along(segment, interval), (light, interval)))
+            let light = NearLight::of(light, segment, 0.0, segment.length)?;
+            Some((light.sent(segment), light))
         });
-        let ((light, interval), chosen) = choose(reached, choice)?;
-        let (pivot, source) = light.anchor(uniform2(&mut self.rng))?;
-        let law = Equiangular::new(segment.origin, segment.direction, pivot, interval.0, interval.1)?;
-        let distance = law.sample(u).clamp(interval.0, interval.1);
-        let point = segment.at(distance);
-        let properties = world.medium.properties(point);
+        let (light, chosen) = choose(reached, choice)?;
+        let joint = light.join(segment, u, uniform2(&mut self.rng))?;
+        let properties = world.medium.properties(joint.point);
         if properties.scattering.is_black() {
             return None;
         }
-        let source: Source = match source {
-            Some(source) => source,
-            None => light.sample(point, uniform2(&mut self.rng))?.source,
-        };
-        let incident = source.incident(point)?;
+        let LightSample { source, incident, .. } = joint.light(|| uniform2(&mut self.rng))?;
         let value = properties.phase.value(deflection(incident.to_light, -segment.direction));
-        let shadow = shadow_ray(point, &source);
+        let shadow = shadow_ray(joint.point, &source);
         if world.scene.is_blocked(&shadow) {
             return None;
         }
         let marching = Marching { steps: self.estimator.walk.steps, offset: uniform(&mut self.rng) };
-        let way = Ray {
-            length: if source.falloff == Falloff::Distant { f32::INFINITY } else { incident.distance },
-            ..shadow
-        };
-        let through = transmittance(&segment.with_length(distance), world.medium, marching)
-            * transmittance(&way, world.medium, marching);
-        let pdf = law.pdf(distance) * chosen.probability;
+        let through = transmittance(&segment.with_length(joint.distance), world.medium, marching)
+            * transmittance(&shadow.with_length(incident.distance), world.medium, marching);
+        let pdf = joint.pdf * chosen.probability;
         let light = properties.scattering * value * through * incident.irradiance / pdf;
         light.is_finite().then_some(light)
     }

@@ -9,14 +9,13 @@ use crate::light::{Falloff, Light, sky};
 use crate::math::{Ray, float};
 use crate::phase::{Phase, deflection};
 use crate::sampling::discrete::choose;
-use crate::sampling::distance::Equiangular;
 use crate::sampling::{Generator, uniform, uniform2, warp};
 use crate::single_scatter::{Arrival, Contribution};
 use crate::spectrum::{Gradient, Spectrum};
 use crate::transmittance::thickness::{
     Marching, Steps, optical_thickness_with_gradients, transmittance_with_gradients, until_the_end,
 };
-use crate::world::{nearest_surface, shadow_ray};
+use crate::world::{NearLight, nearest_surface, shadow_ray};
 
 /// Beyond this many distances to the light an endless segment is not sampled equiangularly: 10⁻⁴ of
 /// the angle lies there, and `tan` loses its digits.
@@ -216,11 +215,11 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Walk<'_, M, S> {
         total: &mut Incoming,
         rng: &mut Generator,
     ) {
-        let importance = |light: &Light<'_>| {
+        let lights = self.lights.iter().filter_map(|light| {
             let near = light.steep_field().is_some_and(|field| field.contains(at));
-            if near || light.is_sky() { 0.0 } else { light.importance(at) }
-        };
-        self.each_light(importance, rng, |light, share, rng| {
+            (!near && !light.is_sky()).then(|| (light.importance(at), light))
+        });
+        self.each(lights, rng, |light, share, rng| {
             let mut sample = light.sample(at, uniform2(rng))?;
             sample.source.weight = sample.source.weight / share;
             let arrival = Arrival::from_source(at, self.medium, &sample.source, self.marching(rng), 0.0)?;
@@ -244,33 +243,28 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Walk<'_, M, S> {
         rng: &mut Generator,
     ) {
         let lit = until_the_end(ray, self.medium);
-        let interval = |light: &Light<'_>| {
+        let lights = self.lights.iter().filter_map(|light| {
             let centre = light.steep_field()?.centre();
             let farthest = lit.length.min(ENDLESS * ray.origin.distance(centre).max(self.medium.resolution()));
-            light.near_interval(&lit, 0.0, farthest)
-        };
-        let importance = |light: &Light<'_>| interval(light).map_or(0.0, |part| light.sent_along(&lit, part));
-        self.each_light(importance, rng, |light, share, rng| {
-            let (position, source) = light.anchor(uniform2(rng))?;
-            let (near, far) = interval(light)?;
-            let law = Equiangular::new(ray.origin, ray.direction, position, near, far)?;
-            let distance = law.sample(uniform(rng)).clamp(near, far);
-            let (at, marching) = (ray.at(distance), self.marching(rng));
+            let light = NearLight::of(light, &lit, 0.0, farthest)?;
+            Some((light.sent(&lit), light))
+        });
+        self.each(lights, rng, |light, share, rng| {
+            let on_light = uniform2(rng);
+            let joint = light.join(ray, uniform(rng), on_light)?;
+            let (at, distance, marching) = (joint.point, joint.distance, self.marching(rng));
             let properties = self.medium.properties(at);
             if properties.scattering.is_black() {
                 return None;
             }
-            let source = match source {
-                Some(source) => source,
-                None => light.sample(at, uniform2(rng))?.source,
-            };
+            let source = joint.light(|| uniform2(rng))?.source;
             let closest = if source.falloff == Falloff::Area { 0.0 } else { self.settings.closest };
             let arrival = Arrival::from_source(at, self.medium, &source, marching, closest)?;
             if self.scene.is_blocked(&shadow_ray(at, &source)) {
                 return None;
             }
             let segment = optical_thickness_with_gradients(&ray.with_length(distance), self.medium, marching);
-            let frozen = kappa / (law.pdf(distance) * share);
+            let frozen = kappa / (joint.pdf * share);
             let slope = self.medium.gradients(at).scattering;
             let through = segment.value.transmitted();
             let shift = Shift::new(ray, end, reach, distance);
@@ -288,21 +282,20 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Walk<'_, M, S> {
     }
 
     /// Calls `connect(light, probability)` for all lights with positive importance, or for one of them.
-    fn each_light(
+    fn each<L>(
         &self,
-        importance: impl Fn(&Light<'_>) -> f32,
+        lights: impl Iterator<Item = (f32, L)>,
         rng: &mut Generator,
-        mut connect: impl FnMut(&Light<'_>, f32, &mut Generator) -> Option<()>,
+        mut connect: impl FnMut(L, f32, &mut Generator) -> Option<()>,
     ) {
         if self.settings.one_light {
-            let weighted = self.lights.iter().map(|light| (importance(light), light));
-            if let Some((light, choice)) = choose(weighted, uniform(rng)) {
+            if let Some((light, choice)) = choose(lights, uniform(rng)) {
                 connect(light, choice.probability, rng);
             }
             return;
         }
-        for light in self.lights {
-            if importance(light) > 0.0 {
+        for (importance, light) in lights {
+            if importance > 0.0 {
                 connect(light, 1.0, rng);
             }
         }

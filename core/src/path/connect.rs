@@ -6,11 +6,10 @@ use crate::host::{Medium, Scene};
 use crate::light::{Falloff, Incident, Light, LightSample, Source};
 use crate::math::Ray;
 use crate::phase::deflection;
-use crate::sampling::distance::Equiangular;
 use crate::sampling::{Generator, discrete, mis};
 use crate::spectrum::Spectrum;
 use crate::transmittance::{Flight, transmittance};
-use crate::world::{World, short_of_end};
+use crate::world::{NearLight, World, short_of_end};
 
 /// How important a light is for next-event estimation at `point`. In the medium, a light's near
 /// field is left to [`along`].
@@ -117,7 +116,7 @@ pub(super) fn next_event<M: Medium + ?Sized, S: Scene + ?Sized>(
 }
 
 /// Light from the near field of a light, scattered towards the eye somewhere along a flight, over
-/// the throughput at the flight's start: an equiangular connection (Kulla and Fajardo 2012).
+/// the throughput at the flight's start: see [`NearLight`].
 ///
 /// Grey media: the point lies on the part that was flown, whose survival already holds the
 /// transmittance. Coloured ones: on the whole segment, with an estimate of the transmittance.
@@ -128,51 +127,32 @@ pub(super) fn along<M: Medium + ?Sized, S: Scene + ?Sized>(
     flight: &Flight,
     random: (f32, f32, Vec2),
     rng: &mut Generator,
-) -> Spectrum {
+) -> Option<Spectrum> {
     let flown = world.medium.is_grey();
     let (near, far) = (flight.span.0, if flown { flight.span.1 } else { segment.length });
     let lights = world.lights;
-    let around =
-        |pivot: Vec3, (near, far): (f32, f32)| Equiangular::new(segment.origin, segment.direction, pivot, near, far);
     let reached = lights.iter().filter_map(|light| {
-        let interval = light.near_interval(segment, near, far)?;
-        let sent = if lights.len() == 1 { 1.0 } else { light.sent_along(segment, interval) };
-        Some((sent, (light, interval)))
+        let light = NearLight::of(light, segment, near, far)?;
+        let sent = if lights.len() == 1 { 1.0 } else { light.sent(segment) };
+        Some((sent, light))
     });
-    let Some(((light, interval), chosen)) = discrete::choose(reached, random.0) else {
-        return Spectrum::ZERO;
-    };
-    let Some((pivot, source)) = light.anchor(random.2) else {
-        return Spectrum::ZERO;
-    };
-    let Some(equiangular) = around(pivot, interval) else {
-        return Spectrum::ZERO;
-    };
-    let distance = equiangular.sample(random.1).clamp(interval.0, interval.1);
-    let point = segment.at(distance);
-    let sampled = match source {
-        Some(source) => source
-            .incident(point)
-            .map(|incident| (incident, light.anchor_pdf(point, incident.to_light, incident.distance, source.normal))),
-        None => light.sample(point, random.2).map(|sample| (sample.incident, sample.pdf)),
-    };
-    let Some((incident, pdf)) = sampled else {
-        return Spectrum::ZERO;
-    };
-    let properties = world.medium.properties(point);
+    let (light, chosen) = discrete::choose(reached, random.0)?;
+    let joint = light.join(segment, random.1, random.2)?;
+    let LightSample { incident, pdf, .. } = joint.light(|| random.2)?;
+    let properties = world.medium.properties(joint.point);
     let deflection = deflection(incident.to_light, -segment.direction);
     let scattered = properties.scattering * properties.phase.value(deflection);
     if scattered.is_black() {
-        return Spectrum::ZERO;
+        return None;
     }
     let weight = if pdf > 0.0 { mis::power(pdf, properties.phase.pdf(deflection)) } else { 1.0 };
-    let way = Ray { origin: point, direction: incident.to_light, length: incident.distance };
+    let way = Ray { origin: joint.point, direction: incident.to_light, length: incident.distance };
     let mut arriving = reach(world, &way, rng);
     if arriving.is_black() {
-        return Spectrum::ZERO;
+        return None;
     }
     if !flown {
-        arriving *= transmittance(world.medium, &segment.with_length(distance), rng);
+        arriving *= transmittance(world.medium, &segment.with_length(joint.distance), rng);
     }
-    scattered * arriving * incident.irradiance * (weight / (equiangular.pdf(distance) * chosen.probability))
+    Some(scattered * arriving * incident.irradiance * (weight / (joint.pdf * chosen.probability)))
 }

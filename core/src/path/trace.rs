@@ -10,7 +10,7 @@ use crate::sampling::{Generator, mis, uniform, uniform2};
 use crate::spectrum::Spectrum;
 use crate::surface::Surface;
 use crate::transmittance::{Flight, flight, transmittance};
-use crate::world::{World, leave};
+use crate::world::{World, beyond, leave};
 
 /// A path longer than this ends, whatever the settings say: a guard against worlds without
 /// absorption, where roulette may never come up.
@@ -196,9 +196,10 @@ fn walk<const BEYOND: bool, M: Medium + ?Sized, S: Scene + ?Sized>(
         if has_near_fields {
             let random = (uniform(rng), uniform(rng), uniform2(rng));
             if !is_seen && path.scatterings < max_scatterings && flown.span.1 > flown.span.0 {
-                let light = connect::along(world, &segment, &flown, random, &mut child);
                 let first = if path.first == First::Nothing { First::Medium } else { path.first };
-                path.add(path.throughput * light, first, path.scatterings + 1);
+                if let Some(light) = connect::along(world, &segment, &flown, random, &mut child) {
+                    path.add(path.throughput * light, first, path.scatterings + 1);
+                }
             }
         }
         path.throughput *= flown.weight;
@@ -245,8 +246,7 @@ fn walk<const BEYOND: bool, M: Medium + ?Sized, S: Scene + ?Sized>(
                 emitted(&mut path, world, &ray, &hit, point);
             }
             if hidden || hit.surface == Surface::Null {
-                let origin = leave(point, hit.normal, ray.direction, hit.distance);
-                ray = Ray { origin, direction: ray.direction, length: ray.length - hit.distance };
+                ray = beyond(&ray, &hit);
                 continue;
             }
             path.arrive(First::Surface);

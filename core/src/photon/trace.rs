@@ -8,13 +8,10 @@ use crate::sampling::{Generator, discrete, uniform, uniform2};
 use crate::spectrum::Spectrum;
 use crate::surface::{Surface, SurfaceSample};
 use crate::transmittance::flight;
-use crate::world::{World, leave};
+use crate::world::{World, leave, nearest_surface};
 
 /// A walk longer than this ends: a guard against worlds that absorb nothing.
 const MAX_SEGMENTS: u32 = 100_000;
-
-/// Null interfaces that one flight passes at most.
-const MAX_NULLS: u32 = 1024;
 
 /// Largest probability of going on where roulette is played. Larger: walks in worlds without absorption
 /// take longer to end. Smaller: their powers spread.
@@ -88,7 +85,10 @@ pub fn trace<M: Medium + ?Sized, S: Scene + ?Sized>(
 
     // As many as segments before: every segment but the last ends in one.
     for scatterings in 0..MAX_SEGMENTS {
-        let (reach, hit) = reach(world.scene, &ray);
+        // As far as the point that is met, rounded, lies along the ray.
+        let along = |hit: Hit| Hit { distance: (ray.at(hit.distance) - ray.origin).dot(ray.direction).max(0.0), ..hit };
+        let hit = nearest_surface(&ray, world.scene).map(along);
+        let reach = hit.map_or(ray, |hit| ray.with_length(hit.distance));
         let u_distance = uniform(rng);
         let mut child = Generator::new(u64::from(rng.next_u32()) | u64::from(scatterings) << 32);
         let lobe_choice = uniform(rng);
@@ -140,23 +140,6 @@ pub fn trace<M: Medium + ?Sized, S: Scene + ?Sized>(
         let Some((after, onward)) = next else { return };
         (power, ray) = (after, onward);
     }
-}
-
-/// The way to the next surface that is not null, or without end, and that surface with its distance from
-/// the start of the way.
-fn reach<S: Scene + ?Sized>(scene: &S, ray: &Ray) -> (Ray, Option<Hit>) {
-    let mut rest = *ray;
-    for _ in 0..MAX_NULLS {
-        let Some(hit) = scene.closest_hit(&rest) else { break };
-        let point = rest.at(hit.distance);
-        if hit.surface != Surface::Null {
-            let distance = (point - ray.origin).dot(ray.direction).max(0.0);
-            return (ray.with_length(distance), Some(Hit { distance, ..hit }));
-        }
-        let origin = leave(point, hit.normal, ray.direction, hit.distance);
-        rest = Ray { origin, direction: ray.direction, length: rest.length - hit.distance };
-    }
-    (*ray, None)
 }
 
 /// What a surface does to power, where a [`SurfaceSample`] says what it does to radiance.

@@ -6,14 +6,19 @@
 //! | file | holds |
 //! |---|---|
 //! | `mod` | [`World`]: medium, surfaces and lights |
-//! | `rays` | rays that leave surfaces, meet the next one, or ask whether a light is hidden |
+//! | `host/passing` | [`leave`], [`beyond`], [`nearest_surface`]: from surface to surface, past null interfaces |
+//! | `rays` | [`shadow_ray`]: is a light hidden? |
+//! | `near` | [`NearLight`]: rays close by a light, joined to it |
 //! | `outline` | [`Outline`]: what methods must know beforehand |
 
+mod near;
 mod outline;
 mod rays;
 
+pub use crate::host::passing::{MAX_INTERFACES, beyond, leave, nearest_surface};
+pub use near::{Joint, NearLight};
 pub use outline::{LightCounts, Outline};
-pub use rays::{leave, nearest_surface, shadow_ray, short_of_end};
+pub use rays::{shadow_ray, short_of_end};
 
 use crate::light::Light;
 
