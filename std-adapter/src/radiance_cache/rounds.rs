@@ -67,8 +67,8 @@ impl Fill for VolumeCache<'_> {
         self.radius_near(place.point)
     }
     fn add(&mut self, record: Record, higher: Vec<Coefficient>) -> bool {
-        // Storage that grows is never full.
-        self.insert(record, &higher) == Ok(true)
+        // An estimate that is no number is left out; storage that grows is never full.
+        self.insert(record, &higher).is_ok()
     }
     fn count(&self) -> usize {
         self.len()
@@ -93,7 +93,8 @@ impl Fill for VolumeCache<'_> {
         }
     }
     fn replace(&mut self, number: usize, value: Spectrum, gradient: &Gradient, higher: &Vec<Coefficient>) {
-        self.revise(number as u32, value, gradient, higher);
+        // What is no number leaves the record as it was.
+        let _ = self.revise(number as u32, value, gradient, higher);
     }
 }
 
@@ -106,7 +107,7 @@ impl Fill for SurfaceCache<'_> {
         self.radius_near(place.point)
     }
     fn add(&mut self, record: Record, facing: Facing) -> bool {
-        self.insert(record, &[facing]) == Ok(true)
+        self.insert(record, &[facing]).is_ok()
     }
     fn count(&self) -> usize {
         self.len()
@@ -131,7 +132,7 @@ impl Fill for SurfaceCache<'_> {
         }
     }
     fn replace(&mut self, number: usize, value: Spectrum, gradient: &Gradient, facing: &Facing) {
-        self.revise(number as u32, value, gradient, &[*facing]);
+        let _ = self.revise(number as u32, value, gradient, &[*facing]);
     }
 }
 
