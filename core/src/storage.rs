@@ -54,6 +54,22 @@ impl<T: Copy> List<'_, T> {
         Ok(())
     }
 
+    /// How many more elements fit; a `Vec` has no end.
+    ///
+    /// ```
+    /// # use fogbow::storage::List;
+    /// let mut list = List::from(&mut [0.0; 3][..]);
+    /// assert_eq!((list.push(1.0), list.room()), (Ok(()), 2));
+    /// ```
+    #[must_use]
+    pub fn room(&self) -> usize {
+        match &self.0 {
+            Storage::Lent { slots, used } => slots.len() - used,
+            #[cfg(feature = "alloc")]
+            Storage::Grown(_) => usize::MAX,
+        }
+    }
+
     /// The elements so far.
     #[must_use]
     pub fn as_slice(&self) -> &[T] {

@@ -1,8 +1,9 @@
 //! The radiance cache: radii, records, mixtures and look-ups. What fills it: `cache_light.rs`.
 
 use fogbow::cache::{
-    Basis, Blend, Cache, Extrapolation, Facing, Limits, Reading, Record, SurfaceCache, TurningBasis, VolumeCache,
-    clamp_gradient, exponent_limit, log_gradient_radius, neighbour_clamped, valid_radius, weight,
+    Basis, Blend, Cache, Extrapolation, Facing, Index, InsertError, Limits, Reading, Record, SurfaceCache,
+    TurningBasis, VolumeCache, clamp_gradient, exponent_limit, log_gradient_radius, neighbour_clamped, valid_radius,
+    weight,
 };
 use fogbow::math::Vec3;
 use fogbow::sampling::{Generator, uniform};
@@ -172,7 +173,7 @@ fn energies_far_from_1_make_records_like_any_other() {
         let record = Record::new(Vec3::ZERO, &sums, 0.5, Limits { min: 0.1, max: 4.0 }).unwrap();
         assert_eq!(record.radius, 1.0);
         let mut cache: VolumeCache<'_> = Cache::growing(0);
-        assert_eq!(cache.insert(record, &[]), Ok(true));
+        assert_eq!(cache.insert(record, &[]), Ok(()));
         for extrapolation in KINDS {
             let reading = Reading { extrapolation, ..Reading::new(0.5) };
             let got = cache.lookup(Vec3::X * 0.5, &Basis::new(Vec3::Z, 0), &reading).unwrap() / scale;
@@ -207,10 +208,54 @@ fn records_that_are_no_numbers_are_left_out() {
         Record { value: Spectrum::splat(-1.0), ..good },
         Record { gradient: Gradient::outer(nan, Vec3::X), ..good },
     ] {
-        assert_eq!(cache.insert(bad, &[]), Ok(false), "{bad:?}");
+        assert_eq!(cache.insert(bad, &[]), Err(InsertError::Record), "{bad:?}");
     }
-    assert_eq!(cache.insert(good, &[Coefficient::ZERO]), Ok(false), "one attachment too many");
     assert!(cache.is_empty());
+}
+
+#[test]
+fn attachments_that_are_no_numbers_or_of_another_number_are_refused() {
+    let good = record(Vec3::ZERO, 1.0);
+    let nan = Coefficient { value: Spectrum::splat(f32::NAN), ..Coefficient::ZERO };
+    let steep =
+        Coefficient { gradient: Gradient::outer(Spectrum::splat(f32::INFINITY), Vec3::ONE), ..Coefficient::ZERO };
+    let mut cache: VolumeCache<'_> = Cache::growing(3);
+    for bad in [nan, steep] {
+        let attached = [Coefficient::ZERO, Coefficient::ZERO, bad];
+        assert_eq!(cache.insert(good, &attached), Err(InsertError::Attachment(2)));
+    }
+    assert_eq!(cache.insert(good, &[Coefficient::ZERO; 4]), Err(InsertError::Stride { found: 4, due: 3 }));
+    assert!(cache.is_empty());
+
+    cache.insert(good, &[Coefficient::ZERO; 3]).unwrap();
+    let mut revise = |value, attached: &[Coefficient]| cache.revise(0, value, &Gradient::ZERO, attached);
+    assert_eq!(revise(Spectrum::ONE, &[nan; 3]), Err(InsertError::Attachment(0)));
+    assert_eq!(revise(Spectrum::ONE, &[]), Err(InsertError::Stride { found: 0, due: 3 }));
+    assert_eq!(revise(Spectrum::splat(-1.0), &[Coefficient::ZERO; 3]), Err(InsertError::Record));
+    assert_eq!((cache.records(), cache.attachments()), (&[good][..], &[Coefficient::ZERO; 3][..]));
+
+    let mut floor: SurfaceCache<'_> = Cache::growing(1);
+    for normal in [Vec3::splat(f32::NAN), Vec3::ZERO, Vec3::Y * 2.0] {
+        let facing = Facing { normal, turn: Gradient::ZERO };
+        assert_eq!(floor.insert(good, &[facing]), Err(InsertError::Attachment(0)), "{normal}");
+    }
+}
+
+/// No room for a third: neither its neighbours nor anything else may know that it was there.
+#[test]
+fn a_full_cache_is_as_before() {
+    for (room, attachments) in [(2, 9), (3, 8)] {
+        let (mut records, mut higher) = ([record(Vec3::ZERO, 1.0); 3], [Coefficient::ZERO; 9]);
+        let index = || Index::new(Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        let mut cache: VolumeCache<'_> =
+            Cache::new(&mut records[..room], &mut higher[..attachments], index(), index(), 3);
+        for x in [0.0, 3.0] {
+            cache.insert(record(Vec3::X * x, 5.0), &[Coefficient::ZERO; 3]).unwrap();
+        }
+        let before = (cache.records().to_vec(), cache.attachments().to_vec());
+        assert_eq!(cache.insert(record(Vec3::X, 0.1), &[Coefficient::ZERO; 3]), Err(InsertError::Full));
+        assert_eq!((cache.records().to_vec(), cache.attachments().to_vec()), before);
+    }
 }
 
 fn record(position: Vec3, radius: f32) -> Record {

@@ -55,7 +55,7 @@ fn volume(count: usize, stride: usize, seed: u64) -> VolumeCache<'static> {
         let record = record(unit);
         let mut higher = || Coefficient { value: Spectrum::splat(unit() - 0.5), gradient: gradient(unit) };
         let higher: Vec<_> = (0..stride).map(|_| higher()).collect();
-        assert_eq!(cache.insert(record, &higher), Ok(true));
+        assert_eq!(cache.insert(record, &higher), Ok(()));
     }
     cache.finish().unwrap();
     cache
@@ -66,7 +66,7 @@ fn surface(count: usize, seed: u64) -> SurfaceCache<'static> {
     let mut cache = Cache::growing(1);
     for _ in 0..count {
         let facing = Facing { normal: point(&mut unit).normalize_or(Vec3::Z), turn: gradient(&mut unit) };
-        assert_eq!(cache.insert(record(&mut unit), &[facing]), Ok(true));
+        assert_eq!(cache.insert(record(&mut unit), &[facing]), Ok(()));
     }
     cache.finish().unwrap();
     cache

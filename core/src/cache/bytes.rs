@@ -12,7 +12,7 @@
 //! | 24 | 8 | tag: what the cache was made for, a number of the host's choice |
 //! | 32 | 8 | [`Crc`] of bytes 0 to 32 and of all from 40 on |
 //! | 40 | 64 n | records: position, radius, value (r, g, b), gradient (along x: r, g, b; along y; along z) as `f32` |
-//! | 40 + 64 n | 48 n s | attachments, record after record: 12 `f32` each, [`Coefficient`] or [`Facing`] |
+//! | 40 + 64 n | 48 n s | attachments, record after record: 12 `f32` each, [`Coefficient`] or [`Facing`](super::Facing) |
 //!
 //! The index is not stored: it is built anew, and gives the same answers because it depends on the
 //! records and their order alone. So a cache read back gives the bits that the one written gave after
@@ -45,12 +45,12 @@
 
 use core::fmt;
 
-use bytemuck::Pod;
-
+use super::Record;
+pub use super::record::Attachment;
+use super::record::MAX_STRIDE;
 use super::store::Cache;
-use super::{Facing, Record};
 use crate::bytes::{Crc, element, elements};
-use crate::sh::{self, Coefficient};
+use crate::sh::Coefficient;
 use crate::storage::Full;
 
 /// The first bytes: not text, and damaged by whatever changes ends of lines.
@@ -61,9 +61,6 @@ pub const VERSION: u32 = 1;
 
 /// Length of a [`Header`] (bytes).
 pub const HEADER_BYTES: usize = 40;
-
-/// Most attachments a record may have: those of an expansion of [`sh::MAX_DEGREE`].
-const MAX_STRIDE: u32 = sh::MAX_COEFFICIENTS as u32 - 1;
 
 /// Which cache.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -81,29 +78,6 @@ impl fmt::Display for Kind {
             Self::Volume => "records in a medium",
             Self::Surface => "records on surfaces",
         })
-    }
-}
-
-/// What may be attached to records that are written as bytes: made of `f32` and nothing else.
-pub trait Attachment: Pod {
-    /// The kind of cache it makes.
-    const KIND: Kind;
-    /// Whether it can belong to a record that was computed.
-    fn is_valid(&self) -> bool;
-}
-
-impl Attachment for Coefficient {
-    const KIND: Kind = Kind::Volume;
-    fn is_valid(&self) -> bool {
-        self.value.0.iter().all(|c| c.is_finite()) && self.gradient.is_finite()
-    }
-}
-
-impl Attachment for Facing {
-    const KIND: Kind = Kind::Surface;
-    fn is_valid(&self) -> bool {
-        // Normals of hosts are unit vectors up to rounding; what is far from it is damage.
-        (self.normal.length_squared() - 1.0).abs() < 1e-2 && self.turn.is_finite()
     }
 }
 
@@ -239,7 +213,7 @@ impl Header {
         };
         let header = Self { kind, stride: word(16), count: word(20), tag: long(24), checksum: long(32) };
         let size = BytesError::Size { stride: header.stride, count: header.count };
-        if header.stride > MAX_STRIDE {
+        if header.stride as usize > MAX_STRIDE {
             return Err(size);
         }
         header.total().map(|_| header).ok_or(size)

@@ -16,7 +16,7 @@
 //!
 //! | file | holds |
 //! |---|---|
-//! | `record` | [`Record`], [`Facing`]: what is stored |
+//! | `record` | [`Record`], [`Attachment`]: what is stored |
 //! | `radius` | Eq. 34, limits, distance to surfaces, clamping of gradients and neighbours |
 //! | `extrapolate` | Eq. 35, and a mixture of second order: [`Blend`] |
 //! | `index` | [`Index`]: which spheres contain this point |
@@ -59,7 +59,7 @@ pub use index::{Block, Index, Node};
 pub use kind::Kind;
 pub use lookup::{Basis, Reading, TURNING_DEGREE, TurningBasis};
 pub use radius::{Limits, clamp_gradient, clearance, log_gradient_radius, neighbour_clamped, valid_radius};
-pub use record::{Facing, Record};
+pub use record::{Attachment, Facing, Record};
 pub use set_bytes::CachesError;
 pub use settings::{Effort, Settings};
-pub use store::{Cache, SurfaceCache, VolumeCache};
+pub use store::{Cache, InsertError, SurfaceCache, VolumeCache};

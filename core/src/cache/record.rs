@@ -3,7 +3,9 @@
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
+use super::bytes::Kind;
 use super::radius::{self, Limits};
+use crate::sh::{self, Coefficient};
 use crate::single_scatter::Sums;
 use crate::spectrum::{Gradient, Spectrum};
 
@@ -75,4 +77,43 @@ pub struct Facing {
     pub normal: Vec3,
     /// Vector irradiance `∫ L ω dω` (W·m⁻²): how irradiance changes as the normal turns.
     pub turn: Gradient,
+}
+
+/// Most attachments a record may have: those of an expansion of [`sh::MAX_DEGREE`].
+pub(super) const MAX_STRIDE: usize = sh::MAX_COEFFICIENTS - 1;
+
+mod sealed {
+    /// The formats of caches know what is attached, and how large it is.
+    pub trait Sealed {}
+    impl Sealed for crate::sh::Coefficient {}
+    impl Sealed for super::Facing {}
+}
+
+/// What may be attached to records: a [`Coefficient`] in the medium, a [`Facing`] on surfaces. 12 floats either way.
+pub trait Attachment: Pod + sealed::Sealed {
+    /// The kind of cache it makes.
+    const KIND: Kind;
+    /// Whether it can belong to a record that was computed: what is not valid is neither kept nor read.
+    ///
+    /// ```
+    /// # use fogbow::{cache::Attachment, sh::Coefficient, spectrum::Spectrum};
+    /// assert!(Coefficient::ZERO.is_valid());
+    /// assert!(!Coefficient { value: Spectrum::splat(f32::NAN), ..Coefficient::ZERO }.is_valid());
+    /// ```
+    fn is_valid(&self) -> bool;
+}
+
+impl Attachment for Coefficient {
+    const KIND: Kind = Kind::Volume;
+    fn is_valid(&self) -> bool {
+        self.value.is_finite() && self.gradient.is_finite()
+    }
+}
+
+impl Attachment for Facing {
+    const KIND: Kind = Kind::Surface;
+    fn is_valid(&self) -> bool {
+        // Normals of hosts are unit vectors up to rounding; what is far from it is damage.
+        (self.normal.length_squared() - 1.0).abs() < 1e-2 && self.turn.is_finite()
+    }
 }

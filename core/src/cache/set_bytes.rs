@@ -17,7 +17,8 @@
 
 use core::fmt;
 
-use super::bytes::{self, Attachment, BytesError};
+use super::bytes::{self, BytesError};
+use super::record::Attachment;
 use super::caches::RadianceCaches;
 use super::kind::Kind;
 use super::radius::Limits;

@@ -4,8 +4,8 @@ use super::guide::Guide;
 use super::kind::Kind;
 use super::lookup::Reading;
 use super::radius::clamp_gradient;
-use super::store::Cache;
-use super::{Facing, Place, Record, SurfaceCache, VolumeCache};
+use super::store::{Cache, InsertError};
+use super::{Attachment, Facing, Place, Record, SurfaceCache, VolumeCache};
 use crate::math::Vec3;
 use crate::sh::Coefficient;
 use crate::single_scatter::Sums;
@@ -120,11 +120,12 @@ impl<'s> Slot<'s> {
         let result = match (self, attached) {
             (Self::Volume(cache), Attached::Higher(higher)) => cache.insert(record, higher),
             (Self::Surface(cache), Attached::Facing(facing)) => cache.insert(record, &[facing]),
-            _ => Ok(false),
+            // Lent memory was too small for the estimate.
+            _ => Err(InsertError::Full),
         };
         match result {
-            Ok(true) => Inserted::Added,
-            Ok(false) => Inserted::LeftOut,
+            Ok(()) => Inserted::Added,
+            Err(error) if error.is_invalid() => Inserted::LeftOut,
             Err(_) => Inserted::Full,
         }
     }
@@ -145,13 +146,14 @@ impl<'s> Slot<'s> {
                     mixed.value = mix(new.value, old.value);
                     mixed.gradient = new.gradient * share + old.gradient * (1.0 - share);
                 }
-                cache.revise(number as u32, value, &gradient, &mixed[..stride]);
+                // An estimate that is no number leaves the record as it is.
+                let _ = cache.revise(number as u32, value, &gradient, &mixed[..stride]);
             }
             (Self::Surface(cache), Attached::Facing(mut facing)) => {
                 if let Some(old) = cache.attached(number as u32).first() {
                     facing.turn = facing.turn * share + old.turn * (1.0 - share);
                 }
-                cache.revise(number as u32, value, &gradient, &[facing]);
+                let _ = cache.revise(number as u32, value, &gradient, &[facing]);
             }
             _ => {}
         }
@@ -159,7 +161,7 @@ impl<'s> Slot<'s> {
 
     /// Brings all records into the indices; whether these have room for them.
     pub(super) fn finish(&mut self) -> bool {
-        fn of<E: bytemuck::Pod>(cache: &mut Cache<'_, E>) -> bool {
+        fn of<E: Attachment>(cache: &mut Cache<'_, E>) -> bool {
             cache.is_finished() || cache.finish().is_ok()
         }
         match self {

@@ -1,11 +1,12 @@
 //! Records, what is attached to each, and the index over them.
 
-use bytemuck::Pod;
+use core::fmt;
+
 use glam::Vec3;
 
 use super::index::Index;
 use super::radius::neighbour_clamped;
-use super::{Facing, Record};
+use super::record::{Attachment, Facing, MAX_STRIDE, Record};
 use crate::sh::Coefficient;
 use crate::spectrum::{Gradient, Spectrum};
 use crate::storage::{Full, List};
@@ -13,6 +14,9 @@ use crate::storage::{Full, List};
 /// Records not yet in the index: looked at one by one, so only few; but every rebuild costs as much as
 /// a few hundred records.
 const LOOSE: u32 = 32;
+
+/// No cache holds more: what counts them, and what the index keeps of them, fits 32 bits.
+const MAX_RECORDS: usize = 1 << 28;
 
 /// Records with `stride` attachments each, found by position.
 ///
@@ -32,14 +36,69 @@ pub struct Cache<'s, E> {
 /// By how much spheres are widened: in the medium for points that none contains, on surfaces against noise.
 pub(super) const WIDE: f32 = 2.0;
 
+/// Why a record was not taken. The cache is then as before.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum InsertError {
+    /// Lent storage has no room left.
+    Full,
+    /// Not [`Cache::stride`] attachments: a mistake of the caller's, not of the estimate.
+    Stride {
+        /// As many as were given.
+        found: usize,
+        /// As many as are due.
+        due: usize,
+    },
+    /// There is no record of this number to be revised: a mistake of the caller's.
+    Number(u32),
+    /// The record is not valid, see [`Record::is_valid`]: an estimate that is no number.
+    Record,
+    /// An attachment is not valid, see [`Attachment::is_valid`]: the first such.
+    Attachment(usize),
+}
+
+impl InsertError {
+    /// Whether the estimate was no number, so that it is to be left out; all else is for the caller to mend.
+    ///
+    /// ```
+    /// # use fogbow::cache::InsertError;
+    /// assert!(InsertError::Record.is_invalid() && !InsertError::Full.is_invalid());
+    /// ```
+    #[must_use]
+    pub fn is_invalid(&self) -> bool {
+        matches!(self, Self::Record | Self::Attachment(_))
+    }
+}
+
+impl fmt::Display for InsertError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Full => Full.fmt(f),
+            Self::Stride { found, due } => write!(f, "{found} attachments where a record has {due}"),
+            Self::Number(number) => write!(f, "there is no record {number}"),
+            Self::Record => f.write_str("the record is not valid"),
+            Self::Attachment(number) => write!(f, "attachment {number} is not valid"),
+        }
+    }
+}
+
+impl core::error::Error for InsertError {}
+
+impl From<Full> for InsertError {
+    fn from(_: Full) -> Self {
+        Self::Full
+    }
+}
+
 /// In-scattered radiance in a medium.
 pub type VolumeCache<'s> = Cache<'s, Coefficient>;
 
 /// Indirect irradiance on surfaces.
 pub type SurfaceCache<'s> = Cache<'s, Facing>;
 
-impl<'s, E: Pod> Cache<'s, E> {
-    /// An empty cache in lent or growing storage, with `stride` attachments per record. `wide` is the
+impl<'s, E: Attachment> Cache<'s, E> {
+    /// An empty cache in lent or growing storage, with `stride` attachments per record, those of an expansion of
+    /// [`MAX_DEGREE`](crate::sh::MAX_DEGREE) at most: more are cut to as many. `wide` is the
     /// index that [`Cache::finish`] makes of spheres twice as large; it needs two to three times the room of `index`.
     #[must_use]
     pub fn new(
@@ -49,6 +108,7 @@ impl<'s, E: Pod> Cache<'s, E> {
         wide: Index<'s>,
         stride: usize,
     ) -> Self {
+        let stride = stride.min(MAX_STRIDE);
         let mut cache = Self { records: records.into(), attached: attached.into(), index, wide, stride };
         cache.records.clear();
         cache.attached.clear();
@@ -103,13 +163,29 @@ impl<'s, E: Pod> Cache<'s, E> {
     }
 
     /// Adds a record with its attachments, after clamping its radius and its neighbours' against each
-    /// other. What is not valid or has not `stride` attachments is left out: `Ok(false)`.
+    /// other.
     ///
     /// # Errors
-    /// [`Full`] when lent storage has no room left; the cache is then as before but for the index.
-    pub fn insert(&mut self, mut record: Record, attached: &[E]) -> Result<bool, Full> {
-        if !record.is_valid() || attached.len() != self.stride {
-            return Ok(false);
+    /// What is wrong with the record, or that there is no room: the cache is then as before.
+    ///
+    /// ```
+    /// # use fogbow::cache::{Cache, InsertError, Record, VolumeCache};
+    /// # use fogbow::{math::Vec3, spectrum::{Gradient, Spectrum}};
+    /// # #[cfg(feature = "alloc")] {
+    /// let mut cache: VolumeCache = Cache::growing(0);
+    /// let record = Record { position: Vec3::ZERO, radius: 2.0, value: Spectrum::ONE, gradient: Gradient::ZERO };
+    /// assert_eq!(cache.insert(record, &[]), Ok(()));
+    /// // What is small beside what is large tells of something the large one missed.
+    /// cache.insert(Record { position: Vec3::X, radius: 0.25, ..record }, &[])?;
+    /// assert_eq!(cache.records()[0].radius, 1.25);
+    /// assert_eq!(cache.insert(Record { radius: f32::NAN, ..record }, &[]), Err(InsertError::Record));
+    /// # }
+    /// # Ok::<(), InsertError>(())
+    /// ```
+    pub fn insert(&mut self, mut record: Record, attached: &[E]) -> Result<(), InsertError> {
+        self.check(&record, attached)?;
+        if self.len() >= MAX_RECORDS || self.records.room() == 0 || self.attached.room() < attached.len() {
+            return Err(InsertError::Full);
         }
         for other in self.records.as_mut_slice() {
             let apart = record.position.distance(other.position);
@@ -118,30 +194,60 @@ impl<'s, E: Pod> Cache<'s, E> {
                 other.radius = other.radius.min(record.radius + apart);
             }
         }
-        for element in attached {
-            self.attached.push(*element)?;
-        }
-        self.records.push(record)?;
+        self.restore(record, attached.iter().copied())?;
         let loose = self.len() as u32 - self.index.len();
-        if loose > LOOSE.max(self.index.len() / 16) { self.rebuild().map(|()| true) } else { Ok(true) }
+        if loose > LOOSE.max(self.index.len() / 16) {
+            // Without room for the index records are looked at one by one.
+            let _ = self.rebuild();
+        }
+        Ok(())
+    }
+
+    /// Whether a record can be kept, and written and read again.
+    fn check(&self, record: &Record, attached: &[E]) -> Result<(), InsertError> {
+        if attached.len() != self.stride {
+            return Err(InsertError::Stride { found: attached.len(), due: self.stride });
+        }
+        if !record.is_valid() {
+            return Err(InsertError::Record);
+        }
+        attached.iter().position(|e| !e.is_valid()).map_or(Ok(()), |number| Err(InsertError::Attachment(number)))
     }
 
     /// Replaces what a record says of the light, by an estimate that knows more than the first could. Its
     /// place and radius stay, and with them what decides how much it counts: a radius that comes from
-    /// the same noise as the value would favour values that are too small. `false` where there is no
-    /// such record or the estimate is no number.
-    pub fn revise(&mut self, record: u32, value: Spectrum, gradient: &Gradient, attached: &[E]) -> bool {
+    /// the same noise as the value would favour values that are too small.
+    ///
+    /// # Errors
+    /// What is wrong with the estimate, or that there is no such record: the cache is then as before.
+    ///
+    /// ```
+    /// # use fogbow::cache::{Cache, InsertError, Record, VolumeCache};
+    /// # use fogbow::{math::Vec3, spectrum::{Gradient, Spectrum}};
+    /// # #[cfg(feature = "alloc")] {
+    /// let mut cache: VolumeCache = Cache::growing(0);
+    /// let blind = Record { position: Vec3::ZERO, radius: 2.0, value: Spectrum::ONE, gradient: Gradient::ZERO };
+    /// cache.insert(blind, &[])?;
+    /// cache.revise(0, Spectrum::splat(1.5), &Gradient::ZERO, &[])?;
+    /// assert_eq!(cache.records(), [Record { value: Spectrum::splat(1.5), ..blind }]);
+    /// assert_eq!(cache.revise(7, Spectrum::ONE, &Gradient::ZERO, &[]), Err(InsertError::Number(7)));
+    /// # }
+    /// # Ok::<(), InsertError>(())
+    /// ```
+    pub fn revise(
+        &mut self,
+        record: u32,
+        value: Spectrum,
+        gradient: &Gradient,
+        attached: &[E],
+    ) -> Result<(), InsertError> {
         let (i, stride) = (record as usize, self.stride);
-        let Some(old) = self.records.as_mut_slice().get_mut(i) else { return false };
+        let old = self.records().get(i).ok_or(InsertError::Number(record))?;
         let new = Record { value, gradient: *gradient, ..*old };
-        if !new.is_valid() || attached.len() != stride {
-            return false;
-        }
-        *old = new;
-        if let Some(slots) = self.attached.as_mut_slice().get_mut(i * stride..(i + 1) * stride) {
-            slots.copy_from_slice(attached);
-        }
-        true
+        self.check(&new, attached)?;
+        self.records.as_mut_slice()[i] = new;
+        self.attached.as_mut_slice()[i * stride..(i + 1) * stride].copy_from_slice(attached);
+        Ok(())
     }
 
     /// Forgets all records and keeps the memory.
@@ -203,8 +309,8 @@ impl<'s, E: Pod> Cache<'s, E> {
 }
 
 #[cfg(feature = "alloc")]
-impl<E: Pod> Cache<'_, E> {
-    /// An empty cache that grows as needed.
+impl<E: Attachment> Cache<'_, E> {
+    /// An empty cache that grows as needed; `stride` as for [`Cache::new`].
     #[must_use]
     pub fn growing(stride: usize) -> Self {
         use alloc::vec::Vec;

@@ -1,8 +1,8 @@
 //! Radiance caches in lent storage: filled with a few records, looked up, seen by eye rays.
 
 use fogbow::cache::{
-    Basis, Block, Cache, Caches, Estimator, EyeSettings, Facing, Index, Limits, Node, Place, Reader, Reading, Record,
-    SurfaceCache, TurningBasis, VolumeCache, places, radiance,
+    Basis, Block, Cache, Caches, Estimator, EyeSettings, Facing, Index, InsertError, Limits, Node, Place, Reader,
+    Reading, Record, SurfaceCache, TurningBasis, VolumeCache, places, radiance,
 };
 use fogbow::host::Medium;
 use fogbow::light::Light;
@@ -12,7 +12,6 @@ use fogbow::path;
 use fogbow::sampling::Generator;
 use fogbow::sh::{Coefficient, coefficient_count};
 use fogbow::spectrum::Spectrum;
-use fogbow::storage::Full;
 use fogbow::transmittance::thickness::Steps;
 use fogbow::world::World;
 
@@ -69,7 +68,7 @@ pub(crate) fn cache(out: &mut Digest) {
     out.int(u64::from(done));
 }
 
-fn in_medium(out: &mut Digest, medium: &dyn Medium, lights: &[Light<'_>]) -> Result<(), Full> {
+fn in_medium(out: &mut Digest, medium: &dyn Medium, lights: &[Light<'_>]) -> Result<(), InsertError> {
     let mut rng = Generator::new(17);
     let mut estimator = Estimator {
         world: World { medium, scene: &Balls, lights },
@@ -88,7 +87,7 @@ fn in_medium(out: &mut Digest, medium: &dyn Medium, lights: &[Light<'_>]) -> Res
         let at = (point(&mut rng) * 0.5).with_y(-2.0);
         let (sums, facing) = estimator.irradiance(at, Vec3::Y, WALKS, &mut rng);
         if let Some(record) = Record::new(at, &sums, READING.tolerance, LIMITS) {
-            out.int(u64::from(floor.insert(record, &[facing])?));
+            floor.insert(record, &[facing])?;
         }
     }
     floor.finish()?;
@@ -116,12 +115,12 @@ fn in_medium(out: &mut Digest, medium: &dyn Medium, lights: &[Light<'_>]) -> Res
         let mut coefficients = [Coefficient::ZERO; STRIDE];
         let once = estimator.surface(at, &phase, WALKS, &mut coefficients, &mut rng);
         if let Some(record) = Record::new(at, &once, READING.tolerance, LIMITS) {
-            out.int(u64::from(surface.insert(record, &coefficients)?));
+            surface.insert(record, &coefficients)?;
         }
         let mut coefficients = [Coefficient::ZERO; STRIDE];
         let often = estimator.multiple(at, &phase, WALKS, &mut coefficients, &mut rng);
         if let Some(record) = Record::new(at, &often, READING.tolerance, LIMITS) {
-            out.int(u64::from(multiple.insert(record, &coefficients)?));
+            multiple.insert(record, &coefficients)?;
         }
     }
     surface.finish()?;
