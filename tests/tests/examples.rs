@@ -72,7 +72,6 @@ const MISSING: &[(&str, usize)] = &[
     ("single_scatter/arrival.rs", 6),
     ("single_scatter/sample.rs", 4),
     ("single_scatter/sums.rs", 2),
-    ("storage.rs", 2),
     ("surface/lambert.rs", 3),
     ("surface/mod.rs", 4),
     ("surface/phong.rs", 4),
