@@ -468,7 +468,7 @@ impl Symmetric3 {
     /// ```
     /// # use fogbow::math::Symmetric3;
     /// let flat = Symmetric3::from_upper([2.0, 0.0, 0.0, 4.0, 0.0, 0.0]);
-    /// assert_eq!(flat.pseudo_inverse().to_upper(), [0.5, 0.0, 0.0, 0.25, 0.0, 0.0]);   // where there is nothing: 0, not ∞
+    /// assert_eq!(flat.pseudo_inverse().to_upper(), [0.5, 0.0, 0.0, 0.25, 0.0, 0.0]);   // 0 stays 0
     /// ```
     #[must_use]
     pub fn pseudo_inverse(&self) -> Self {

@@ -53,8 +53,8 @@ pub fn derivative(deflection: Deflection, g: f32, alpha: f32) -> f32 {
 /// ```
 /// # use fogbow::phase::{draine, henyey_greenstein, Deflection};
 /// let sideways = Deflection::from_cos(0.3);
-/// let (draine, plain) = (draine::second_derivative(sideways, 0.5, 0.0), henyey_greenstein::second_derivative(sideways, 0.5));
-/// assert!((draine - plain).abs() < 1e-6);   // Henyey–Greenstein where α = 0
+/// let draine = draine::second_derivative(sideways, 0.5, 0.0);
+/// assert!((draine - henyey_greenstein::second_derivative(sideways, 0.5)).abs() < 1e-6);   // Henyey–Greenstein where α = 0
 /// ```
 #[inline]
 #[must_use]
@@ -115,7 +115,8 @@ impl Powers for f64 {
 ///
 /// ```
 /// # use fogbow::phase::draine;
-/// let mean = (0..1000).map(|i| draine::sample((i as f32 + 0.5) / 1000.0, 0.5, 2.0).deflection.cos).sum::<f32>() / 1000.0;
+/// let cosines = (0..1000).map(|i| draine::sample((i as f32 + 0.5) / 1000.0, 0.5, 2.0).deflection.cos);
+/// let mean = cosines.sum::<f32>() / 1000.0;
 /// assert!((mean - draine::moment(0.5, 2.0, 1)).abs() < 1e-4);   // the mean cosine is the first moment
 /// ```
 #[must_use]

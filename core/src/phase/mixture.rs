@@ -244,7 +244,7 @@ impl Phase {
     /// ```
     /// # use fogbow::phase::{Deflection, Phase};
     /// let (cloud, forward) = (Phase::droplets(20.0).unwrap(), Deflection::from_cos(0.9));
-    /// assert!((cloud.pdf(forward) / cloud.value(forward)[0] - 1.0).abs() < 1e-6);   // without colours they are the same
+    /// assert!((cloud.pdf(forward) / cloud.value(forward)[0] - 1.0).abs() < 1e-6);   // the same without colours
     /// ```
     #[inline]
     #[must_use]

@@ -50,7 +50,8 @@ pub fn uniform_sphere_pdf() -> f32 {
 ///
 /// ```
 /// # use fogbow::{math::Vec2, sampling::warp::cosine_hemisphere};
-/// assert!((cosine_hemisphere(Vec2::new(0.75, 0.1)).z - 0.5).abs() < 1e-6);   // z² is uniform: a disc, seen from above
+/// let direction = cosine_hemisphere(Vec2::new(0.75, 0.1));
+/// assert!((direction.z - 0.5).abs() < 1e-6);   // z² is uniform: a disc, seen from above
 /// ```
 #[inline]
 #[must_use]
