@@ -38,12 +38,6 @@ const MISSING: &[(&str, usize)] = &[
     ("single_scatter/sample.rs", 4),
     ("transmittance/thickness.rs", 4),
     ("transmittance/tracking.rs", 1),
-    ("vpl/bound.rs", 7),
-    ("vpl/compensate.rs", 1),
-    ("vpl/eye.rs", 3),
-    ("vpl/gather.rs", 5),
-    ("vpl/light.rs", 6),
-    ("vpl/scatterer.rs", 6),
 ];
 
 /// Names that more than one public type has. Only to be made shorter. `Settings` is `module::Settings`.
