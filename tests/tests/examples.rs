@@ -65,6 +65,8 @@ const ABOVE_SIX: &[&str] = &[
 struct Function {
     /// Type or trait that it belongs to.
     owner: Option<String>,
+    /// Whether that is a trait.
+    of_trait: bool,
     name: String,
     /// Without the receiver.
     arguments: usize,
@@ -216,9 +218,10 @@ fn read(source: &str) -> Public {
                     Some((_, Scope::Methods(owner) | Scope::Trait(owner))) => Some(owner.clone()),
                     _ => None,
                 };
-                if is_public || matches!(scopes.last(), Some((_, Scope::Trait(_)))) {
+                let of_trait = matches!(scopes.last(), Some((_, Scope::Trait(_))));
+                if is_public || of_trait {
                     let arguments = arguments(past_generics(after));
-                    public.functions.push(Function { owner, name: name.to_owned(), arguments, docs });
+                    public.functions.push(Function { owner, of_trait, name: name.to_owned(), arguments, docs });
                 }
             }
             "struct" | "enum" | "union" | "trait" | "type" if is_public => {
@@ -278,10 +281,12 @@ fn before_word<'a>(code: &'a str, word: &str) -> Vec<&'a str> {
         .collect()
 }
 
-/// Whether an example of its own names the function, or one of its type calls it.
+/// Whether an example of its own names the function, or one of its type calls it; that of a trait may implement it.
 fn is_shown(function: &Function, docs_of_owner: &str) -> bool {
     let own = examples(&function.docs).iter().any(|code| !before_word(code, &function.name).is_empty());
-    let calls = |before: &str| before.ends_with('.') || before.ends_with("::");
+    let calls = |before: &str| {
+        before.ends_with('.') || before.ends_with("::") || (function.of_trait && before.ends_with("fn "))
+    };
     let by_owner = function.owner.is_some()
         && examples(docs_of_owner).iter().any(|code| before_word(code, &function.name).into_iter().any(calls));
     own || by_owner
@@ -464,10 +469,11 @@ mod tests {
 
 #[test]
 fn an_example_is_run_asserts_something_and_names_the_function() {
-    let shown = |docs: &str| {
-        let docs = docs.to_owned();
-        is_shown(&Function { owner: Some("T".to_owned()), name: "f".to_owned(), arguments: 0, docs }, "")
+    let method = |docs: &str| {
+        let (owner, name, docs) = (Some("T".to_owned()), "f".to_owned(), docs.to_owned());
+        Function { owner, of_trait: false, name, arguments: 0, docs }
     };
+    let shown = |docs: &str| is_shown(&method(docs), "");
     assert!(shown("```\n# use x::f;\nassert_eq!(f(1), 1);\n```"));
     assert!(shown("Text.\n```rust\nlet a = [1].map(f);\nassert!(a[0] > 0);\n```\nText."));
     assert!(!shown("```text\nassert_eq!(f(1), 1);\n```"));
@@ -475,11 +481,9 @@ fn an_example_is_run_asserts_something_and_names_the_function() {
     assert!(!shown("```\n# use x::f;\nlet _ = f(1);\n```"));
     assert!(!shown("```\n# use x::f;\nassert_eq!(half(1), 1); // f(1)\n```"));
     assert!(!shown("f(1)"));
-    let by_type = |code: &str| {
-        let function =
-            Function { owner: Some("T".to_owned()), name: "f".to_owned(), arguments: 0, docs: String::new() };
-        is_shown(&function, &format!("```\n{code}\n```"))
-    };
+    let by_type = |code: &str| is_shown(&method(""), &format!("```\n{code}\n```"));
     assert!(by_type("assert_eq!(T::new().f(), 1);") && by_type("assert_eq!(T::f(), 1);"));
+    let implemented = "```\nimpl T for U { fn f() {} }\nassert!(ask(&U));\n```";
+    assert!(is_shown(&Function { of_trait: true, ..method("") }, implemented) && !is_shown(&method(""), implemented));
     assert!(!by_type("assert_eq!(f(1), 1);") && !by_type("assert_eq!(T::new().fs(), 1);"));
 }
