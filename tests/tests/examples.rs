@@ -28,8 +28,6 @@ const MISSING: &[(&str, usize)] = &[
     ("path/mod.rs", 1),
     ("path/trace.rs", 2),
     ("single_scatter/sample.rs", 4),
-    ("transmittance/thickness.rs", 4),
-    ("transmittance/tracking.rs", 1),
 ];
 
 /// Names that more than one public type has. Only to be made shorter. `Settings` is `module::Settings`.
