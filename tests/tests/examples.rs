@@ -25,8 +25,6 @@ const MISSING: &[(&str, usize)] = &[
     ("cache/record.rs", 2),
     ("cache/store.rs", 15),
     ("host.rs", 19),
-    ("path/mod.rs", 1),
-    ("path/trace.rs", 2),
     ("single_scatter/sample.rs", 4),
 ];
 
