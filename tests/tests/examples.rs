@@ -14,16 +14,9 @@ const EXCEPTIONS: &[(&str, &str)] = &[];
 
 /// Functions still without an example, file by file. Only to be made shorter.
 const MISSING: &[(&str, usize)] = &[
-    ("cache/bytes.rs", 6),
-    ("cache/estimate.rs", 13),
-    ("cache/extrapolate.rs", 2),
-    ("cache/eye.rs", 4),
-    ("cache/guide.rs", 2),
-    ("cache/index.rs", 3),
-    ("cache/lookup.rs", 12),
-    ("cache/radius.rs", 6),
-    ("cache/record.rs", 2),
-    ("cache/store.rs", 15),
+    ("cache/bytes.rs", 1),
+    ("cache/record.rs", 1),
+    ("cache/store.rs", 1),
     ("host.rs", 4),
     ("single_scatter/sample.rs", 4),
 ];
