@@ -14,6 +14,13 @@ use crate::spectrum::{Gradient, Hessian, Spectrum};
 use crate::surface::Surface;
 
 /// Optical properties of a medium at a point.
+///
+/// ```
+/// # use fogbow::{host::Properties, spectrum::Spectrum};
+/// let fog = Properties { absorption: Spectrum::ONE, scattering: Spectrum::splat(3.0), ..Properties::VACUUM };
+/// assert_eq!((fog.extinction(), fog.albedo()), (Spectrum::splat(4.0), Spectrum::splat(0.75)));
+/// assert_eq!(Properties::VACUUM.albedo(), Spectrum::ZERO);
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Properties {
     /// Absorption coefficient σₐ (m⁻¹).
@@ -101,6 +108,23 @@ pub struct Face {
 }
 
 /// A participating medium, as the host knows it.
+///
+/// ```
+/// # use fogbow::{host::Medium, math::{Ray, Vec3}, medium::{Homogeneous, Placed, Region}, phase::Phase};
+/// # use fogbow::spectrum::{Gradient, Hessian, Spectrum};
+/// let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::ONE, Phase::ISOTROPIC)?;
+/// let ball = Placed::new(fog, Region::sphere(Vec3::ZERO, 2.0)?);
+/// assert_eq!((ball.properties(Vec3::X).scattering, ball.extinction(3.0 * Vec3::X)), (Spectrum::ONE, Spectrum::ZERO));
+/// // Inside, nothing varies; what changes at its face is told apart.
+/// assert_eq!(ball.extinction_with_gradient(Vec3::X), (Spectrum::ONE, Gradient::ZERO));
+/// assert_eq!(ball.extinction_hessian(Vec3::X), Hessian::ZERO);
+/// let mut faces = Vec::new();
+/// ball.faces(&Ray::new(-5.0 * Vec3::X, Vec3::X), &mut |face| faces.push((face.distance, face.jump[0])));
+/// assert_eq!(faces, [(3.0, -1.0), (7.0, -1.0)]);   // outside minus inside
+/// assert_eq!(ball.mean_extinction(Vec3::ZERO, 0.5), Spectrum::ONE);
+/// assert!(ball.is_grey() && !ball.is_emissive());
+/// # Ok::<(), fogbow::medium::MediumError>(())
+/// ```
 pub trait Medium {
     /// Optical properties at `point`.
     fn properties(&self, point: Vec3) -> Properties;
@@ -129,12 +153,31 @@ pub trait Medium {
 
     /// Length (m) over which coefficients vary: the step of the default's differences and of ray
     /// marching. A grid answers with its cell.
+    ///
+    /// ```
+    /// # use fogbow::{host::Medium, math::{Affine3, Vec3}, medium::{Density, Grid, MinMax}, phase::Phase, spectrum::Spectrum};
+    /// let (mut blocks, smoke, unit) = ([MinMax::default()], Density::F32(&[1.0; 4]), Spectrum::ONE);
+    /// let grid = Grid::new([4, 1, 1], smoke, unit, unit, Phase::ISOTROPIC, Affine3::IDENTITY, &mut blocks)?;
+    /// assert_eq!(grid.resolution(), 0.25);   // its shortest cell
+    /// # Ok::<(), fogbow::medium::MediumError>(())
+    /// ```
     fn resolution(&self) -> f32 {
         1e-2
     }
 
     /// `∇σₜ` and `∇σₛ` (m⁻²) inside the medium. The default takes central differences over a
     /// hundredth of [`Medium::resolution`].
+    ///
+    /// ```
+    /// # use fogbow::{host::Medium, math::Vec3, medium::{FractalNoise, Noise}, phase::Phase, spectrum::Spectrum};
+    /// let cloud = Noise::new(FractalNoise::default(), Spectrum::ONE, Spectrum::ONE, Phase::ISOTROPIC)?;
+    /// let point = Vec3::new(0.3, 0.4, 0.6);
+    /// let difference = cloud.extinction(point + 1e-3 * Vec3::X) - cloud.extinction(point - 1e-3 * Vec3::X);
+    /// let gradients = cloud.gradients(point);
+    /// assert!((gradients.extinction.x[0] - difference[0] / 2e-3).abs() < 2e-3);
+    /// assert_eq!(gradients.extinction.x, gradients.scattering.x * 2.0);   // half of it scatters
+    /// # Ok::<(), fogbow::medium::MediumError>(())
+    /// ```
     fn gradients(&self, point: Vec3) -> Gradients {
         let step = 1e-2 * self.resolution();
         let difference = |axis: Vec3| {
@@ -244,6 +287,23 @@ pub struct Hit {
 }
 
 /// The surfaces of the world.
+///
+/// ```
+/// # use fogbow::{host::{Hit, Scene}, math::{Ray, Symmetric3, Vec3}, spectrum::Spectrum, surface::Surface};
+/// struct Floor;   // at z = 0, seen from above
+/// impl Scene for Floor {
+///     fn closest_hit(&self, ray: &Ray) -> Option<Hit> {
+///         let distance = -ray.origin.z / ray.direction.z;
+///         let surface = Surface::Lambert { reflectance: Spectrum::splat(0.5) };
+///         let hit = Hit { distance, normal: Vec3::Z, surface, light: None };
+///         (distance > 0.0 && distance < ray.length).then_some(hit)
+///     }
+/// }
+/// let down = Ray::new(2.0 * Vec3::Z, Vec3::NEG_Z);
+/// let hit = Floor.closest_hit(&down).unwrap();
+/// assert_eq!((hit.distance, Floor.curvature(&down, &hit)), (2.0, Symmetric3::ZERO));
+/// assert!(Floor.is_blocked(&down) && !Floor.is_blocked(&down.with_length(1.0)));
+/// ```
 pub trait Scene {
     /// The nearest surface along `ray`, or `None` if nothing lies within its length.
     fn closest_hit(&self, ray: &Ray) -> Option<Hit>;

@@ -12,6 +12,16 @@ use crate::math::{Symmetric3, float};
 
 /// One value per colour channel. A type of its own, so that a colour cannot be dotted with a
 /// direction.
+///
+/// ```
+/// # use fogbow::spectrum::Spectrum;
+/// let lamp = Spectrum::new(3.0, 2.0, 1.0);
+/// assert_eq!((lamp.max_element(), lamp.min_element(), lamp.mean()), (3.0, 1.0, 2.0));
+/// let filter = Spectrum::new(0.5, 0.5, 0.0);
+/// assert_eq!(lamp * filter, Spectrum::new(1.5, 1.0, 0.0));   // channel by channel
+/// assert_eq!(lamp.min(Spectrum::splat(2.0)) + lamp.max(Spectrum::splat(2.0)), lamp + Spectrum::splat(2.0));
+/// assert_eq!(lamp.zip(filter, f32::max), lamp.map(|channel| channel.max(0.5)));
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Default, Pod, Zeroable)]
 #[repr(transparent)]
 pub struct Spectrum(pub [f32; 3]);
@@ -88,6 +98,14 @@ impl Spectrum {
     }
 
     /// `e^{−x}` per channel: transmittance of an optical thickness. Beyond [`float::OPAQUE`]: 0.
+    ///
+    /// ```
+    /// # use fogbow::spectrum::Spectrum;
+    /// let thickness = Spectrum::new(0.0, 1.0, 100.0);
+    /// let transmittance = thickness.transmitted();
+    /// assert_eq!((transmittance[0], transmittance[2]), (1.0, 0.0));
+    /// assert!((transmittance[1] - 0.36787944).abs() < 1e-7);   // 1/e after one mean free path
+    /// ```
     #[inline]
     #[must_use]
     pub fn transmitted(self) -> Self {
@@ -98,6 +116,12 @@ impl Spectrum {
     }
 
     /// `self / other`, 0 where `other` is 0.
+    ///
+    /// ```
+    /// # use fogbow::spectrum::Spectrum;
+    /// let (scattering, extinction) = (Spectrum::new(1.0, 3.0, 0.0), Spectrum::new(2.0, 4.0, 0.0));
+    /// assert_eq!(scattering.ratio(extinction), Spectrum::new(0.5, 0.75, 0.0));   // an albedo, also where nothing is
+    /// ```
     #[inline]
     #[must_use]
     pub fn ratio(self, other: Self) -> Self {
@@ -105,6 +129,11 @@ impl Spectrum {
     }
 
     /// Whether all channels are equal.
+    ///
+    /// ```
+    /// # use fogbow::spectrum::Spectrum;
+    /// assert!(Spectrum::splat(0.3).is_grey() && !Spectrum::new(0.3, 0.3, 0.4).is_grey());
+    /// ```
     #[inline]
     #[must_use]
     pub fn is_grey(self) -> bool {
@@ -112,6 +141,11 @@ impl Spectrum {
     }
 
     /// Whether no channel carries anything.
+    ///
+    /// ```
+    /// # use fogbow::spectrum::Spectrum;
+    /// assert!(Spectrum::ZERO.is_black() && !Spectrum::new(0.0, 1e-30, 0.0).is_black());
+    /// ```
     #[inline]
     #[must_use]
     pub fn is_black(self) -> bool {
@@ -119,6 +153,12 @@ impl Spectrum {
     }
 
     /// Whether every channel is a number and not infinite.
+    ///
+    /// ```
+    /// # use fogbow::spectrum::Spectrum;
+    /// assert!(Spectrum::splat(-1.0).is_finite());
+    /// assert!(!(Spectrum::ONE / 0.0).is_finite() && !Spectrum::splat(f32::NAN).is_finite());
+    /// ```
     #[inline]
     #[must_use]
     pub fn is_finite(self) -> bool {
@@ -126,6 +166,12 @@ impl Spectrum {
     }
 
     /// Whether every channel is finite and not negative.
+    ///
+    /// ```
+    /// # use fogbow::spectrum::Spectrum;
+    /// assert!(Spectrum::ZERO.is_valid());
+    /// assert!(!Spectrum::splat(-1.0).is_valid() && !Spectrum::splat(f32::NAN).is_valid());   // no radiance
+    /// ```
     #[inline]
     #[must_use]
     pub fn is_valid(self) -> bool {
@@ -219,6 +265,14 @@ impl core::iter::Sum for Spectrum {
 }
 
 /// The spatial gradient of a [`Spectrum`]: its derivative along x, y and z (per metre).
+///
+/// ```
+/// # use fogbow::{math::Vec3, spectrum::{Gradient, Spectrum}};
+/// let warmer = Gradient::outer(Spectrum::new(2.0, 1.0, 0.0), Vec3::X);   // W·m⁻³·sr⁻¹, along x only
+/// assert_eq!(warmer.along(Vec3::new(0.5, 7.0, 0.0)), Spectrum::new(1.0, 0.5, 0.0));   // after half a metre
+/// assert_eq!(warmer.channel(0), Vec3::new(2.0, 0.0, 0.0));
+/// assert!(warmer.is_finite());
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Default, Pod, Zeroable)]
 #[repr(C)]
 pub struct Gradient {
@@ -242,6 +296,13 @@ impl Gradient {
     }
 
     /// From one gradient vector per channel.
+    ///
+    /// ```
+    /// # use fogbow::{math::Vec3, spectrum::Gradient};
+    /// let gradient = Gradient::from_channels(Vec3::X, 2.0 * Vec3::Y, 3.0 * Vec3::Z);
+    /// assert_eq!(gradient.channel(2), 3.0 * Vec3::Z);
+    /// assert_eq!(gradient.y[1], 2.0);   // the second channel's derivative along y
+    /// ```
     #[inline]
     #[must_use]
     pub fn from_channels(r: Vec3, g: Vec3, b: Vec3) -> Self {
@@ -264,6 +325,13 @@ impl Gradient {
 
     /// Euclidean norm per channel. Scaled by the largest component where squares leave the range of `f32`:
     /// energies around 1e−30 keep their norm.
+    ///
+    /// ```
+    /// # use fogbow::{math::Vec3, spectrum::{Gradient, Spectrum}};
+    /// let gradient = Gradient::outer(Spectrum::new(1.0, 1e-30, 0.0), Vec3::new(3.0, 0.0, 4.0));
+    /// let norm = gradient.norm();
+    /// assert!((norm[0] - 5.0).abs() < 1e-6 && (norm[1] / 5e-30 - 1.0).abs() < 1e-6 && norm[2] == 0.0);
+    /// ```
     #[inline]
     #[must_use]
     pub fn norm(&self) -> Spectrum {
@@ -337,6 +405,15 @@ impl Neg for Gradient {
 
 /// The symmetric matrix of second derivatives of a [`Spectrum`] (per square metre), upper
 /// triangle row by row.
+///
+/// ```
+/// # use fogbow::{math::Vec3, spectrum::{Hessian, Spectrum}};
+/// // Of the field x² + 3xy.
+/// let hessian = Hessian { xx: Spectrum::splat(2.0), xy: Spectrum::splat(3.0), ..Hessian::ZERO };
+/// assert_eq!(hessian.between(Vec3::X, Vec3::X), Spectrum::splat(2.0));
+/// assert_eq!(hessian.between(Vec3::X, Vec3::Y), hessian.between(Vec3::Y, Vec3::X));
+/// assert_eq!(hessian.mean().to_upper(), [2.0, 3.0, 0.0, 0.0, 0.0, 0.0]);
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Default, Pod, Zeroable)]
 #[repr(C)]
 pub struct Hessian {

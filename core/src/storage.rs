@@ -81,6 +81,15 @@ impl<T: Copy> List<'_, T> {
     }
 
     /// The elements so far, to change in place.
+    ///
+    /// ```
+    /// # use fogbow::storage::List;
+    /// let mut slots = [0u32; 4];
+    /// let mut list = List::from(&mut slots[..]);
+    /// list.push(1).unwrap();
+    /// list.as_mut_slice()[0] += 6;
+    /// assert_eq!(list.as_slice(), [7]);   // what was lent but is not used does not show
+    /// ```
     #[must_use]
     pub fn as_mut_slice(&mut self) -> &mut [T] {
         match &mut self.0 {
@@ -155,6 +164,15 @@ impl<T: Copy> List<'_, T> {
     }
 
     /// Forgets all elements and keeps the memory.
+    ///
+    /// ```
+    /// # use fogbow::storage::List;
+    /// let mut slots = [0u32; 1];
+    /// let mut list = List::from(&mut slots[..]);
+    /// list.push(7).unwrap();
+    /// list.clear();
+    /// assert!(list.as_slice().is_empty() && list.push(8).is_ok());
+    /// ```
     pub fn clear(&mut self) {
         match &mut self.0 {
             Storage::Lent { used, .. } => *used = 0,

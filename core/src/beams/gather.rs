@@ -100,18 +100,52 @@ impl<'s> Beams<'s> {
     }
 
     /// Forgets all pieces and keeps the memory.
+    ///
+    /// ```
+    /// # use fogbow::{beams::{Beams, Node, Piece}, math::Bounds, spectrum::Spectrum};
+    /// let (mut pieces, mut nodes) = ([Piece::default(); 1], [Node::default(); 2]);
+    /// let mut beams = Beams::new(&mut pieces[..], &mut nodes[..]);
+    /// let piece = Piece { length: 1.0, radius: 0.1, power: Spectrum::ONE, ..Piece::default() };
+    /// beams.push(piece)?;
+    /// beams.build(1)?;
+    /// beams.clear();
+    /// assert_eq!((beams.pieces().len(), beams.bounds()), (0, Bounds::EMPTY));
+    /// assert!(beams.push(piece).is_ok());   // there is room for the next pass
+    /// # Ok::<(), fogbow::storage::Full>(())
+    /// ```
     pub fn clear(&mut self) {
         self.pieces.clear();
         self.nodes.clear();
     }
 
     /// The pieces, in the order of the tree.
+    ///
+    /// ```
+    /// # use fogbow::{beams::{Beams, Node, Piece}, spectrum::Spectrum};
+    /// let (mut pieces, mut nodes) = ([Piece::default(); 2], [Node::default(); 3]);
+    /// let mut beams = Beams::new(&mut pieces[..], &mut nodes[..]);
+    /// let piece = Piece { length: 1.0, radius: 0.1, power: Spectrum::ONE, ..Piece::default() };
+    /// beams.push(piece)?;
+    /// beams.push(Piece { power: Spectrum::ZERO, ..piece })?;   // without power: left out
+    /// assert_eq!(beams.pieces(), [piece]);
+    /// # Ok::<(), fogbow::storage::Full>(())
+    /// ```
     #[must_use]
     pub fn pieces(&self) -> &[Piece] {
         self.pieces.as_slice()
     }
 
     /// Memory in use (bytes), without what a `Vec` or a lent slice holds in reserve.
+    ///
+    /// ```
+    /// # use fogbow::{beams::{Beams, Node, Piece}, spectrum::Spectrum};
+    /// let (mut pieces, mut nodes) = ([Piece::default(); 8], [Node::default(); 9]);
+    /// let mut beams = Beams::new(&mut pieces[..], &mut nodes[..]);
+    /// beams.push(Piece { length: 1.0, radius: 0.1, power: Spectrum::ONE, ..Piece::default() })?;
+    /// beams.build(1)?;
+    /// assert_eq!(beams.bytes(), 64 + 32);   // a piece and the box around it
+    /// # Ok::<(), fogbow::storage::Full>(())
+    /// ```
     #[must_use]
     pub fn bytes(&self) -> usize {
         size_of_val(self.pieces.as_slice()) + size_of_val(self.nodes.as_slice())
@@ -155,6 +189,16 @@ impl<'s> Beams<'s> {
     }
 
     /// The box around all pieces; empty before [`Beams::build`] and without pieces.
+    ///
+    /// ```
+    /// # use fogbow::{beams::{Beams, Node, Piece}, math::Vec3, spectrum::Spectrum};
+    /// let (mut pieces, mut nodes) = ([Piece::default(); 1], [Node::default(); 2]);
+    /// let mut beams = Beams::new(&mut pieces[..], &mut nodes[..]);
+    /// beams.push(Piece { length: 2.0, direction: Vec3::Z, radius: 0.5, power: Spectrum::ONE, ..Piece::default() })?;
+    /// beams.build(1)?;
+    /// assert_eq!(beams.bounds().size(), Vec3::new(1.0, 1.0, 3.0));   // with the blur around it
+    /// # Ok::<(), fogbow::storage::Full>(())
+    /// ```
     #[must_use]
     pub fn bounds(&self) -> Bounds {
         self.nodes.as_slice().first().map_or(Bounds::EMPTY, Node::bounds)

@@ -41,6 +41,12 @@ pub struct Piece {
 
 impl Piece {
     /// Where it ends (m).
+    ///
+    /// ```
+    /// # use fogbow::{beams::Piece, math::Vec3};
+    /// let piece = Piece { origin: Vec3::X, length: 2.0, direction: Vec3::Z, ..Piece::default() };
+    /// assert_eq!(piece.end(), Vec3::new(1.0, 0.0, 2.0));
+    /// ```
     #[inline]
     #[must_use]
     pub fn end(&self) -> Vec3 {

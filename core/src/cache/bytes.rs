@@ -196,6 +196,12 @@ impl Header {
     ///
     /// # Errors
     /// What is wrong with it.
+    ///
+    /// ```
+    /// # use fogbow::cache::bytes::{BytesError, Header};
+    /// assert_eq!(Header::read(b"P6"), Err(BytesError::NoHeader { found: 2 }));
+    /// assert_eq!(Header::read(&[0; 64]), Err(BytesError::Magic));
+    /// ```
     pub fn read(bytes: &[u8]) -> Result<Self, BytesError> {
         let header = bytes.first_chunk::<HEADER_BYTES>().ok_or(BytesError::NoHeader { found: bytes.len() })?;
         if !header.starts_with(&MAGIC) {
@@ -220,6 +226,12 @@ impl Header {
     }
 
     /// Length of all of it, header included (bytes). `usize::MAX` where that is too small.
+    ///
+    /// ```
+    /// # use fogbow::cache::bytes::{HEADER_BYTES, Header, Kind};
+    /// let header = Header { kind: Kind::Volume, stride: 3, count: 10, tag: 0, checksum: 0 };
+    /// assert_eq!(header.byte_count(), HEADER_BYTES + 10 * (64 + 3 * 48));
+    /// ```
     #[must_use]
     pub fn byte_count(&self) -> usize {
         self.total().unwrap_or(usize::MAX)
@@ -233,6 +245,14 @@ impl Header {
 }
 
 /// How many bytes [`write()`] writes.
+///
+/// ```
+/// # use fogbow::cache::{Cache, VolumeCache, bytes};
+/// # #[cfg(feature = "alloc")] {
+/// let cache: VolumeCache = Cache::growing(3);
+/// assert_eq!(bytes::byte_count(&cache), bytes::HEADER_BYTES);   // no records so far
+/// # }
+/// ```
 #[must_use]
 pub fn byte_count<E: Attachment>(cache: &Cache<'_, E>) -> usize {
     HEADER_BYTES + size_of_val(cache.records()) + size_of_val(cache.attachments())
@@ -244,6 +264,26 @@ pub fn byte_count<E: Attachment>(cache: &Cache<'_, E>) -> usize {
 ///
 /// # Errors
 /// The first of `sink`.
+///
+/// ```
+/// # use fogbow::{cache::{Cache, Record, VolumeCache, bytes}, math::Vec3, spectrum::{Gradient, Spectrum}};
+/// # #[cfg(feature = "alloc")] {
+/// let mut cache: VolumeCache = Cache::growing(0);
+/// let record = Record { position: Vec3::ZERO, radius: 1.0, value: Spectrum::ONE, gradient: Gradient::ZERO };
+/// cache.insert(record, &[])?;
+/// cache.finish()?;
+/// let mut file = Vec::new();
+/// let Ok(()) = bytes::write(&cache, 7, |part| {
+///     file.extend_from_slice(part);
+///     Ok::<_, core::convert::Infallible>(())
+/// });
+/// assert_eq!(file.len(), bytes::byte_count(&cache));
+/// let mut copy: VolumeCache = Cache::growing(0);
+/// bytes::read_into(&file, 7, &mut copy)?;
+/// assert_eq!(copy.records(), [record]);
+/// # }
+/// # Ok::<(), Box<dyn core::error::Error>>(())
+/// ```
 pub fn write<E: Attachment, F>(
     cache: &Cache<'_, E>,
     tag: u64,
@@ -274,6 +314,21 @@ pub fn write<E: Attachment, F>(
 ///
 /// # Errors
 /// The first check that fails. The cache is then as before, or empty after [`BytesError::Full`].
+///
+/// ```
+/// # use fogbow::cache::{Cache, VolumeCache, bytes::{self, BytesError}};
+/// # #[cfg(feature = "alloc")] {
+/// let mut cache: VolumeCache = Cache::growing(0);
+/// let mut file = Vec::new();
+/// let Ok(()) = bytes::write(&cache, 7, |part| {
+///     file.extend_from_slice(part);
+///     Ok::<_, core::convert::Infallible>(())
+/// });
+/// assert_eq!(bytes::read_into(&file, 8, &mut cache), Err(BytesError::Tag { found: 7, due: 8 }));
+/// file[30] ^= 1;   // a bit of the tag
+/// assert_eq!(bytes::read_into(&file, 7, &mut cache), Err(BytesError::Checksum));
+/// # }
+/// ```
 pub fn read_into<E: Attachment>(bytes: &[u8], tag: u64, cache: &mut Cache<'_, E>) -> Result<(), BytesError> {
     let header = Header::read(bytes)?;
     let due = header.byte_count();

@@ -74,6 +74,42 @@ impl Mixture<'_> {
 /// Light from surfaces takes its direct part from one connection to the lights, its indirect part
 /// from the surface cache, where that has something, and from one traced path where not: so caches
 /// filled one after the other build on each other, and none needs another to be right.
+///
+/// ```
+/// # use fogbow::{cache::Estimator, host::{Empty, Hit}, light::{Light, PointLight}, math::{Ray, Vec2, Vec3, float::PI}};
+/// # use fogbow::{multiple_scatter, path, phase::Phase, sampling::Generator, spectrum::Spectrum, surface::Surface};
+/// # use fogbow::transmittance::thickness::Steps;
+/// # use fogbow::path::World;
+/// // A lamp of 1 W/sr two metres above, and a grey floor; in vacuum, as if there were a last bit of fog.
+/// let lamps = [Light::Point(PointLight::new(2.0 * Vec3::Z, Spectrum::ONE)?)];
+/// let world = World { medium: &Empty, scene: &Empty, lights: &lamps };
+/// # let walk = multiple_scatter::Settings::new(Steps::Length(0.1));
+/// # let (paths, light_samples) = (path::Settings::default(), 1);
+/// let estimator = Estimator { world, surfaces: None, scattered: None, walk, paths, light_samples, finest: 1e-3 };
+/// let surface = Surface::Lambert { reflectance: Spectrum::splat(0.5) };
+/// let floor = Hit { distance: 1.0, normal: Vec3::Z, surface, light: None };
+/// # let near = |light: Spectrum, expected: f32| (light[0] / expected - 1.0).abs() < 1e-5;
+/// let (at, phase, mut rng) = (Vec3::ZERO, estimator.phase(Vec3::ZERO), Generator::new(1));
+/// // Irradiance is I/r² = ¼ W·m⁻²; scattered once 1/4π of it, reflected ρ/π.
+/// assert!(near(estimator.single(at, &phase, &mut [], &mut rng).value, 0.25 / (4.0 * PI)));
+/// assert!(near(estimator.towards(at, Vec3::X, &phase, &mut rng), 0.25 / (4.0 * PI)));
+/// assert!(near(estimator.direct(at, &floor, &mut rng), 0.25));
+/// let random = (0.5, Vec2::splat(0.5));   // chooses the light and the point on it
+/// assert!(near(estimator.direct_at(at, &floor, false, random, &mut rng), 0.25));
+/// assert!(near(estimator.outgoing(&Ray::new(Vec3::Z, Vec3::NEG_Z), &floor, &mut rng), 0.5 / PI * 0.25));
+/// assert!(near(estimator.reflected(at, &floor, Vec3::Z, surface, random, &mut rng), 0.5 / PI * 0.25));
+/// // Nothing is scattered twice in vacuum.
+/// assert!(estimator.multiple(at, &phase, 8, &mut [], &mut rng).value.is_black());
+/// assert!(estimator.multiple_towards(at, Vec3::X, &phase, &mut rng).is_black());
+/// // A sky of 1 counts as light of surfaces: it is scattered as 1, and a floor receives π.
+/// let sky = [Light::Constant(Spectrum::ONE)];
+/// let outside = Estimator { world: World { lights: &sky, ..world }, ..estimator };
+/// assert!(near(outside.surface(at, &phase, 8, &mut [], &mut rng).value, 1.0));
+/// assert!(near(outside.surface_towards(at, Vec3::X, &phase, &mut rng), 1.0));
+/// assert!(near(outside.irradiance(at, Vec3::Z, 8, &mut rng).0.value, PI));
+/// assert!(near(outside.indirect(at, &floor, &mut rng), PI));
+/// # Ok::<(), fogbow::light::LightError>(())
+/// ```
 #[derive(Debug)]
 pub struct Estimator<'a, M: ?Sized, S: ?Sized> {
     /// The world.

@@ -37,6 +37,11 @@ pub fn weight(d: f32) -> f32 {
 
 /// The largest exponent a record may be carried by: `max(4ε, 4)` (sheet § 1.10). Within its radius
 /// it is at most `ε`, but for expansions that nearly vanish in the direction asked for.
+///
+/// ```
+/// # use fogbow::cache::exponent_limit;
+/// assert_eq!((exponent_limit(0.5), exponent_limit(2.0)), (4.0, 8.0));
+/// ```
 #[inline]
 #[must_use]
 pub fn exponent_limit(tolerance: f32) -> f32 {
@@ -119,6 +124,15 @@ impl Blend {
     }
 
     /// Sum of the weights so far.
+    ///
+    /// ```
+    /// # use fogbow::{cache::{Blend, Extrapolation}, math::Vec3, spectrum::{Gradient, Spectrum}};
+    /// let mut blend = Blend::new(Extrapolation::Linear, 4.0);
+    /// assert_eq!((blend.weight(), blend.value()), (0.0, None));
+    /// blend.add(0.25, Spectrum::ONE, &Gradient::ZERO, Vec3::X);
+    /// blend.add(0.5, Spectrum::ONE, &Gradient::ZERO, Vec3::Y);
+    /// assert_eq!(blend.weight(), 0.75);
+    /// ```
     #[inline]
     #[must_use]
     pub fn weight(&self) -> f32 {

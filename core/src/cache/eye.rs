@@ -96,6 +96,12 @@ pub struct Seen {
 
 impl Seen {
     /// All light together.
+    ///
+    /// ```
+    /// # use fogbow::{cache::Seen, spectrum::Spectrum};
+    /// let seen = Seen { emitted: Spectrum::ONE, medium_multiple: Spectrum::splat(0.5), lookups: 3, ..Seen::default() };
+    /// assert_eq!(seen.total(), Spectrum::splat(1.5));
+    /// ```
     #[must_use]
     pub fn total(&self) -> Spectrum {
         self.emitted
@@ -203,6 +209,20 @@ pub struct Place {
 
 /// Calls `visit` for every place where the light along `ray` would be looked up: where records are
 /// needed. From every one of them it also follows a random direction to a surface, which lights it.
+///
+/// ```
+/// # use fogbow::{cache::{EyeSettings, places}, host::Empty, math::{Ray, Vec3}, medium::Homogeneous, phase::Phase};
+/// # use fogbow::{sampling::Generator, spectrum::Spectrum};
+/// # use fogbow::path::World;
+/// let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::ONE, Phase::ISOTROPIC)?;
+/// let world = World { medium: &fog, scene: &Empty, lights: &[] };
+/// let settings = EyeSettings { density: 8.0, connections: 1, lights_visible: true, indirect: true };
+/// let (ray, mut found) = (Ray::between(Vec3::ZERO, core::f32::consts::LN_2 * Vec3::X), Vec::new());
+/// places(&ray, &world, &settings, &mut Generator::new(1), |place| found.push(place));
+/// assert_eq!(found.len(), 4);   // half of what is seen is fog
+/// assert!(found.iter().all(|place| place.is_seen && place.normal.is_none()));
+/// # Ok::<(), fogbow::medium::MediumError>(())
+/// ```
 pub fn places<M: Medium + ?Sized, S: Scene + ?Sized>(
     ray: &Ray,
     world: &World<'_, M, S>,
@@ -275,6 +295,30 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized, F: FnMut(Place)> Sight for Wanted<'_
 /// Where a cache has no record at a point, one sample of what it would hold takes its place, so that
 /// gaps make noise and no holes. `estimator` brings the world; its surface cache is what such
 /// samples use.
+///
+/// ```
+/// # use fogbow::{cache::{Basis, Cache, Caches, Estimator, EyeSettings, Reader, Reading, Record, VolumeCache, radiance}};
+/// # use fogbow::{host::Empty, math::{Ray, Vec3}, medium::Homogeneous, multiple_scatter, path, phase::Phase};
+/// # use fogbow::{sampling::Generator, spectrum::{Gradient, Spectrum}, transmittance::thickness::Steps};
+/// # use fogbow::path::World;
+/// # #[cfg(feature = "alloc")] {
+/// let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::ONE, Phase::ISOTROPIC)?;
+/// let world = World { medium: &fog, scene: &Empty, lights: &[] };
+/// # let walk = multiple_scatter::Settings::new(Steps::Length(0.1));
+/// # let (paths, light_samples) = (path::Settings::default(), 1);
+/// # let estimator = Estimator { world, surfaces: None, scattered: None, walk, paths, light_samples, finest: 1e-3 };
+/// // One record says that light of 1 is scattered in from the lights, 50 m around.
+/// let mut cache: VolumeCache = Cache::growing(0);
+/// let record = Record { position: Vec3::ZERO, radius: 50.0, value: Spectrum::ONE, gradient: Gradient::ZERO };
+/// cache.insert(record, &[])?;
+/// let caches = Caches { single: Some(Reader { cache: &cache, reading: Reading::new(0.5) }), ..Caches::default() };
+/// let settings = EyeSettings { density: 64.0, connections: 1, lights_visible: true, indirect: true };
+/// let ray = Ray::new(Vec3::ZERO, Vec3::X);
+/// let seen = radiance(&ray, &estimator, &caches, &settings, &mut Generator::new(1));
+/// assert!((seen.medium_single[0] - 1.0).abs() < 0.02 && seen.misses == 0);   // so opaque fog looks like 1
+/// # }
+/// # Ok::<(), Box<dyn core::error::Error>>(())
+/// ```
 pub fn radiance<M: Medium + ?Sized, S: Scene + ?Sized>(
     ray: &Ray,
     estimator: &Estimator<'_, M, S>,
@@ -286,6 +330,26 @@ pub fn radiance<M: Medium + ?Sized, S: Scene + ?Sized>(
 }
 
 /// As [`radiance`], but for light that the medium scatters: emission, and surfaces seen through the medium.
+///
+/// ```
+/// # use fogbow::{cache::{Caches, Estimator, EyeSettings, radiance_beyond}, host::Empty, light::Light};
+/// # use fogbow::{math::{Ray, Vec3}, medium::{Homogeneous, Placed, Region}, multiple_scatter, path, phase::Phase};
+/// # use fogbow::{sampling::Generator, spectrum::Spectrum, transmittance::thickness::Steps};
+/// # use fogbow::path::World;
+/// // A sky of 1, seen through a ball of fog two metres wide.
+/// let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::ONE, Phase::ISOTROPIC)?;
+/// let (ball, lights) = (Placed::new(fog, Region::sphere(Vec3::ZERO, 1.0)?), [Light::Constant(Spectrum::ONE)]);
+/// let world = World { medium: &ball, scene: &Empty, lights: &lights };
+/// # let walk = multiple_scatter::Settings::new(Steps::Length(0.1));
+/// # let (paths, light_samples) = (path::Settings::default(), 1);
+/// # let estimator = Estimator { world, surfaces: None, scattered: None, walk, paths, light_samples, finest: 1e-3 };
+/// let settings = EyeSettings { density: 8.0, connections: 1, lights_visible: true, indirect: true };
+/// let ray = Ray::new(-5.0 * Vec3::X, Vec3::X);
+/// let seen = radiance_beyond(&ray, &estimator, &Caches::default(), &settings, &mut Generator::new(1));
+/// assert!((seen.emitted[0] - (-2.0_f32).exp()).abs() < 1e-6);
+/// assert_eq!(seen.total(), seen.emitted);   // what the fog scatters is left to others
+/// # Ok::<(), fogbow::medium::MediumError>(())
+/// ```
 pub fn radiance_beyond<M: Medium + ?Sized, S: Scene + ?Sized>(
     ray: &Ray,
     estimator: &Estimator<'_, M, S>,

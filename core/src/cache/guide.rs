@@ -42,6 +42,15 @@ fn cell(direction: Vec3) -> usize {
 
 impl Guide {
     /// Adds one of `count` samples: `value` is what it found over its density `pdf` (sr⁻¹).
+    ///
+    /// ```
+    /// # use fogbow::{cache::{Guide, Guided}, math::Vec3};
+    /// let mut guide = Guide::default();
+    /// guide.add(Vec3::Z, 4.0, 0.08, 2);
+    /// guide.add(Vec3::NEG_Z, 2.0, 0.08, 2);
+    /// let guided = Guided::new(&guide).unwrap();
+    /// assert!((guided.pdf(Vec3::Z) / guided.pdf(Vec3::NEG_Z) - 2.0).abs() < 1e-5);   // twice as bright, twice as likely
+    /// ```
     #[inline]
     pub fn add(&mut self, direction: Vec3, value: f32, pdf: f32, count: u32) {
         let share = 1.0 / count.max(1) as f32;
@@ -75,6 +84,16 @@ impl Guide {
     }
 
     /// Adds what another has learnt nearby.
+    ///
+    /// ```
+    /// # use fogbow::{cache::{Guide, Guided}, math::Vec3};
+    /// let (mut here, mut beside) = (Guide::default(), Guide::default());
+    /// here.add(Vec3::Z, 2.0, 0.08, 1);
+    /// beside.add(Vec3::X, 2.0, 0.08, 1);
+    /// here.merge(&beside, 0.25);
+    /// let guided = Guided::new(&here).unwrap();
+    /// assert!((guided.pdf(Vec3::X) / guided.pdf(Vec3::Z) - 0.5).abs() < 1e-5);   // by the root of its weight
+    /// ```
     pub fn merge(&mut self, other: &Self, weight: f32) {
         self.squares.iter_mut().zip(&other.squares).for_each(|(a, b)| *a += weight * b);
         self.sum += weight * other.sum;

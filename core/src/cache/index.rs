@@ -215,18 +215,50 @@ impl<'s> Index<'s> {
     }
 
     /// Number of spheres it was built over, those left out included.
+    ///
+    /// ```
+    /// # use fogbow::{cache::{Block, Index, Node}, math::Vec3};
+    /// let (mut nodes, mut entries) = ([Node::default(); 2], [0; 12]);
+    /// let (mut spheres, mut blocks) = ([[0.0; 4]; 2], [Block::default(); 24]);
+    /// let mut index = Index::new(&mut nodes[..], &mut entries[..], &mut spheres[..], &mut blocks[..]);
+    /// index.rebuild(2, |i| (Vec3::ZERO, i as f32))?;   // the first has no radius: no point lies in it
+    /// assert_eq!(index.len(), 2);
+    /// # Ok::<(), fogbow::storage::Full>(())
+    /// ```
     #[must_use]
     pub fn len(&self) -> u32 {
         self.len
     }
 
     /// Whether it was built over no spheres.
+    ///
+    /// ```
+    /// # use fogbow::{cache::{Block, Index, Node}, math::Vec3};
+    /// let (mut nodes, mut entries) = ([Node::default(); 2], [0; 12]);
+    /// let (mut spheres, mut blocks) = ([[0.0; 4]; 2], [Block::default(); 24]);
+    /// let mut index = Index::new(&mut nodes[..], &mut entries[..], &mut spheres[..], &mut blocks[..]);
+    /// assert!(index.is_empty());
+    /// index.rebuild(1, |_| (Vec3::ZERO, 1.0))?;
+    /// assert!(!index.is_empty());
+    /// # Ok::<(), fogbow::storage::Full>(())
+    /// ```
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.len == 0
     }
 
     /// Memory in use (bytes), without what a `Vec` or a lent slice holds in reserve.
+    ///
+    /// ```
+    /// # use fogbow::{cache::{Block, Index, Node}, math::Vec3};
+    /// let (mut nodes, mut entries) = ([Node::default(); 2], [0; 12]);
+    /// let (mut spheres, mut blocks) = ([[0.0; 4]; 2], [Block::default(); 24]);
+    /// let mut index = Index::new(&mut nodes[..], &mut entries[..], &mut spheres[..], &mut blocks[..]);
+    /// assert_eq!(index.bytes(), 0);   // lent, but not used
+    /// index.rebuild(1, |_| (Vec3::ZERO, 1.0))?;
+    /// assert!(index.bytes() >= size_of::<Block>());
+    /// # Ok::<(), fogbow::storage::Full>(())
+    /// ```
     #[must_use]
     pub fn bytes(&self) -> usize {
         size_of_val(self.nodes.as_slice())

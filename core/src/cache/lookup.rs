@@ -34,6 +34,12 @@ pub struct Reading {
 
 impl Reading {
     /// Records made with `tolerance`, carried in the best way there is.
+    ///
+    /// ```
+    /// # use fogbow::cache::{Extrapolation, Reading};
+    /// let reading = Reading::new(0.5);
+    /// assert_eq!((reading.extrapolation, reading.margin), (Extrapolation::Curved, 0.0));
+    /// ```
     #[must_use]
     pub fn new(tolerance: f32) -> Self {
         Self { extrapolation: Extrapolation::default(), tolerance, margin: 0.0 }
@@ -45,6 +51,12 @@ impl Reading {
 }
 
 /// Basis functions in the direction to the eye: evaluated once per eye ray.
+///
+/// ```
+/// # use fogbow::{cache::Basis, math::Vec3};
+/// let basis = Basis::new(Vec3::Z, 2);
+/// assert!(basis.covers(0) && basis.covers(2) && !basis.covers(3));
+/// ```
 #[derive(Debug, Clone, Copy)]
 pub struct Basis {
     values: [f32; MAX_COEFFICIENTS],
@@ -89,6 +101,23 @@ pub struct TurningBasis {
 
 impl TurningBasis {
     /// Up to `degree`, at most [`TURNING_DEGREE`], towards `to_eye` (unit).
+    ///
+    /// ```
+    /// # use fogbow::{cache::{Cache, Reading, Record, TurningBasis, VolumeCache}, math::Vec3};
+    /// # use fogbow::{sh::Coefficient, spectrum::{Gradient, Spectrum}};
+    /// # #[cfg(feature = "alloc")] {
+    /// // Light that goes with Y₁₁ = √(3/4π) x around a mean of 1.
+    /// let mut cache: VolumeCache = Cache::growing(3);
+    /// let record = Record { position: Vec3::ZERO, radius: 1.0, value: Spectrum::ONE, gradient: Gradient::ZERO };
+    /// let higher = Coefficient { value: Spectrum::ONE, gradient: Gradient::ZERO };
+    /// cache.insert(record, &[Coefficient::ZERO, Coefficient::ZERO, higher])?;
+    /// let basis = TurningBasis::new(Vec3::Z, 1);
+    /// let (light, turned) = cache.lookup_with_gradients(Vec3::ZERO, &basis, &Reading::new(0.5)).unwrap();
+    /// assert_eq!(light.radiance, Spectrum::ONE);
+    /// assert!((turned.x[0] - 0.48860251).abs() < 1e-6);   // per radian that the direction turns towards x
+    /// # }
+    /// # Ok::<(), Box<dyn core::error::Error>>(())
+    /// ```
     #[must_use]
     pub fn new(to_eye: Vec3, degree: usize) -> Self {
         let degree = degree.min(TURNING_DEGREE);

@@ -38,12 +38,26 @@ impl Limits {
     }
 
     /// Narrowed to at most `reach` (m). The least radius wins.
+    ///
+    /// ```
+    /// # use fogbow::cache::Limits;
+    /// let limits = Limits { min: 0.1, max: 2.0 };
+    /// assert_eq!(limits.within(0.5), Limits { min: 0.1, max: 0.5 });
+    /// assert_eq!(limits.within(0.01), Limits { min: 0.1, max: 0.1 });
+    /// ```
     #[must_use]
     pub fn within(self, reach: f32) -> Self {
         Self { max: self.max.min(reach).max(self.min), ..self }
     }
 
     /// A radius within the bounds; the greatest where none is defined.
+    ///
+    /// ```
+    /// # use fogbow::cache::Limits;
+    /// let limits = Limits { min: 0.1, max: 2.0 };
+    /// let radii = [Some(0.01), Some(0.5), Some(9.0), None].map(|raw| limits.clamp(raw));
+    /// assert_eq!(radii, [0.1, 0.5, 2.0, 2.0]);
+    /// ```
     #[must_use]
     pub fn clamp(&self, raw: Option<f32>) -> f32 {
         raw.map_or(self.max, |r| r.max(self.min).min(self.max))
@@ -97,6 +111,21 @@ const GRAZING: f32 = 0.1;
 /// and whose sphere reaches there leaves no room for a record that would know: so radii are limited by it.
 /// Source: as the harmonic mean distance of Ward et al. 1988, *A Ray Tracing Solution for Diffuse
 /// Interreflection*, but the least one.
+///
+/// ```
+/// # use fogbow::{cache::clearance, host::{Empty, Hit, Scene}, math::{Ray, Vec3}, surface::Surface};
+/// struct Floor;   // at z = 0
+/// impl Scene for Floor {
+///     fn closest_hit(&self, ray: &Ray) -> Option<Hit> {
+///         let distance = -ray.origin.z / ray.direction.z;
+///         let hit = Hit { distance, normal: Vec3::Z, surface: Surface::BLACK, light: None };
+///         (distance > 0.0 && distance < ray.length).then_some(hit)
+///     }
+/// }
+/// let height = clearance(2.0 * Vec3::Z, None, &Floor);
+/// assert!((2.0..2.0 * 1.05).contains(&height));
+/// assert_eq!(clearance(Vec3::ZERO, None, &Empty), f32::INFINITY);
+/// ```
 #[must_use]
 pub fn clearance(point: Vec3, normal: Option<Vec3>, scene: &(impl Scene + ?Sized)) -> f32 {
     let distance = |j| {
@@ -113,6 +142,13 @@ pub fn clearance(point: Vec3, normal: Option<Vec3>, scene: &(impl Scene + ?Sized
 
 /// The radius that the plain logarithmic gradient would give, `ε L/‖∇L‖` (m): infinite at saddle
 /// points, which is why Eq. 34 adds norms. For comparison only (Jarosz et al. 2008, Fig. 4).
+///
+/// ```
+/// # use fogbow::{cache::log_gradient_radius, math::Vec3, spectrum::{Gradient, Spectrum}};
+/// let slope = Gradient::outer(Spectrum::new(1.0, 2.0, 4.0), Vec3::X);
+/// assert_eq!(log_gradient_radius(Spectrum::ONE, &slope, 0.5), 0.125);   // of the channel that changes most
+/// assert_eq!(log_gradient_radius(Spectrum::ONE, &Gradient::ZERO, 0.5), f32::INFINITY);
+/// ```
 #[must_use]
 pub fn log_gradient_radius(value: Spectrum, gradient: &Gradient, tolerance: f32) -> f32 {
     value.zip(gradient.norm(), |l, g| if g > 0.0 { tolerance * (l / g) } else { f32::INFINITY }).min_element()
@@ -120,6 +156,13 @@ pub fn log_gradient_radius(value: Spectrum, gradient: &Gradient, tolerance: f32)
 
 /// A gradient no steeper than `L/radius` in every channel: what was widened to the least radius
 /// must not explode within it (Křivánek et al. 2006).
+///
+/// ```
+/// # use fogbow::{cache::clamp_gradient, math::Vec3, spectrum::{Gradient, Spectrum}};
+/// let steep = Gradient::outer(Spectrum::splat(8.0), Vec3::X);
+/// let clamped = clamp_gradient(&steep, Spectrum::ONE, 0.25);
+/// assert_eq!(clamped.x, Spectrum::splat(4.0));   // not below 0 within 0.25 m
+/// ```
 #[must_use]
 pub fn clamp_gradient(gradient: &Gradient, value: Spectrum, radius: f32) -> Gradient {
     let norm = gradient.norm();
@@ -129,6 +172,12 @@ pub fn clamp_gradient(gradient: &Gradient, value: Spectrum, radius: f32) -> Grad
 
 /// The radius that neighbours allow: `R ≤ R_j + ‖x − x_j‖` for each of them (Křivánek et al. 2006,
 /// neighbour clamping). A small radius beside a large one tells of something the large one missed.
+///
+/// ```
+/// # use fogbow::{cache::neighbour_clamped, math::Vec3};
+/// // Half a metre away light changes within 0.1 m.
+/// assert_eq!(neighbour_clamped(2.0, Vec3::ZERO, (0.5 * Vec3::X, 0.1)), 0.6);
+/// ```
 #[inline]
 #[must_use]
 pub fn neighbour_clamped(radius: f32, position: Vec3, other: (Vec3, f32)) -> f32 {

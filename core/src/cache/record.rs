@@ -62,6 +62,13 @@ impl Record {
     }
 
     /// `∇L · (point − position)`.
+    ///
+    /// ```
+    /// # use fogbow::{cache::Record, math::Vec3, spectrum::{Gradient, Spectrum}};
+    /// let gradient = Gradient::outer(Spectrum::splat(3.0), Vec3::X);
+    /// let record = Record { position: Vec3::X, radius: 1.0, value: Spectrum::ONE, gradient };
+    /// assert_eq!(record.change(1.5 * Vec3::X), Spectrum::splat(1.5));   // half a metre on
+    /// ```
     #[inline]
     #[must_use]
     pub fn change(&self, point: Vec3) -> Spectrum {

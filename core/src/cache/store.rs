@@ -24,6 +24,37 @@ const MAX_RECORDS: usize = 1 << 28;
 /// ([`VolumeCache`]); on surfaces what an irradiance record has besides ([`SurfaceCache`]).
 /// Insertion looks at neighbours and rebuilds the index now and then; nothing else changes, so that
 /// any number of threads may read.
+///
+/// ```
+/// # use fogbow::cache::{Block, Cache, Index, Node, Record};
+/// # use fogbow::{bytemuck::Zeroable, math::Vec3, sh::Coefficient, spectrum::{Gradient, Spectrum}};
+/// # let (mut nodes, mut entries, mut spheres) = ([Node::default(); 1], [0; 6], [[0.0; 4]; 1]);
+/// # let (mut wide_nodes, mut wide_entries, mut wide_spheres) = (nodes, entries, spheres);
+/// # let (mut blocks, mut wide_blocks) = ([Block::default(); 20], [Block::default(); 20]);
+/// # let index = Index::new(&mut nodes[..], &mut entries[..], &mut spheres[..], &mut blocks[..]);
+/// # let wide = Index::new(&mut wide_nodes[..], &mut wide_entries[..], &mut wide_spheres[..], &mut wide_blocks[..]);
+/// let (mut records, mut attached) = ([Record::zeroed(); 1], [Coefficient::ZERO; 3]);
+/// // Room for one record with an expansion of degree 1: three coefficients besides the mean.
+/// let mut cache = Cache::new(&mut records[..], &mut attached[..], index, wide, 3);
+/// assert!(cache.is_empty() && cache.stride() == 3);
+/// let record = Record { position: Vec3::ZERO, radius: 1.0, value: Spectrum::ONE, gradient: Gradient::ZERO };
+/// let higher = [Coefficient { value: Spectrum::splat(0.5), gradient: Gradient::ZERO }; 3];
+/// cache.insert(record, &higher)?;
+/// cache.finish()?;
+/// assert_eq!((cache.len(), cache.records()), (1, &[record][..]));
+/// assert_eq!((cache.attachments(), cache.attached(0)), (&higher[..], &higher[..]));
+/// // Its sphere holds a point at 0.5 m; twice as large, one at 1.5 m as well.
+/// let (mut near, mut far) = (0, 0);
+/// cache.visit(0.5 * Vec3::X, |_, _, share| near += u32::from(share == 0.5));
+/// cache.visit(1.5 * Vec3::X, |_, _, _| far += 1);
+/// cache.visit_wide(1.5 * Vec3::X, |_, _, share| far += u32::from(share == 0.75));
+/// assert_eq!((near, far), (1, 1));
+/// assert!(cache.bytes() > size_of::<Record>() + 3 * size_of::<Coefficient>());   // with the indices
+/// assert!(cache.insert(record, &higher).is_err());   // full
+/// cache.clear();
+/// assert!(cache.is_empty());
+/// # Ok::<(), Box<dyn core::error::Error>>(())
+/// ```
 #[derive(Debug)]
 pub struct Cache<'s, E> {
     records: List<'s, Record>,
@@ -91,9 +122,46 @@ impl From<Full> for InsertError {
 }
 
 /// In-scattered radiance in a medium.
+///
+/// ```
+/// # use fogbow::{cache::{Basis, Cache, Reading, Record, TurningBasis, VolumeCache}, math::Vec3};
+/// # use fogbow::spectrum::{Gradient, Spectrum};
+/// # #[cfg(feature = "alloc")] {
+/// let mut cache: VolumeCache = Cache::growing(0);
+/// let gradient = Gradient::outer(Spectrum::ONE, Vec3::X);
+/// cache.insert(Record { position: Vec3::ZERO, radius: 1.0, value: Spectrum::splat(2.0), gradient }, &[])?;
+/// cache.finish()?;
+/// let (reading, basis) = (Reading::new(0.5), Basis::new(Vec3::Z, cache.degree()));
+/// let point = 0.5 * Vec3::X;
+/// assert_eq!(cache.lookup(point, &basis, &reading), Some(Spectrum::splat(2.5)));   // L + ∇L·Δ
+/// let (light, _) = cache.lookup_with_gradients(point, &TurningBasis::new(Vec3::Z, 0), &reading).unwrap();
+/// assert_eq!((light.radiance[0], light.gradient), (2.5, gradient));
+/// // A metre and a half away no record reaches; in such gaps spheres count as twice as large.
+/// let gap = 1.5 * Vec3::X;
+/// assert!(cache.covers(point, &reading) && !cache.covers(gap, &reading));
+/// assert!(cache.lookup(gap, &basis, &reading).is_some() && cache.lookup(3.0 * Vec3::X, &basis, &reading).is_none());
+/// assert_eq!(cache.radius_near(gap), Some(1.0));
+/// # }
+/// # Ok::<(), Box<dyn core::error::Error>>(())
+/// ```
 pub type VolumeCache<'s> = Cache<'s, Coefficient>;
 
 /// Indirect irradiance on surfaces.
+///
+/// ```
+/// # use fogbow::{cache::{Cache, Facing, Reading, Record, SurfaceCache}, math::Vec3, spectrum::{Gradient, Spectrum}};
+/// # #[cfg(feature = "alloc")] {
+/// let mut cache: SurfaceCache = Cache::growing(1);
+/// let record = Record { position: Vec3::ZERO, radius: 1.0, value: Spectrum::splat(2.0), gradient: Gradient::ZERO };
+/// cache.insert(record, &[Facing { normal: Vec3::Z, turn: Gradient::ZERO }])?;
+/// cache.finish()?;
+/// let (reading, point) = (Reading::new(0.5), 0.5 * Vec3::X);
+/// assert_eq!(cache.lookup(point, Vec3::Z, &reading), Some(Spectrum::splat(2.0)));
+/// assert!(cache.covers(point, Vec3::Z, &reading) && !cache.covers(point, Vec3::X, &reading));   // around the corner
+/// assert_eq!(cache.radius_near(point), Some(1.0));
+/// # }
+/// # Ok::<(), Box<dyn core::error::Error>>(())
+/// ```
 pub type SurfaceCache<'s> = Cache<'s, Facing>;
 
 impl<'s, E: Attachment> Cache<'s, E> {
@@ -311,6 +379,17 @@ impl<'s, E: Attachment> Cache<'s, E> {
 #[cfg(feature = "alloc")]
 impl<E: Attachment> Cache<'_, E> {
     /// An empty cache that grows as needed; `stride` as for [`Cache::new`].
+    ///
+    /// ```
+    /// # use fogbow::{cache::{Cache, Record, VolumeCache}, math::Vec3, spectrum::{Gradient, Spectrum}};
+    /// let mut cache: VolumeCache = Cache::growing(0);
+    /// for i in 0..1000 {
+    ///     let position = i as f32 * Vec3::X;
+    ///     cache.insert(Record { position, radius: 0.5, value: Spectrum::ONE, gradient: Gradient::ZERO }, &[])?;
+    /// }
+    /// assert_eq!(cache.len(), 1000);
+    /// # Ok::<(), Box<dyn core::error::Error>>(())
+    /// ```
     #[must_use]
     pub fn growing(stride: usize) -> Self {
         use alloc::vec::Vec;

@@ -99,6 +99,13 @@ pub struct Header {
 }
 
 /// Number of bytes that [`write()`] gives.
+///
+/// ```
+/// # use fogbow::{covariance::{Lattice, bytes}, math::{Bounds, Vec3}};
+/// let lattice = Lattice::new(Bounds { min: Vec3::ZERO, max: Vec3::ONE }, [3, 2, 1])?;
+/// assert_eq!(bytes::byte_count(&lattice), 72 + 6 * 28);   // a header, and seven `f32` for each cell
+/// # Ok::<(), fogbow::covariance::LatticeError>(())
+/// ```
 #[must_use]
 pub fn byte_count(lattice: &Lattice) -> usize {
     HEADER_BYTES + lattice.cell_count() * size_of::<Voxel>()
@@ -163,6 +170,12 @@ fn word<const N: usize>(bytes: &[u8], at: usize) -> [u8; N] {
 ///
 /// # Errors
 /// The first check that fails.
+///
+/// ```
+/// # use fogbow::covariance::bytes::{self, BytesError};
+/// assert_eq!(bytes::header(b"P6", 7), Err(BytesError::NoHeader { found: 2 }));
+/// assert_eq!(bytes::header(&[0; 200], 7), Err(BytesError::Magic));   // long enough, but no grid
+/// ```
 pub fn header(bytes: &[u8], tag: u64) -> Result<Header, BytesError> {
     if bytes.len() < HEADER_BYTES {
         return Err(BytesError::NoHeader { found: bytes.len() });
@@ -199,6 +212,23 @@ pub fn header(bytes: &[u8], tag: u64) -> Result<Header, BytesError> {
 ///
 /// # Errors
 /// The first check that fails.
+///
+/// ```
+/// # use fogbow::covariance::{Grid, Lattice, Voxel, bytes::{self, BytesError}};
+/// # use fogbow::math::{Bounds, Vec3};
+/// let lattice = Lattice::new(Bounds { min: Vec3::ZERO, max: Vec3::ONE }, [1, 1, 1])?;
+/// let mut file = Vec::new();
+/// let Ok(()) = bytes::write(&Grid::new(lattice, &[Voxel::EMPTY], 1)?, 7, |part| {
+///     file.extend_from_slice(part);
+///     Ok::<_, core::convert::Infallible>(())
+/// });
+/// let mut voxels = [Voxel { weight: 1.0, ..Voxel::EMPTY }];
+/// assert_eq!(bytes::read_into(&file, 8, &mut voxels), Err(BytesError::Tag { found: 7, due: 8 }));
+/// *file.last_mut().unwrap() ^= 1;
+/// assert_eq!(bytes::read_into(&file, 7, &mut voxels), Err(BytesError::Checksum));
+/// assert_eq!(voxels[0].weight, 1.0);   // as before
+/// # Ok::<(), fogbow::covariance::LatticeError>(())
+/// ```
 pub fn read_into(bytes: &[u8], tag: u64, voxels: &mut [Voxel]) -> Result<(), BytesError> {
     let lattice = header(bytes, tag)?.lattice;
     if voxels.len() != lattice.cell_count() {

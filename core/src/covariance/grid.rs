@@ -7,6 +7,20 @@ use super::metrics::Voxel;
 use crate::math::Symmetric3;
 
 /// A filled grid, ready to be asked.
+///
+/// ```
+/// # use fogbow::{covariance::{Grid, Lattice, Voxel}, math::{Bounds, Symmetric3, Vec3}};
+/// // One cell of 8 m³, through which two photons of 3 W flew 2 m each.
+/// let lattice = Lattice::new(Bounds { min: Vec3::ZERO, max: Vec3::splat(2.0) }, [1, 1, 1])?;
+/// let sum = Symmetric3::from_upper([24.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
+/// let voxels = [Voxel { sum, weight: 2.0 * 3.0 * 2.0 }];
+/// let grid = Grid::new(lattice, &voxels, 2)?;
+/// assert_eq!(grid.fluence(Vec3::ONE), Some(0.75));   // 12 W·m over 8 m³, for one of two
+/// assert_eq!(grid.covariance(Vec3::ONE).unwrap().xx, 2.0);
+/// assert_eq!((grid.voxel(Vec3::ONE), grid.voxel(Vec3::NEG_X)), (Some(voxels[0]), None));
+/// assert_eq!((grid.lattice(), grid.voxels(), grid.paths()), (&lattice, &voxels[..], 2));
+/// # Ok::<(), fogbow::covariance::LatticeError>(())
+/// ```
 #[derive(Debug, Clone, Copy)]
 pub struct Grid<'a> {
     lattice: Lattice,

@@ -8,6 +8,18 @@ use crate::math::{Bounds, Ray};
 pub const MAX_EDGE: u32 = 1024;
 
 /// A box cut into `size` equal cells; whatever belongs to a cell lies in a slice of [`Lattice::cell_count`].
+///
+/// ```
+/// # use fogbow::{covariance::Lattice, math::{Bounds, Vec3}};
+/// let bounds = Bounds { min: Vec3::ZERO, max: Vec3::new(4.0, 2.0, 1.0) };
+/// let lattice = Lattice::new(bounds, [4, 2, 1])?;
+/// assert_eq!((lattice.bounds(), lattice.size(), lattice.cell()), (bounds, [4, 2, 1], Vec3::ONE));
+/// assert_eq!(lattice.cell_count(), 8);
+/// // Cells along x come first, then those along y.
+/// assert_eq!(lattice.centre(5), Vec3::new(1.5, 1.5, 0.5));
+/// assert_eq!((lattice.index(lattice.centre(5)), lattice.index(Vec3::NEG_X)), (Some(5), None));
+/// # Ok::<(), fogbow::covariance::LatticeError>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Lattice {
     bounds: Bounds,
@@ -130,6 +142,16 @@ impl Lattice {
 
     /// The eight cells around `point` with their trilinear weights; at the border the outer ones repeat.
     /// `None` outside.
+    ///
+    /// ```
+    /// # use fogbow::{covariance::Lattice, math::{Bounds, Vec3}};
+    /// let lattice = Lattice::new(Bounds { min: Vec3::ZERO, max: Vec3::ONE }, [4, 4, 4])?;
+    /// let point = Vec3::new(0.3, 0.6, 0.5);
+    /// let around = lattice.around(point).unwrap();
+    /// let mean: Vec3 = around.iter().map(|&(cell, weight)| lattice.centre(cell) * weight).sum();
+    /// assert!((mean - point).length() < 1e-6);   // what is linear is interpolated exactly
+    /// # Ok::<(), fogbow::covariance::LatticeError>(())
+    /// ```
     #[inline]
     #[must_use]
     pub fn around(&self, point: Vec3) -> Option<[(usize, f32); 8]> {

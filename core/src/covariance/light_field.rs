@@ -34,6 +34,12 @@ pub struct Patch {
 
 impl Patch {
     /// A flat surface of one colour.
+    ///
+    /// ```
+    /// # use fogbow::{covariance::Patch, math::{Symmetric3, Vec3}};
+    /// let floor = Patch::flat(Vec3::Z);
+    /// assert_eq!((floor.normal, floor.curvature, floor.texture), (Vec3::Z, Symmetric3::ZERO, Symmetric3::ZERO));
+    /// ```
     #[must_use]
     pub const fn flat(normal: Vec3) -> Self {
         Self { normal, curvature: Symmetric3::ZERO, texture: Symmetric3::ZERO }
@@ -64,12 +70,26 @@ fn across(v: Vec3, w: Vec3) -> Option<Vec3> {
 
 impl LightField {
     /// A covariance in a frame of its own around a direction of travel (unit).
+    ///
+    /// ```
+    /// # use fogbow::{covariance::{LightField, Symmetric4}, math::Vec3};
+    /// let light = LightField::around(Vec3::X, Symmetric4::ZERO);
+    /// assert!(light.frame.w == Vec3::X && light.frame.u.dot(Vec3::X).abs() < 1e-6);
+    /// ```
     #[must_use]
     pub fn around(direction: Vec3, covariance: Symmetric4) -> Self {
         Self { covariance, frame: Frame::around(direction) }
     }
 
     /// After a flight of `distance` (m): [`Symmetric4::travelled`].
+    ///
+    /// ```
+    /// # use fogbow::{covariance::{LightField, Symmetric4}, math::{Symmetric2, Vec3}};
+    /// let unit = Symmetric2::diagonal(1.0, 1.0);
+    /// let light = LightField::around(Vec3::Z, Symmetric4::separable(unit, Symmetric2::ZERO));
+    /// // Seen from 3 m away, one cycle per metre is three per radian.
+    /// assert_eq!(light.travelled(3.0).covariance.angular, Symmetric2::diagonal(9.0, 9.0));
+    /// ```
     #[inline]
     #[must_use]
     pub fn travelled(&self, distance: f32) -> Self {
@@ -77,6 +97,13 @@ impl LightField {
     }
 
     /// Past occluders of spatial covariance `occluders` (cycles²/m², in space): B Fig. 3.
+    ///
+    /// ```
+    /// # use fogbow::{covariance::{LightField, Symmetric4}, math::{Symmetric3, Vec3}};
+    /// let edge = Symmetric3::from_upper([4.0, 0.0, 0.0, 0.0, 0.0, 0.0]);   // across x
+    /// let past = |direction: Vec3| LightField::around(direction, Symmetric4::ZERO).occluded(&edge).covariance.trace();
+    /// assert_eq!((past(Vec3::Z), past(Vec3::X)), (4.0, 0.0));   // along x there is nothing to cut off
+    /// ```
     #[inline]
     #[must_use]
     pub fn occluded(&self, occluders: &Symmetric3) -> Self {
@@ -86,6 +113,14 @@ impl LightField {
 
     /// Attenuated along `distance` (m) of a medium whose extinction has this Hessian (m⁻³):
     /// [`Symmetric4::attenuated`].
+    ///
+    /// ```
+    /// # use fogbow::{covariance::{LightField, Symmetric4}, math::{Symmetric3, Vec3, float::PI}};
+    /// let smoke = Symmetric3::from_upper([4.0 * PI * PI, 0.0, 0.0, 0.0, 0.0, 0.0]);   // varies along x
+    /// let through = |direction: Vec3| LightField::around(direction, Symmetric4::ZERO).attenuated(&smoke, 2.0);
+    /// assert!((through(Vec3::Z).covariance.trace() - 2.0).abs() < 1e-5);
+    /// assert_eq!(through(Vec3::X).covariance.trace(), 0.0);
+    /// ```
     #[inline]
     #[must_use]
     pub fn attenuated(&self, hessian: &Symmetric3, distance: f32) -> Self {
@@ -95,6 +130,14 @@ impl LightField {
 
     /// The same light field in the frame turned about the ray so that `u` points along `axis` as far as it can;
     /// unchanged if `axis` is parallel to the ray.
+    ///
+    /// ```
+    /// # use fogbow::{covariance::{LightField, Symmetric4}, math::{Symmetric2, Vec3}};
+    /// let light = LightField::around(Vec3::Z, Symmetric4::separable(Symmetric2::diagonal(4.0, 1.0), Symmetric2::ZERO));
+    /// let turned = light.turned_to(light.frame.v);
+    /// assert!((turned.frame.u - light.frame.v).length() < 1e-6);
+    /// assert!((turned.covariance.spatial.xx - 1.0).abs() < 1e-6);   // the same light, by other axes
+    /// ```
     #[inline]
     #[must_use]
     pub fn turned_to(&self, axis: Vec3) -> Self {
@@ -127,6 +170,14 @@ impl LightField {
 
     /// [`LightField::scattered`] by a lobe of known angular covariance (cycles²/rad²; `u` in the plane of
     /// scattering).
+    ///
+    /// ```
+    /// # use fogbow::{covariance::{LightField, Symmetric4}, math::{Symmetric2, Vec3}};
+    /// let (sharp, lobe) = (Symmetric2::diagonal(3.0, 3.0), Symmetric2::diagonal(1.5, 1.5));
+    /// let light = LightField::around(Vec3::Z, Symmetric4::separable(sharp, sharp));
+    /// let straight = light.convolved(Vec3::Z, 1.0, &lobe);
+    /// assert!((straight.covariance.angular.xx - 1.0).abs() < 1e-6);   // 1/(1/3 + 1/1.5)
+    /// ```
     #[inline]
     #[must_use]
     pub fn convolved(&self, outgoing: Vec3, cos_alpha: f32, lobe: &Symmetric2) -> Self {
@@ -184,6 +235,16 @@ impl LightField {
 
     /// Refracted into `outgoing` (unit, direction of travel) where the index of refraction changes from
     /// `indices.0` to `indices.1`: [`Symmetric4::refracted`].
+    ///
+    /// ```
+    /// # use fogbow::{covariance::{LightField, Patch, Symmetric4}, math::{Symmetric2, Vec3}};
+    /// let unit = Symmetric2::diagonal(1.0, 1.0);
+    /// let light = LightField::around(Vec3::NEG_Z, Symmetric4::separable(unit, unit));
+    /// let inside = light.refracted(Vec3::NEG_Z, &Patch::flat(Vec3::Z), (1.0, 1.5));
+    /// // Head on into glass: angular frequencies grow by n, those in space stay.
+    /// assert!((inside.covariance.angular.trace() - 2.0 * 2.25).abs() < 1e-5);
+    /// assert!((inside.covariance.spatial.trace() - 2.0).abs() < 1e-5);
+    /// ```
     #[inline]
     #[must_use]
     pub fn refracted(&self, outgoing: Vec3, patch: &Patch, indices: (f32, f32)) -> Self {
@@ -200,6 +261,16 @@ impl LightField {
 
     /// Of two light fields that travel together, with energies `weight` and `other_weight`, in this frame:
     /// [`Symmetric4::combined`]. `None` if their directions differ by more than a thousandth.
+    ///
+    /// ```
+    /// # use fogbow::{covariance::{LightField, Symmetric4}, math::{Symmetric2, Vec3}};
+    /// let unit = Symmetric2::diagonal(1.0, 1.0);
+    /// let (sharp, even) = (Symmetric4::separable(unit, unit), Symmetric4::ZERO);
+    /// let light = LightField::around(Vec3::Z, sharp);
+    /// let both = light.combined(1.0, &LightField::around(Vec3::Z, even), 1.0).unwrap();
+    /// assert!((both.covariance.trace() - 2.0).abs() < 1e-6);   // the mean of 4 and 0
+    /// assert!(light.combined(1.0, &LightField::around(Vec3::X, even), 1.0).is_none());
+    /// ```
     #[must_use]
     pub fn combined(&self, weight: f32, other: &Self, other_weight: f32) -> Option<Self> {
         if !(self.frame.w.distance_squared(other.frame.w) < 1e-6) {
@@ -211,6 +282,13 @@ impl LightField {
 
     /// What it adds to the covariance (cycles²/m²) of the fluence in space: `R S Rᵀ`, zero along the ray
     /// (B Eq. 15–16 as corrected in sheet § 2.5).
+    ///
+    /// ```
+    /// # use fogbow::{covariance::{LightField, Symmetric4}, math::{Symmetric2, Vec3}};
+    /// let (place, unit) = (Symmetric2::diagonal(4.0, 4.0), Symmetric2::diagonal(1.0, 1.0));
+    /// let gamma = LightField::around(Vec3::Y, Symmetric4::separable(place, unit)).volumetric();
+    /// assert!((gamma.along(Vec3::X) - 4.0).abs() < 1e-5 && gamma.along(Vec3::Y).abs() < 1e-5);
+    /// ```
     #[inline]
     #[must_use]
     pub fn volumetric(&self) -> Symmetric3 {

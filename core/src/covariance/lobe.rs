@@ -39,6 +39,14 @@ pub fn phase_hessian(phase: &Phase, deflection: Deflection) -> (f32, f32) {
 ///
 /// Where `h₁₁` changes its sign, between peak and tail, no angular frequency passes: an artefact of a local
 /// model, kept as it is.
+///
+/// ```
+/// # use fogbow::{covariance::phase_covariance, math::float::PI, phase::{Deflection, Lobe, Phase}};
+/// let straight = Deflection::from_cos(1.0);
+/// let fog = phase_covariance(&Phase::from(Lobe::HenyeyGreenstein { g: 0.5 }), straight);
+/// assert!((fog.xx - 6.0 / (4.0 * PI * PI)).abs() < 1e-6);   // 3g/(1 − g)² at the peak
+/// assert_eq!(phase_covariance(&Phase::ISOTROPIC, straight).trace(), 0.0);   // nothing of directions is left
+/// ```
 #[inline]
 #[must_use]
 pub fn phase_covariance(phase: &Phase, deflection: Deflection) -> Symmetric2 {

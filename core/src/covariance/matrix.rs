@@ -15,6 +15,15 @@ pub const LIMIT: f32 = 1e12;
 /// [ spatial  mixed  ]      mixed = [[uθ, uφ], [vθ, vφ]]
 /// [ mixedᵀ   angular ]
 /// ```
+///
+/// ```
+/// # use fogbow::{covariance::Symmetric4, math::Symmetric2};
+/// let light = Symmetric4::separable(Symmetric2::diagonal(4.0, 1.0), Symmetric2::diagonal(0.5, 0.5));
+/// assert_eq!(light.to_upper(), [4.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.5, 0.0, 0.5]);
+/// assert_eq!(Symmetric4::from_upper(light.to_upper()), light);
+/// assert_eq!(light.trace(), 6.0);
+/// assert_eq!(light.plus(&light), light.times(2.0));
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Default, Pod, Zeroable)]
 #[repr(C)]
 pub struct Symmetric4 {
@@ -95,18 +104,37 @@ impl Symmetric4 {
     }
 
     /// Eigenvalues and eigenvectors.
+    ///
+    /// ```
+    /// # use fogbow::covariance::Symmetric4;
+    /// // Place and direction vary together: uu = θθ = 2, uθ = 1.
+    /// let values = Symmetric4::from_upper([2.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 2.0, 0.0, 0.0]).eigen().values;
+    /// assert!((values[0] - 3.0).abs() < 1e-6 && (values[1] - 1.0).abs() < 1e-6 && values[3].abs() < 1e-6);
+    /// ```
     #[must_use]
     pub fn eigen(&self) -> Eigen<4> {
         jacobi(self.rows())
     }
 
     /// The matrix with the absolute values of the eigenvalues.
+    ///
+    /// ```
+    /// # use fogbow::{covariance::Symmetric4, math::Symmetric2};
+    /// let with = |u: f32| Symmetric4::separable(Symmetric2::diagonal(u, 1.0), Symmetric2::ZERO);
+    /// assert_eq!(with(-2.0).absolute(), with(2.0));
+    /// ```
     #[must_use]
     pub fn absolute(&self) -> Self {
         Self::from_rows(rebuilt(&self.eigen(), f32::abs))
     }
 
     /// Moore–Penrose inverse; eigenvalues below a millionth of the largest count as 0.
+    ///
+    /// ```
+    /// # use fogbow::{covariance::Symmetric4, math::Symmetric2};
+    /// let with = |u: f32| Symmetric4::separable(Symmetric2::diagonal(u, 1.0), Symmetric2::ZERO);
+    /// assert_eq!(with(4.0).pseudo_inverse(), with(0.25));   // what is 0 stays 0
+    /// ```
     #[must_use]
     pub fn pseudo_inverse(&self) -> Self {
         Self::from_rows(inverted(&self.eigen()))

@@ -15,6 +15,17 @@ const MOST_ENERGY: f32 = 1e20;
 
 /// The covariance of the fluence at a place, as it is gathered: the sum of what light fields add to it, and of
 /// the energy with which they do.
+///
+/// ```
+/// # use fogbow::{covariance::Voxel, math::Symmetric3};
+/// let sharp = Symmetric3::from_upper([8.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
+/// let (mut voxel, mut other) = (Voxel::EMPTY, Voxel::EMPTY);
+/// assert_eq!(voxel.covariance(), None);
+/// voxel.add_covariance(&sharp, 1.0);
+/// other.add_covariance(&Symmetric3::ZERO, 3.0);
+/// voxel.merge(&other);
+/// assert_eq!(voxel.covariance(), Some(sharp.times(0.25)));   // a quarter of the energy varies
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Default, Pod, Zeroable)]
 #[repr(C)]
 pub struct Voxel {
@@ -29,6 +40,15 @@ impl Voxel {
     pub const EMPTY: Self = Self { sum: Symmetric3::ZERO, weight: 0.0 };
 
     /// Adds a light field with energy `energy`; more than 10²⁰ counts as that.
+    ///
+    /// ```
+    /// # use fogbow::{covariance::{LightField, Symmetric4, Voxel}, math::{Symmetric2, Vec3}};
+    /// let place = Symmetric2::diagonal(4.0, 4.0);
+    /// let light = LightField::around(Vec3::Z, Symmetric4::separable(place, Symmetric2::ZERO));
+    /// let mut voxel = Voxel::EMPTY;
+    /// voxel.add(&light, 2.0);
+    /// assert_eq!((voxel.weight, voxel.covariance()), (2.0, Some(light.volumetric())));
+    /// ```
     #[inline]
     pub fn add(&mut self, light: &LightField, energy: f32) {
         self.add_covariance(&light.volumetric(), energy);
@@ -65,6 +85,14 @@ impl Voxel {
 
 /// Bound (per m²) on the absolute Hessian of a fluence `fluence` whose covariance is `covariance` (cycles²/m²):
 /// `4π² F Γ` (B Eq. 2, 21); equality for Gaussians at their centre.
+///
+/// ```
+/// # use fogbow::{covariance::hessian_bound, math::{Symmetric3, float::PI}};
+/// // The fluence 3 exp(−x²/2s²) has the covariance 1/(4π²s²), and at its centre the second derivative −3/s².
+/// let s = 0.5;
+/// let gamma = Symmetric3::from_upper([1.0 / (4.0 * PI * PI * s * s), 0.0, 0.0, 0.0, 0.0, 0.0]);
+/// assert!((hessian_bound(3.0, &gamma).xx - 3.0 / (s * s)).abs() < 1e-5);
+/// ```
 #[inline]
 #[must_use]
 pub fn hessian_bound(fluence: f32, covariance: &Symmetric3) -> Symmetric3 {
@@ -76,6 +104,13 @@ pub fn hessian_bound(fluence: f32, covariance: &Symmetric3) -> Symmetric3 {
 ///
 /// Covariance tracing itself is blind to it (sheet § 2.5): a diverging beam of one brightness has no content across.
 /// `size` (m) is the radius of the light, within which there is no such fall-off.
+///
+/// ```
+/// # use fogbow::{covariance::{divergence, hessian_bound}, math::Vec3};
+/// let gamma = divergence(Vec3::Z, 2.0, 0.0);
+/// let bound = hessian_bound(0.25, &gamma);   // F = 1/r²: F″ = 6/r⁴ along the ray, −2/r⁴ across
+/// assert!((bound.zz - 6.0 / 16.0).abs() < 1e-6 && (bound.xx - 2.0 / 16.0).abs() < 1e-6);
+/// ```
 #[inline]
 #[must_use]
 pub fn divergence(direction: Vec3, distance: f32, size: f32) -> Symmetric3 {
@@ -142,6 +177,17 @@ pub fn kernel_radius(trace: f32, relative_bias: f32, moment: f32, most: f32) -> 
 /// ```text
 /// Σ = ∫ K(t) [T_tᵀ pad(Γ_uv(t)) T_t + ∫₀ᵗ T_sᵀ pad(|H(s)|/4π²) T_s ds] dt / ∫ K dt
 /// ```
+///
+/// ```
+/// # use fogbow::{covariance::ImageCovariance, math::{Frame, Symmetric3, Vec3}};
+/// let mut image = ImageCovariance::new(Frame { u: Vec3::X, v: Vec3::Y, w: Vec3::Z });
+/// assert_eq!(image.value(), None);
+/// // Half of the light comes from 3 m away and varies by 2 cycles per metre, the other half is even.
+/// image.add(3.0, 0.1, 1.0, &Symmetric3::from_upper([4.0, 0.0, 0.0, 0.0, 0.0, 0.0]), None);
+/// image.add(5.0, 0.1, 1.0, &Symmetric3::ZERO, None);
+/// assert_eq!(image.angular().unwrap().xx, 0.5 * 4.0 * 9.0);   // cycles per radian: times the distance, squared
+/// assert_eq!(image.value().unwrap().angular, image.angular().unwrap());
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ImageCovariance {
     frame: Frame,
@@ -197,6 +243,12 @@ impl ImageCovariance {
 
 /// Density of samples in an image (per rad²) of covariance `image` (cycles²/rad²), but for a factor: `√det`
 /// (B § 5.2).
+///
+/// ```
+/// # use fogbow::{covariance::sample_density, math::Symmetric2};
+/// assert_eq!(sample_density(&Symmetric2::diagonal(4.0, 9.0)), 6.0);   // √4 along one axis, √9 along the other
+/// assert_eq!(sample_density(&Symmetric2::diagonal(4.0, 0.0)), 0.0);
+/// ```
 #[inline]
 #[must_use]
 pub fn sample_density(image: &Symmetric2) -> f32 {
@@ -210,6 +262,14 @@ pub fn sample_density(image: &Symmetric2) -> f32 {
 ///
 /// Towards where the image does not vary the filter is infinitely wide: add `(1/(2π r))² I` to bound it by a
 /// standard deviation `r`.
+///
+/// ```
+/// # use fogbow::{covariance::filter_precision, math::{Symmetric2, float::PI}};
+/// // A Gaussian blob of standard deviation s has the covariance 1/(4π²s²): the filter is as wide as the blob.
+/// let s = 0.02;
+/// let precision = filter_precision(&Symmetric2::diagonal(1.0 / (4.0 * PI * PI * s * s), 0.0));
+/// assert!((precision.xx * s * s - 1.0).abs() < 1e-5);
+/// ```
 #[inline]
 #[must_use]
 pub fn filter_precision(image: &Symmetric2) -> Symmetric2 {

@@ -46,6 +46,20 @@ pub struct OccluderCell {
 }
 
 /// Nearby surfaces, in cells the host lends.
+///
+/// ```
+/// # use fogbow::{covariance::{Lattice, OccluderCell, Occluders}, math::{Bounds, Vec3, float::PI}};
+/// let lattice = Lattice::new(Bounds { min: Vec3::ZERO, max: Vec3::ONE }, [1, 1, 1])?;
+/// let mut cells = [OccluderCell::default()];
+/// let mut occluders = Occluders::new(lattice, &mut cells)?;
+/// assert_eq!((occluders.covariance(Vec3::splat(0.5), Vec3::Z), occluders.occupied()), (None, 0));
+/// // A wall at x = 1, 0.5 m beside a ray along z: the light is cut off across x, at that distance.
+/// occluders.add(Vec3::new(1.0, 0.5, 0.5), Vec3::NEG_X);
+/// let edge = occluders.covariance(Vec3::splat(0.5), Vec3::Z).unwrap();
+/// assert!((edge.xx - 1.0 / (4.0 * PI * PI * 0.25)).abs() < 1e-6 && edge.yy.abs() < 1e-6);
+/// assert_eq!((occluders.lattice(), occluders.occupied()), (&lattice, 1));
+/// # Ok::<(), fogbow::covariance::LatticeError>(())
+/// ```
 #[derive(Debug)]
 pub struct Occluders<'a> {
     lattice: Lattice,
@@ -81,6 +95,25 @@ impl<'a> Occluders<'a> {
     /// Adds the surfaces of `scene`, found by `rays`² rays through every column of cells along each axis.
     ///
     /// Lights, glass and null interfaces stop no light and are left out.
+    ///
+    /// ```
+    /// # use fogbow::{covariance::{Lattice, OccluderCell, Occluders}, host::{Hit, Scene}, math::{Bounds, Ray, Vec3}};
+    /// # use fogbow::surface::Surface;
+    /// struct Floor;   // at z = 0.1
+    /// impl Scene for Floor {
+    ///     fn closest_hit(&self, ray: &Ray) -> Option<Hit> {
+    ///         let distance = (0.1 - ray.origin.z) / ray.direction.z;
+    ///         let hit = Hit { distance, normal: Vec3::Z, surface: Surface::BLACK, light: None };
+    ///         (distance > 0.0 && distance < ray.length).then_some(hit)
+    ///     }
+    /// }
+    /// let lattice = Lattice::new(Bounds { min: Vec3::ZERO, max: Vec3::ONE }, [2, 2, 2])?;
+    /// let mut cells = [OccluderCell::default(); 8];
+    /// let mut occluders = Occluders::new(lattice, &mut cells)?;
+    /// occluders.add_scene(&Floor, 2);
+    /// assert_eq!(occluders.occupied(), 4);   // the lower half of the cells
+    /// # Ok::<(), fogbow::covariance::LatticeError>(())
+    /// ```
     pub fn add_scene(&mut self, scene: &(impl Scene + ?Sized), rays: u32) {
         let bounds = self.lattice.bounds();
         let extent = bounds.size();

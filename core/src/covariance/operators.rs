@@ -58,6 +58,13 @@ impl Symmetric4 {
 
     /// Multiplied in space by a mask with the spectral covariance `mask` (cycles²/m²): an occluder, a
     /// texture (B Fig. 3).
+    ///
+    /// ```
+    /// # use fogbow::{covariance::Symmetric4, math::Symmetric2};
+    /// let edge = Symmetric2::diagonal(4.0, 0.0);
+    /// let lit = Symmetric4::separable(Symmetric2::diagonal(1.0, 1.0), Symmetric2::ZERO).masked(&edge);
+    /// assert_eq!(lit.spatial, Symmetric2::diagonal(5.0, 1.0));   // of a product of functions, variances add up
+    /// ```
     #[inline]
     #[must_use]
     pub fn masked(&self, mask: &Symmetric2) -> Self {
@@ -74,6 +81,13 @@ impl Symmetric4 {
     ///
     /// B Eq. 6–7 (the print's `4π` is wrong: sheet § 2.3). Exact at minima of extinction; across maxima
     /// the truth is minus as much, so that the absolute value is conservative.
+    ///
+    /// ```
+    /// # use fogbow::{covariance::Symmetric4, math::{Symmetric2, float::PI}};
+    /// let hessian = Symmetric2::diagonal(-4.0 * PI * PI, 0.0);   // across a maximum of extinction
+    /// let seen = Symmetric4::ZERO.attenuated(&hessian, 0.5);
+    /// assert!((seen.spatial.xx - 0.5).abs() < 1e-6 && seen.spatial.yy == 0.0);
+    /// ```
     #[inline]
     #[must_use]
     pub fn attenuated(&self, hessian: &Symmetric2, distance: f32) -> Self {
@@ -136,6 +150,15 @@ impl Symmetric4 {
 
     /// Reflected by a surface whose lobe has the angular covariance `lobe` (cycles²/rad²), in the surface's own
     /// frame: [`Symmetric4::scattered`] without a turn.
+    ///
+    /// ```
+    /// # use fogbow::{covariance::Symmetric4, math::Symmetric2};
+    /// let unit = Symmetric2::diagonal(1.0, 1.0);
+    /// let light = Symmetric4::separable(unit, unit);
+    /// // A diffuse surface shows where it is lit, not from where.
+    /// let seen = light.reflected_in_lobe(&Symmetric2::ZERO);
+    /// assert_eq!((seen.spatial, seen.angular), (unit, Symmetric2::ZERO));
+    /// ```
     #[inline]
     #[must_use]
     pub fn reflected_in_lobe(&self, lobe: &Symmetric2) -> Self {
@@ -143,6 +166,12 @@ impl Symmetric4 {
     }
 
     /// In a frame turned about the ray by an angle: `u′ = cos u + sin v`.
+    ///
+    /// ```
+    /// # use fogbow::{covariance::Symmetric4, math::Symmetric2};
+    /// let light = Symmetric4::separable(Symmetric2::diagonal(4.0, 1.0), Symmetric2::ZERO);
+    /// assert_eq!(light.rotated(0.0, 1.0).spatial, Symmetric2::diagonal(1.0, 4.0));   // a right angle swaps the axes
+    /// ```
     #[inline]
     #[must_use]
     pub fn rotated(&self, cos: f32, sin: f32) -> Self {
@@ -166,6 +195,13 @@ impl Symmetric4 {
     }
 
     /// Of the light field `f(λ₁u, λ₂v, λ₃θ, λ₄φ)`: `Λ Σ Λ`.
+    ///
+    /// ```
+    /// # use fogbow::{covariance::Symmetric4, math::Symmetric2};
+    /// let unit = Symmetric2::diagonal(1.0, 1.0);
+    /// let squeezed = Symmetric4::separable(unit, unit).scaled([3.0, 1.0, 1.0, 1.0]);
+    /// assert_eq!(squeezed.spatial, Symmetric2::diagonal(9.0, 1.0));   // three times as fast
+    /// ```
     #[inline]
     #[must_use]
     pub fn scaled(&self, factors: [f32; 4]) -> Self {
@@ -178,6 +214,13 @@ impl Symmetric4 {
     }
 
     /// On a surface met at an angle of this cosine, in the plane of `u` (step 2 of sheet § 2.2).
+    ///
+    /// ```
+    /// # use fogbow::{covariance::Symmetric4, math::Symmetric2};
+    /// let light = Symmetric4::separable(Symmetric2::diagonal(4.0, 4.0), Symmetric2::ZERO);
+    /// // At 60° what is 1 m across the ray is 2 m on the surface.
+    /// assert_eq!(light.projected(0.5).spatial, Symmetric2::diagonal(1.0, 4.0));
+    /// ```
     #[inline]
     #[must_use]
     pub fn projected(&self, cosine: f32) -> Self {
@@ -185,6 +228,12 @@ impl Symmetric4 {
     }
 
     /// Off a surface, left at an angle of this cosine (step 6); grazing angles count as [`LEAST_COSINE`].
+    ///
+    /// ```
+    /// # use fogbow::{covariance::Symmetric4, math::Symmetric2};
+    /// let light = Symmetric4::separable(Symmetric2::diagonal(4.0, 4.0), Symmetric2::ZERO);
+    /// assert_eq!(light.projected(0.5).unprojected(0.5), light);
+    /// ```
     #[inline]
     #[must_use]
     pub fn unprojected(&self, cosine: f32) -> Self {
@@ -196,6 +245,14 @@ impl Symmetric4 {
     ///
     /// ```text
     /// M Σ Mᵀ,  M = [[I, −N], [0, I]],  N = [[k_tt, cos θ k_ts], [k_ts, cos θ k_ss]]
+    /// ```
+    ///
+    /// ```
+    /// # use fogbow::{covariance::Symmetric4, math::Symmetric2};
+    /// // Where a surface is curved, what varies with direction varies with place: by k² as much.
+    /// let light = Symmetric4::separable(Symmetric2::ZERO, Symmetric2::diagonal(3.0, 0.0));
+    /// let on_ball = light.curved(&Symmetric2::diagonal(2.0, 2.0), 1.0);
+    /// assert_eq!((on_ball.spatial.xx, on_ball.mixed[0], on_ball.angular.xx), (12.0, -6.0, 3.0));
     /// ```
     #[inline]
     #[must_use]
@@ -225,6 +282,13 @@ impl Symmetric4 {
 
     /// With the second axis, and the angle about the first, counted the other way: from the mirror image of
     /// a frame to a right-handed one (step 7).
+    ///
+    /// ```
+    /// # use fogbow::{covariance::Symmetric4, math::Symmetric2};
+    /// let slanted = Symmetric4::separable(Symmetric2::new(2.0, 1.0, 2.0), Symmetric2::ZERO);
+    /// assert_eq!(slanted.flipped().spatial, Symmetric2::new(2.0, -1.0, 2.0));
+    /// assert_eq!(slanted.flipped().flipped(), slanted);
+    /// ```
     #[inline]
     #[must_use]
     pub fn flipped(&self) -> Self {
@@ -233,6 +297,13 @@ impl Symmetric4 {
 
     /// Of the sum of two light fields in the same frame, with energies `weight` and `other_weight`:
     /// `(I₁Σ₁ + I₂Σ₂)/(I₁ + I₂)`; zero without energy. An upper bound where their spectra interfere.
+    ///
+    /// ```
+    /// # use fogbow::{covariance::Symmetric4, math::Symmetric2};
+    /// let sharp = Symmetric4::separable(Symmetric2::diagonal(8.0, 0.0), Symmetric2::ZERO);
+    /// let mixed = sharp.combined(1.0, &Symmetric4::ZERO, 3.0);   // among three times as much even light
+    /// assert_eq!(mixed.spatial.xx, 2.0);
+    /// ```
     #[inline]
     #[must_use]
     pub fn combined(&self, weight: f32, other: &Self, other_weight: f32) -> Self {
@@ -255,6 +326,14 @@ impl Symmetric4 {
     /// ```
     ///
     /// Sheet § 2.5 (in place of B Eq. 16). Variances below 10⁻⁶ of those in `X` are rounding, and returned as 0.
+    ///
+    /// ```
+    /// # use fogbow::{covariance::Symmetric4, math::Symmetric2};
+    /// // Light that falls from all sides through a slit: in the slit its fluence has the slit's edges, behind it none.
+    /// let slit = Symmetric4::separable(Symmetric2::diagonal(4.0, 0.0), Symmetric2::ZERO);
+    /// assert_eq!(slit.slice(), Symmetric2::diagonal(4.0, 0.0));
+    /// assert_eq!(slit.travelled(3.0).slice(), Symmetric2::ZERO);
+    /// ```
     #[inline]
     #[must_use]
     pub fn slice(&self) -> Symmetric2 {
@@ -275,6 +354,12 @@ impl Symmetric4 {
 
     /// Covariance (cycles²/rad²) over directions of the light field summed over places: `P − Cᵀ X⁺ C`,
     /// what a camera with an aperture sees.
+    ///
+    /// ```
+    /// # use fogbow::{covariance::Symmetric4, math::Symmetric2};
+    /// let (place, direction) = (Symmetric2::diagonal(4.0, 0.0), Symmetric2::diagonal(1.0, 2.0));
+    /// assert_eq!(Symmetric4::separable(place, direction).angular_slice(), direction);   // nothing they have in common
+    /// ```
     #[inline]
     #[must_use]
     pub fn angular_slice(&self) -> Symmetric2 {
@@ -293,6 +378,17 @@ impl Symmetric4 {
     /// ```
     ///
     /// Sheet § 2.2; not in B.
+    ///
+    /// ```
+    /// # use fogbow::{covariance::Symmetric4, math::Symmetric2};
+    /// let unit = Symmetric2::diagonal(1.0, 1.0);
+    /// let light = Symmetric4::separable(unit, unit);
+    /// // Head on into glass directions draw together by n = 1.5, so angular frequencies grow by as much.
+    /// let inside = light.refracted(&Symmetric2::ZERO, (1.0, 1.0), (1.0, 1.5));
+    /// assert!((inside.angular.xx - 2.25).abs() < 1e-5 && inside.spatial == unit);
+    /// let outside = inside.refracted(&Symmetric2::ZERO, (1.0, 1.0), (1.5, 1.0));
+    /// assert!((outside.angular.xx - 1.0).abs() < 1e-5);
+    /// ```
     #[inline]
     #[must_use]
     pub fn refracted(&self, curvature: &Symmetric2, cosines: (f32, f32), indices: (f32, f32)) -> Self {
@@ -354,6 +450,11 @@ impl Wide {
 }
 
 /// Angular covariance (cycles²/rad²) of a Phong lobe `cosⁿ`: `n/(4π²) I` (sheet § 2.4).
+///
+/// ```
+/// # use fogbow::{covariance::operators::phong_lobe, math::float::PI};
+/// assert!((phong_lobe(100.0).xx - 100.0 / (4.0 * PI * PI)).abs() < 1e-5);
+/// ```
 #[inline]
 #[must_use]
 pub fn phong_lobe(exponent: f32) -> Symmetric2 {

@@ -21,6 +21,27 @@ use crate::surface::Surface;
 use crate::world::World;
 
 /// What frequency photons fly through and where they leave what they carry.
+///
+/// ```
+/// # use fogbow::{covariance::{FrequencyPhotons, Grid, Lattice, Voxel}, math::{Bounds, Vec3, float::PI}};
+/// # use fogbow::{host::Empty, light::{Light, PointLight}, path::Settings, photon, sampling::Generator, spectrum::Spectrum};
+/// # use fogbow::path::World;
+/// // A lamp of 4π W in the middle of a vacuum: at 2 m its fluence is 1/4 W·m⁻².
+/// let lamps = [Light::Point(PointLight::from_flux(Vec3::ZERO, Spectrum::splat(4.0 * PI))?)];
+/// let world = World { medium: &Empty, scene: &Empty, lights: &lamps };
+/// let lattice = Lattice::new(Bounds { min: Vec3::splat(-2.5), max: Vec3::splat(2.5) }, [5, 5, 5])?;
+/// let (mut voxels, mut rng) = ([Voxel::EMPTY; 125], Generator::new(1));
+/// let mut photons = FrequencyPhotons::new(world, None, lattice);
+/// for _ in 0..4000 {
+///     photon::trace(&world, &lattice.bounds(), &Settings::default(), &mut rng, &mut |event| {
+///         photons.visit(event, &mut voxels);
+///     });
+/// }
+/// assert!(photons.light_field().is_some());   // of the last one
+/// let grid = Grid::new(lattice, &voxels, 4000)?;
+/// assert!((grid.fluence(2.0 * Vec3::X).unwrap() - 0.25).abs() < 0.03);
+/// # Ok::<(), Box<dyn core::error::Error>>(())
+/// ```
 #[derive(Debug)]
 pub struct FrequencyPhotons<'a, M: ?Sized, S: ?Sized> {
     world: World<'a, M, S>,

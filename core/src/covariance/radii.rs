@@ -59,6 +59,15 @@ impl<'a> Radii<'a> {
     }
 
     /// The radius (m) at `point`, interpolated; 0 outside.
+    ///
+    /// ```
+    /// # use fogbow::{covariance::{Grid, Lattice, Radii, Voxel}, math::{Bounds, Vec3}};
+    /// let lattice = Lattice::new(Bounds { min: Vec3::ZERO, max: Vec3::ONE }, [2, 1, 1])?;
+    /// let mut storage = [0.0; 2];
+    /// let radii = Radii::new(&Grid::new(lattice, &[Voxel::EMPTY; 2], 1)?, 0.02, 0.125, 0.3, &mut storage)?;
+    /// assert_eq!((radii.at(Vec3::splat(0.5)), radii.at(Vec3::NEG_X)), (0.3, 0.0));   // even light: the largest allowed
+    /// # Ok::<(), fogbow::covariance::LatticeError>(())
+    /// ```
     #[inline]
     #[must_use]
     pub fn at(&self, point: Vec3) -> f32 {
@@ -67,6 +76,15 @@ impl<'a> Radii<'a> {
     }
 
     /// The radii, one per cell.
+    ///
+    /// ```
+    /// # use fogbow::{covariance::{Grid, Lattice, Radii, Voxel}, math::{Bounds, Vec3}};
+    /// let lattice = Lattice::new(Bounds { min: Vec3::ZERO, max: Vec3::ONE }, [2, 1, 1])?;
+    /// let mut storage = [0.0; 2];
+    /// let radii = Radii::new(&Grid::new(lattice, &[Voxel::EMPTY; 2], 1)?, 0.02, 0.125, 0.3, &mut storage)?;
+    /// assert_eq!(radii.values(), [0.3, 0.3]);
+    /// # Ok::<(), fogbow::covariance::LatticeError>(())
+    /// ```
     #[must_use]
     pub fn values(&self) -> &'a [f32] {
         self.radii

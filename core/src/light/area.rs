@@ -42,6 +42,14 @@ fn importance(radiance: Spectrum, area: f32, centre: Vec3, from: Vec3) -> f32 {
 }
 
 /// A parallelogram that shines to the side of its normal `edge_u × edge_v`.
+///
+/// ```
+/// # use fogbow::{light::QuadLight, math::Vec3, spectrum::Spectrum};
+/// let panel = QuadLight::new(Vec3::ZERO, 2.0 * Vec3::X, Vec3::Y, Spectrum::ONE).unwrap();
+/// assert_eq!((panel.area(), panel.normal()), (2.0, Vec3::Z));
+/// assert_eq!((panel.centre(), panel.edges()), (Vec3::new(1.0, 0.5, 0.0), [2.0 * Vec3::X, Vec3::Y]));
+/// assert!(QuadLight::new(Vec3::ZERO, Vec3::X, Vec3::X, Spectrum::ONE).is_err());   // no area
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct QuadLight {
     corner: Vec3,
@@ -234,8 +242,16 @@ pub struct SphereLight {
 }
 
 impl SphereLight {
+    /// From centre and radius (m) and radiance (W·m⁻²·sr⁻¹).
+    ///
     /// # Errors
     /// Values that are not finite, a negative radiance, a radius that is not positive.
+    ///
+    /// ```
+    /// # use fogbow::{light::{LightError, SphereLight}, math::Vec3, spectrum::Spectrum};
+    /// assert!(SphereLight::new(Vec3::ZERO, 0.1, Spectrum::ONE).is_ok());
+    /// assert_eq!(SphereLight::new(Vec3::ZERO, 0.0, Spectrum::ONE), Err(LightError::NoArea));
+    /// ```
     pub fn new(centre: Vec3, radius: f32, radiance: Spectrum) -> Result<Self, LightError> {
         if !radiance.is_valid() {
             return Err(LightError::Emission);
@@ -250,6 +266,12 @@ impl SphereLight {
     }
 
     /// Area (m²).
+    ///
+    /// ```
+    /// # use fogbow::{light::SphereLight, math::{Vec3, float::PI}, spectrum::Spectrum};
+    /// let ball = SphereLight::new(Vec3::ZERO, 0.5, Spectrum::ONE).unwrap();
+    /// assert!((ball.area() - PI).abs() < 1e-6);   // 4π r²
+    /// ```
     #[must_use]
     pub fn area(&self) -> f32 {
         4.0 * PI * self.radius * self.radius
@@ -304,6 +326,12 @@ pub struct Triangle {
 
 impl Triangle {
     /// The normal, as long as twice the area.
+    ///
+    /// ```
+    /// # use fogbow::{light::Triangle, math::Vec3};
+    /// let half = Triangle { corners: [Vec3::ZERO, Vec3::X, Vec3::Y] };
+    /// assert_eq!(half.cross(), Vec3::Z);   // area ½
+    /// ```
     #[must_use]
     pub fn cross(&self) -> Vec3 {
         let [a, b, c] = self.corners;
@@ -312,6 +340,15 @@ impl Triangle {
 }
 
 /// Triangles that shine to the side of their normals.
+///
+/// ```
+/// # use fogbow::{light::{MeshLight, Triangle}, math::Vec3, spectrum::Spectrum};
+/// let corner = Vec3::new(1.0, 1.0, 0.0);
+/// let square = [[Vec3::ZERO, Vec3::X, corner], [Vec3::ZERO, corner, Vec3::Y]].map(|corners| Triangle { corners });
+/// let mut table = [0.0; 2];
+/// let lamp = MeshLight::new(&square, &mut table, Spectrum::ONE).unwrap();
+/// assert_eq!((lamp.area(), lamp.centre()), (1.0, corner * 0.5));
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MeshLight<'a> {
     triangles: &'a [Triangle],

@@ -14,6 +14,14 @@ use crate::spectrum::Spectrum;
 const MOST_EVEN: f32 = 8.0;
 
 /// Parallel light.
+///
+/// ```
+/// # use fogbow::{light::Sun, math::Vec3, spectrum::Spectrum};
+/// let sun = Sun::new(Vec3::new(0.0, 3.0, 4.0), Spectrum::splat(1000.0)).unwrap();
+/// let (here, there) = (sun.source().incident(Vec3::ZERO), sun.source().incident(1e6 * Vec3::X));
+/// assert_eq!(here, there);   // the same everywhere
+/// assert!((here.unwrap().to_light - Vec3::new(0.0, 0.6, 0.8)).length() < 1e-6);
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sun {
     /// Direction towards the sun (unit).
@@ -67,6 +75,17 @@ pub(super) fn sample_constant(radiance: Spectrum, u: Vec2) -> LightSample {
 ///
 /// Column `i` of `width` lies at longitude `2π (i + ½)/width` with `atan2(x, −z)` as longitude;
 /// row `j` of `height` at the polar angle `π j/(height − 1)` from +y: the layout of Mitsuba 3.
+///
+/// ```
+/// # use fogbow::{light::EnvironmentMap, math::{Mat3, Vec3, float::PI}, spectrum::Spectrum};
+/// // White above, black below, and what interpolation makes of it between.
+/// let texels = [Spectrum::ONE, Spectrum::ONE, Spectrum::ZERO, Spectrum::ZERO];
+/// let (mut weights, mut column) = ([0.0; 4], [0.0; 2]);
+/// let map = EnvironmentMap::new(2, 2, &texels, &mut weights, &mut column, Mat3::IDENTITY).unwrap();
+/// let seen = [Vec3::Y, Vec3::X, Vec3::NEG_Y].map(|direction| map.radiance(direction)[0]);
+/// assert!((seen[0] - 1.0).abs() < 1e-6 && (seen[1] - 0.5).abs() < 1e-6 && seen[2].abs() < 1e-6);
+/// assert!((map.mean_radiance()[0] - 0.5).abs() < 1e-6 && map.resolution() == PI);
+/// ```
 #[derive(Debug, Clone, Copy)]
 pub struct EnvironmentMap<'a> {
     width: usize,

@@ -87,6 +87,14 @@ impl Source {
     }
 
     /// What arrives at `point`; `None` where nothing does.
+    ///
+    /// ```
+    /// # use fogbow::{light::{Falloff, Source}, math::Vec3, spectrum::Spectrum};
+    /// let piece = Source { position: Vec3::ZERO, normal: Vec3::Z, weight: Spectrum::ONE, falloff: Falloff::Area };
+    /// let incident = piece.incident(Vec3::new(0.0, 3.0, 4.0)).unwrap();
+    /// assert!((incident.irradiance[0] - 0.8 / 25.0).abs() < 1e-7);   // cos/r²
+    /// assert_eq!(piece.incident(Vec3::NEG_Z), None);   // behind it
+    /// ```
     #[inline]
     #[must_use]
     pub fn incident(&self, point: Vec3) -> Option<Incident> {
@@ -184,6 +192,15 @@ impl Source {
     }
 
     /// Irradiance (W·m⁻²) and its gradient (W·m⁻³) at `point`, before fog and shadows.
+    ///
+    /// The source is held fixed. `None` at the source itself.
+    ///
+    /// ```
+    /// # use fogbow::{light::PointLight, math::Vec3, spectrum::Spectrum};
+    /// let lamp = PointLight::new(Vec3::ZERO, Spectrum::splat(4.0)).unwrap().source();
+    /// let (irradiance, gradient) = lamp.irradiance(2.0 * Vec3::X).unwrap();
+    /// assert_eq!((irradiance[0], gradient.x[0]), (1.0, -1.0));   // I/r² and −2 I/r³
+    /// ```
     #[must_use]
     pub fn irradiance(&self, point: Vec3) -> Option<(Spectrum, Gradient)> {
         let h = self.geometry(point)?;

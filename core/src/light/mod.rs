@@ -94,6 +94,17 @@ const NEAR_FLAT: f32 = 0.25;
 const NEAR_SPHERE: f32 = 16.0;
 
 /// The ball around a light in which its `1/r²` rules: see [`Light::near_field`].
+///
+/// ```
+/// # use fogbow::{light::{Light, SphereLight}, math::{Ray, Vec3}, spectrum::Spectrum};
+/// let lamp = Light::Sphere(SphereLight::new(Vec3::ZERO, 0.1, Spectrum::ONE).unwrap());
+/// let field = lamp.near_field().unwrap();
+/// let radius = field.radius().unwrap();
+/// assert!(field.contains(0.99 * radius * Vec3::X) && !field.contains(1.01 * radius * Vec3::X));
+/// let across = Ray::new(field.centre() - 5.0 * Vec3::X, Vec3::X);
+/// let (near, far) = field.interval(&across, 0.0, f32::INFINITY).unwrap();
+/// assert!((far - near - 2.0 * radius).abs() < 1e-4);
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct NearField {
     centre: Vec3,
@@ -162,6 +173,12 @@ impl LightSample {
 }
 
 /// Radiance (W·m⁻²·sr⁻¹) of all lights together that are a sky: see [`Light::is_sky`].
+///
+/// ```
+/// # use fogbow::{light::{Light, Sun, sky}, math::Vec3, spectrum::Spectrum};
+/// let lights = [Light::Constant(Spectrum::ONE), Light::Sun(Sun::new(Vec3::Y, Spectrum::ONE).unwrap())];
+/// assert_eq!(sky(&lights, Vec3::Y), Spectrum::ONE);   // the sun's disc has no size
+/// ```
 #[inline]
 #[must_use]
 pub fn sky(lights: &[Light<'_>], to_light: Vec3) -> Spectrum {
@@ -170,6 +187,18 @@ pub fn sky(lights: &[Light<'_>], to_light: Vec3) -> Spectrum {
 
 impl Light<'_> {
     /// Draws a point of the light, as seen from `from`. `None` where the light cannot reach.
+    ///
+    /// For lights with extent, what arrives is weighted by one over the density: its mean over `u` is the irradiance
+    /// of the whole light.
+    ///
+    /// ```
+    /// # use fogbow::{light::{Light, SphereLight}, math::{Vec2, Vec3}, spectrum::Spectrum};
+    /// let lamp = Light::Sphere(SphereLight::new(5.0 * Vec3::Z, 1.0, Spectrum::splat(3.0)).unwrap());
+    /// let sample = lamp.sample(Vec3::ZERO, Vec2::splat(0.5)).unwrap();
+    /// assert!((sample.incident.irradiance[0] * sample.pdf - 3.0).abs() < 1e-5);   // radiance over density
+    /// assert!(sample.incident.distance < 5.0);   // its near side
+    /// assert!(lamp.sample(5.0 * Vec3::Z, Vec2::splat(0.5)).is_none());   // it does not shine inwards
+    /// ```
     #[inline]
     #[must_use]
     pub fn sample(&self, from: Vec3, u: Vec2) -> Option<LightSample> {
@@ -188,6 +217,14 @@ impl Light<'_> {
 
     /// Density (sr⁻¹) with which [`Light::sample`] at `from` draws the direction `to_light`, where
     /// a ray meets the light after `distance` (m) at a surface with `normal`. 0 for point lights.
+    ///
+    /// ```
+    /// # use fogbow::{light::{Light, QuadLight}, math::Vec3, spectrum::Spectrum};
+    /// // A square metre ten metres above, which shines down.
+    /// let lamp = Light::Quad(QuadLight::new(Vec3::new(-0.5, -0.5, 10.0), Vec3::Y, Vec3::X, Spectrum::ONE).unwrap());
+    /// let pdf = lamp.pdf(Vec3::ZERO, Vec3::Z, 10.0, Vec3::NEG_Z);
+    /// assert!((pdf - 100.0).abs() < 1e-3);   // one over the solid angle, A cos/r² = 1/100
+    /// ```
     #[inline]
     #[must_use]
     pub fn pdf(&self, from: Vec3, to_light: Vec3, distance: f32, normal: Vec3) -> f32 {
@@ -203,6 +240,13 @@ impl Light<'_> {
 
     /// Radiance (W·m⁻²·sr⁻¹) that an area light's surface with `normal` sends towards `to_eye`;
     /// 0 from behind and for lights without a surface.
+    ///
+    /// ```
+    /// # use fogbow::{light::{Light, QuadLight}, math::Vec3, spectrum::Spectrum};
+    /// let lamp = Light::Quad(QuadLight::new(Vec3::ZERO, Vec3::X, Vec3::Y, Spectrum::ONE).unwrap());
+    /// assert_eq!(lamp.radiance(Vec3::Z, Vec3::new(0.6, 0.0, 0.8)), Spectrum::ONE);   // the same in all directions
+    /// assert_eq!(lamp.radiance(Vec3::Z, Vec3::NEG_Z), Spectrum::ZERO);   // from behind
+    /// ```
     #[inline]
     #[must_use]
     pub fn radiance(&self, normal: Vec3, to_eye: Vec3) -> Spectrum {
@@ -217,6 +261,13 @@ impl Light<'_> {
 
     /// Radiance (W·m⁻²·sr⁻¹) that arrives from infinity along −`to_light`; 0 for lights within the
     /// world and for suns, whose disc has no size.
+    ///
+    /// ```
+    /// # use fogbow::{light::{Light, PointLight}, math::Vec3, spectrum::Spectrum};
+    /// let lamp = PointLight::new(Vec3::ZERO, Spectrum::ONE).unwrap();
+    /// assert_eq!(Light::Constant(Spectrum::splat(0.5)).background(Vec3::X), Spectrum::splat(0.5));
+    /// assert_eq!(Light::Point(lamp).background(Vec3::X), Spectrum::ZERO);
+    /// ```
     #[inline]
     #[must_use]
     pub fn background(&self, to_light: Vec3) -> Spectrum {
@@ -230,6 +281,12 @@ impl Light<'_> {
     /// Whether it shines evenly from everywhere around the world, so that directions which know nothing of it
     /// meet it well. Caches keep the light of such a sky, as that of surfaces infinitely far: a
     /// connection to it from every place would be noise wherever walls hide most of it.
+    ///
+    /// ```
+    /// # use fogbow::{light::{Light, Sun}, math::Vec3, spectrum::Spectrum};
+    /// assert!(Light::Constant(Spectrum::ONE).is_sky());
+    /// assert!(!Light::Sun(Sun::new(Vec3::Y, Spectrum::ONE).unwrap()).is_sky());
+    /// ```
     #[inline]
     #[must_use]
     pub fn is_sky(&self) -> bool {
@@ -243,6 +300,14 @@ impl Light<'_> {
     /// The ball around a light of finite size within which connections from a medium should be
     /// spread along the ray instead of leaving from collisions: there `1/r²` rules the variance.
     /// Everything, for lights without extent; `None` for lights at infinity.
+    ///
+    /// ```
+    /// # use fogbow::{light::{Light, PointLight}, math::Vec3, spectrum::Spectrum};
+    /// let lamp = Light::Point(PointLight::new(Vec3::Z, Spectrum::ONE).unwrap());
+    /// let field = lamp.near_field().unwrap();
+    /// assert_eq!((field.centre(), field.radius()), (Vec3::Z, None));   // all of space
+    /// assert!(Light::Constant(Spectrum::ONE).near_field().is_none());
+    /// ```
     #[inline]
     #[must_use]
     pub fn near_field(&self) -> Option<NearField> {
@@ -262,6 +327,14 @@ impl Light<'_> {
     /// cannot do without connections spread along rays. `None` for rectangles, which are sampled
     /// by the solid angle they are seen under; around their own points, spread connections
     /// have the heavier tail.
+    ///
+    /// ```
+    /// # use fogbow::{light::{Light, PointLight, QuadLight}, math::Vec3, spectrum::Spectrum};
+    /// let lamp = Light::Point(PointLight::new(Vec3::Z, Spectrum::ONE).unwrap());
+    /// let panel = Light::Quad(QuadLight::new(Vec3::ZERO, Vec3::X, Vec3::Y, Spectrum::ONE).unwrap());
+    /// assert!(lamp.steep_field().is_some());
+    /// assert!(panel.near_field().is_some() && panel.steep_field().is_none());
+    /// ```
     #[inline]
     #[must_use]
     pub fn steep_field(&self) -> Option<NearField> {
@@ -271,6 +344,15 @@ impl Light<'_> {
     /// A point of the light to spread a connection around, before it is known where on a ray the
     /// connection starts. The source is `None` for a sphere, whose visible cap has to be sampled
     /// from there.
+    ///
+    /// ```
+    /// # use fogbow::{light::{Light, QuadLight, SphereLight}, math::{Vec2, Vec3}, spectrum::Spectrum};
+    /// let panel = Light::Quad(QuadLight::new(Vec3::ZERO, Vec3::X, Vec3::Y, Spectrum::ONE).unwrap());
+    /// let (point, source) = panel.anchor(Vec2::splat(0.5)).unwrap();
+    /// assert_eq!((point, source.unwrap().position), (Vec3::new(0.5, 0.5, 0.0), point));
+    /// let ball = Light::Sphere(SphereLight::new(Vec3::Z, 0.1, Spectrum::ONE).unwrap());
+    /// assert!(matches!(ball.anchor(Vec2::splat(0.5)), Some((Vec3::Z, None))));
+    /// ```
     #[inline]
     #[must_use]
     pub fn anchor(&self, u: Vec2) -> Option<(Vec3, Option<Source>)> {
@@ -287,6 +369,16 @@ impl Light<'_> {
     }
 
     /// Density (sr⁻¹) at `from` of a point drawn by [`Light::anchor`]; arguments as [`Light::pdf`].
+    ///
+    /// ```
+    /// # use fogbow::{light::{Light, QuadLight}, math::{Vec3, float::PI}, spectrum::Spectrum};
+    /// // A square metre half a metre above: a face of the cube around the point, a sixth of all directions.
+    /// let panel = Light::Quad(QuadLight::new(Vec3::new(-0.5, -0.5, 0.5), Vec3::Y, Vec3::X, Spectrum::ONE).unwrap());
+    /// let anchored = panel.anchor_pdf(Vec3::ZERO, Vec3::Z, 0.5, Vec3::NEG_Z);
+    /// let sampled = panel.pdf(Vec3::ZERO, Vec3::Z, 0.5, Vec3::NEG_Z);
+    /// assert!((anchored - 0.25).abs() < 1e-6);   // uniform over the area: r²/(A cos)
+    /// assert!((sampled - 6.0 / (4.0 * PI)).abs() < 1e-5);   // uniform over the solid angle
+    /// ```
     #[inline]
     #[must_use]
     pub fn anchor_pdf(&self, from: Vec3, to_light: Vec3, distance: f32, normal: Vec3) -> f32 {
@@ -298,6 +390,13 @@ impl Light<'_> {
 
     /// The most radiant intensity (W/sr, mean of the channels) a light of finite size sends to a far
     /// point; 0 for lights at infinity.
+    ///
+    /// ```
+    /// # use fogbow::{light::{Light, SphereLight}, math::{Vec3, float::PI}, spectrum::Spectrum};
+    /// let ball = Light::Sphere(SphereLight::new(Vec3::ZERO, 0.5, Spectrum::splat(2.0)).unwrap());
+    /// assert!((ball.intensity() - 2.0 * PI * 0.25).abs() < 1e-6);   // radiance times its disc, π r²
+    /// assert_eq!(Light::Constant(Spectrum::ONE).intensity(), 0.0);
+    /// ```
     #[inline]
     #[must_use]
     pub fn intensity(&self) -> f32 {
@@ -314,6 +413,15 @@ impl Light<'_> {
 
     /// The part of `ray` between `near` and `far` (m) that lies in the light's near field and that it
     /// can reach; `None` if there is none. Never too small: a spot's cone is a little widened.
+    ///
+    /// ```
+    /// # use fogbow::{light::{Light, SpotLight}, math::{Ray, Vec3, float::PI}, spectrum::Spectrum};
+    /// // A cone of 45° around +z, crossed one metre from its tip, where it is two metres wide.
+    /// let spot = Light::Spot(SpotLight::new(Vec3::ZERO, Vec3::Z, 0.1, PI / 4.0, Spectrum::ONE).unwrap());
+    /// let ray = Ray::new(Vec3::new(-5.0, 0.0, 1.0), Vec3::X);
+    /// let (near, far) = spot.near_interval(&ray, 0.0, 10.0).unwrap();
+    /// assert!(near <= 4.0 && far >= 6.0 && far - near < 2.01);
+    /// ```
     #[inline]
     #[must_use]
     pub fn near_interval(&self, ray: &Ray, near: f32, far: f32) -> Option<(f32, f32)> {
@@ -351,6 +459,12 @@ impl Light<'_> {
 
     /// A rough irradiance (mean of the channels) at `from` without fog or shadows: by it, lights
     /// are chosen. Positive wherever the light may contribute.
+    ///
+    /// ```
+    /// # use fogbow::{light::{Light, PointLight}, math::Vec3, spectrum::Spectrum};
+    /// let lamp = Light::Point(PointLight::new(Vec3::ZERO, Spectrum::new(1.0, 2.0, 3.0)).unwrap());
+    /// assert_eq!(lamp.importance(2.0 * Vec3::X), 0.5);   // mean intensity over r²
+    /// ```
     #[inline]
     #[must_use]
     pub fn importance(&self, from: Vec3) -> f32 {
@@ -369,6 +483,13 @@ impl Light<'_> {
 
     /// Radiant power (W) emitted into a scene within `bounds`; distant lights shine through its
     /// bounding sphere.
+    ///
+    /// ```
+    /// # use fogbow::{light::{Light, Sun}, math::{Bounds, Vec3, float::PI}, spectrum::Spectrum};
+    /// let bounds = Bounds { min: Vec3::ZERO, max: Vec3::ONE };   // its sphere has the radius √3/2
+    /// let sun = Light::Sun(Sun::new(Vec3::Y, Spectrum::splat(1000.0)).unwrap());
+    /// assert!((sun.power(&bounds)[0] - 1000.0 * PI * 0.75).abs() < 1e-2);
+    /// ```
     #[must_use]
     pub fn power(&self, bounds: &Bounds) -> Spectrum {
         use crate::math::float::PI;

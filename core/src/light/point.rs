@@ -24,6 +24,14 @@ fn inverse_square(position: Vec3, from: Vec3) -> f32 {
 }
 
 /// A light that shines the same in all directions.
+///
+/// ```
+/// # use fogbow::{light::PointLight, math::{Vec3, float::PI}, spectrum::Spectrum};
+/// let bulb = PointLight::from_flux(Vec3::ZERO, Spectrum::splat(4.0 * PI)).unwrap();
+/// let same = PointLight::new(Vec3::ZERO, Spectrum::ONE).unwrap();
+/// assert!((bulb.intensity[0] - same.intensity[0]).abs() < 1e-6);   // flux spread over 4π
+/// assert_eq!(same.source().incident(2.0 * Vec3::X).unwrap().irradiance[0], 0.25);
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PointLight {
     /// Where (m).
@@ -63,6 +71,15 @@ impl PointLight {
 }
 
 /// A light with a `cosˢ` lobe around its axis.
+///
+/// ```
+/// # use fogbow::{light::{LightError, PhongLight}, math::Vec3, spectrum::Spectrum};
+/// let lamp = PhongLight::from_flux(Vec3::ZERO, Vec3::Z, 8.0, Spectrum::splat(60.0)).unwrap();
+/// assert!((lamp.power()[0] - 60.0).abs() < 1e-4);
+/// let aside = lamp.source().incident(Vec3::new(0.6, 0.0, 0.8)).unwrap();
+/// assert!((aside.irradiance[0] / lamp.intensity[0] - 0.8_f32.powi(8)).abs() < 1e-6);   // cosˢ at one metre
+/// assert_eq!(PhongLight::new(Vec3::ZERO, Vec3::Z, 0.5, Spectrum::ONE), Err(LightError::Exponent));
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PhongLight {
     /// Where (m).
@@ -119,6 +136,13 @@ impl PhongLight {
 }
 
 /// A cone of light with a soft border.
+///
+/// ```
+/// # use fogbow::{light::SpotLight, math::{Vec3, float::PI}, spectrum::Spectrum};
+/// let spot = SpotLight::new(Vec3::ZERO, Vec3::Z, PI / 3.0, PI / 3.0, Spectrum::ONE).unwrap();
+/// assert!((spot.power()[0] - PI).abs() < 1e-5);   // 2π (1 − cos 60°) steradians
+/// assert!(spot.source().incident(Vec3::Z).is_some() && spot.source().incident(Vec3::X).is_none());
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SpotLight {
     /// Where (m).

@@ -5,6 +5,15 @@ use glam::Vec3;
 use super::Ray;
 
 /// An axis-aligned box.
+///
+/// ```
+/// # use fogbow::math::{Bounds, Vec3};
+/// let room = Bounds::of([Vec3::ZERO, Vec3::new(4.0, 3.0, 2.0)]);
+/// assert_eq!((room.centre(), room.size()), (Vec3::new(2.0, 1.5, 1.0), Vec3::new(4.0, 3.0, 2.0)));
+/// let lamp = Vec3::new(2.0, 1.5, 5.0);
+/// assert!(!room.contains(lamp) && room.union(Bounds::of([lamp])).contains(lamp));
+/// assert_eq!(room.union(Bounds::EMPTY), room);
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Bounds {
     /// Smallest corner (m).

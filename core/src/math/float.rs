@@ -14,6 +14,12 @@ pub const INV_FOUR_PI: f32 = 0.079_577_471_545_947_67;
 pub const OPAQUE: f32 = 87.0;
 
 /// `eˣ`.
+///
+/// ```
+/// # use fogbow::math::float::exp;
+/// assert_eq!(exp(0.0), 1.0);
+/// assert!((exp(1.5) * exp(-2.5) - exp(-1.0)).abs() < 1e-7);   // e^a e^b = e^{a + b}
+/// ```
 #[inline]
 #[must_use]
 pub fn exp(x: f32) -> f32 {
@@ -21,6 +27,12 @@ pub fn exp(x: f32) -> f32 {
 }
 
 /// Natural logarithm; −∞ at 0.
+///
+/// ```
+/// # use fogbow::math::float::ln;
+/// assert!((ln(2.0) + ln(3.0) - ln(6.0)).abs() < 1e-6);
+/// assert_eq!(ln(0.0), f32::NEG_INFINITY);
+/// ```
 #[inline]
 #[must_use]
 pub fn ln(x: f32) -> f32 {
@@ -28,6 +40,12 @@ pub fn ln(x: f32) -> f32 {
 }
 
 /// `eˣ − 1` without cancellation near 0.
+///
+/// ```
+/// # use fogbow::math::float::{exp, exp_m1};
+/// assert_eq!(exp_m1(1e-8), 1e-8);
+/// assert_eq!(exp(1e-8) - 1.0, 0.0);   // all digits cancelled
+/// ```
 #[inline]
 #[must_use]
 pub fn exp_m1(x: f32) -> f32 {
@@ -35,6 +53,12 @@ pub fn exp_m1(x: f32) -> f32 {
 }
 
 /// `ln(1 + x)` without cancellation near 0.
+///
+/// ```
+/// # use fogbow::math::float::{ln, ln_1p};
+/// assert_eq!(ln_1p(1e-8), 1e-8);
+/// assert_eq!(ln(1.0 + 1e-8), 0.0);   // all digits cancelled
+/// ```
 #[inline]
 #[must_use]
 pub fn ln_1p(x: f32) -> f32 {
@@ -42,6 +66,14 @@ pub fn ln_1p(x: f32) -> f32 {
 }
 
 /// Square root.
+///
+/// NaN below 0.
+///
+/// ```
+/// # use fogbow::math::float::sqrt;
+/// assert_eq!(sqrt(2.25), 1.5);
+/// assert!(sqrt(-1.0).is_nan());
+/// ```
 #[inline]
 #[must_use]
 pub fn sqrt(x: f32) -> f32 {
@@ -49,6 +81,12 @@ pub fn sqrt(x: f32) -> f32 {
 }
 
 /// Square root of `max(x, 0)`: for arguments that rounding may push below zero.
+///
+/// ```
+/// # use fogbow::math::float::safe_sqrt;
+/// let cosine = 1.000_000_1_f32;   // of a direction that is a unit vector but for rounding
+/// assert_eq!(safe_sqrt(1.0 - cosine * cosine), 0.0);
+/// ```
 #[inline]
 #[must_use]
 pub fn safe_sqrt(x: f32) -> f32 {
@@ -56,6 +94,14 @@ pub fn safe_sqrt(x: f32) -> f32 {
 }
 
 /// `xʸ`.
+///
+/// NaN where `x` is negative and `y` no whole number.
+///
+/// ```
+/// # use fogbow::math::float::powf;
+/// assert!((powf(2.0, 10.0) - 1024.0).abs() < 1e-3);
+/// assert!((powf(0.25, 0.5) - 0.5).abs() < 1e-7);   // a square root
+/// ```
 #[inline]
 #[must_use]
 pub fn powf(x: f32, y: f32) -> f32 {
@@ -63,6 +109,12 @@ pub fn powf(x: f32, y: f32) -> f32 {
 }
 
 /// Sine and cosine of an angle (rad).
+///
+/// ```
+/// # use fogbow::math::float::{PI, sin_cos};
+/// let (sine, cosine) = sin_cos(PI / 3.0);
+/// assert!((cosine - 0.5).abs() < 1e-6 && (sine * sine + cosine * cosine - 1.0).abs() < 1e-6);
+/// ```
 #[inline]
 #[must_use]
 pub fn sin_cos(x: f32) -> (f32, f32) {
@@ -70,6 +122,11 @@ pub fn sin_cos(x: f32) -> (f32, f32) {
 }
 
 /// Tangent of an angle (rad).
+///
+/// ```
+/// # use fogbow::math::float::{PI, tan};
+/// assert!((tan(PI / 4.0) - 1.0).abs() < 1e-6);
+/// ```
 #[inline]
 #[must_use]
 pub fn tan(x: f32) -> f32 {
@@ -77,6 +134,12 @@ pub fn tan(x: f32) -> f32 {
 }
 
 /// Arc cosine (rad); the argument is clamped to [−1, 1].
+///
+/// ```
+/// # use fogbow::math::float::{PI, acos};
+/// assert!((acos(0.5) - PI / 3.0).abs() < 1e-6);
+/// assert_eq!(acos(1.000_001), 0.0);   // beyond 1 by rounding
+/// ```
 #[inline]
 #[must_use]
 pub fn acos(x: f32) -> f32 {
@@ -84,6 +147,12 @@ pub fn acos(x: f32) -> f32 {
 }
 
 /// Arc sine (rad); the argument is clamped to [−1, 1].
+///
+/// ```
+/// # use fogbow::math::float::{PI, asin};
+/// assert!((asin(0.5) - PI / 6.0).abs() < 1e-6);
+/// assert!((asin(-1.000_001) + PI / 2.0).abs() < 1e-6);   // beyond −1 by rounding
+/// ```
 #[inline]
 #[must_use]
 pub fn asin(x: f32) -> f32 {
@@ -91,6 +160,12 @@ pub fn asin(x: f32) -> f32 {
 }
 
 /// Arc tangent (rad).
+///
+/// ```
+/// # use fogbow::math::float::{PI, atan};
+/// assert!((atan(1.0) - PI / 4.0).abs() < 1e-6);
+/// assert!((atan(f32::INFINITY) - PI / 2.0).abs() < 1e-6);
+/// ```
 #[inline]
 #[must_use]
 pub fn atan(x: f32) -> f32 {
@@ -98,6 +173,12 @@ pub fn atan(x: f32) -> f32 {
 }
 
 /// Angle (rad) of the point `(x, y)`, in (−π, π].
+///
+/// ```
+/// # use fogbow::math::float::{PI, atan2};
+/// assert!((atan2(2.0, -2.0) - 0.75 * PI).abs() < 1e-6);   // y first; the quadrant is kept
+/// assert_eq!(atan2(0.0, -1.0), PI);
+/// ```
 #[inline]
 #[must_use]
 pub fn atan2(y: f32, x: f32) -> f32 {
@@ -105,6 +186,13 @@ pub fn atan2(y: f32, x: f32) -> f32 {
 }
 
 /// Inverse hyperbolic tangent.
+///
+/// Infinite at ±1, NaN beyond.
+///
+/// ```
+/// # use fogbow::math::float::{atanh, ln};
+/// assert!((atanh(0.5) - 0.5 * ln(3.0)).abs() < 1e-6);   // ½ ln((1 + x)/(1 − x))
+/// ```
 #[inline]
 #[must_use]
 pub fn atanh(x: f32) -> f32 {
@@ -112,6 +200,12 @@ pub fn atanh(x: f32) -> f32 {
 }
 
 /// `√(x² + y²)` without overflow of the squares.
+///
+/// ```
+/// # use fogbow::math::float::hypot;
+/// assert!((hypot(3e30, 4e30) / 5e30 - 1.0).abs() < 1e-6);
+/// assert_eq!(3e30_f32 * 3e30, f32::INFINITY);
+/// ```
 #[inline]
 #[must_use]
 pub fn hypot(x: f32, y: f32) -> f32 {
@@ -119,6 +213,13 @@ pub fn hypot(x: f32, y: f32) -> f32 {
 }
 
 /// Cube root.
+///
+/// Of negative numbers, too.
+///
+/// ```
+/// # use fogbow::math::float::cbrt;
+/// assert!((cbrt(-27.0) + 3.0).abs() < 1e-6);
+/// ```
 #[inline]
 #[must_use]
 pub fn cbrt(x: f32) -> f32 {
@@ -127,6 +228,12 @@ pub fn cbrt(x: f32) -> f32 {
 
 /// The smaller of two numbers; `b` if either is NaN. One instruction, where `f32::min` with its
 /// care for NaN is three.
+///
+/// ```
+/// # use fogbow::math::float::min;
+/// assert_eq!((min(1.0, 2.0), min(f32::NAN, 2.0)), (1.0, 2.0));
+/// assert!(min(2.0, f32::NAN).is_nan());
+/// ```
 #[inline]
 #[must_use]
 pub fn min(a: f32, b: f32) -> f32 {
@@ -134,6 +241,12 @@ pub fn min(a: f32, b: f32) -> f32 {
 }
 
 /// The larger of two numbers; `b` if either is NaN.
+///
+/// ```
+/// # use fogbow::math::float::max;
+/// assert_eq!((max(1.0, 2.0), max(f32::NAN, 0.0)), (2.0, 0.0));   // so `max(x, 0)` is always a number
+/// assert!(max(2.0, f32::NAN).is_nan());
+/// ```
 #[inline]
 #[must_use]
 pub fn max(a: f32, b: f32) -> f32 {
@@ -141,6 +254,11 @@ pub fn max(a: f32, b: f32) -> f32 {
 }
 
 /// Largest integer not above `x`.
+///
+/// ```
+/// # use fogbow::math::float::floor;
+/// assert_eq!((floor(1.5), floor(-1.5)), (1.0, -2.0));
+/// ```
 #[inline]
 #[must_use]
 pub fn floor(x: f32) -> f32 {
@@ -150,6 +268,12 @@ pub fn floor(x: f32) -> f32 {
 /// Largest integer not above `x` as an `i32`, saturating; 0 for NaN.
 ///
 /// Several times faster than [`floor`] on targets without a rounding instruction.
+///
+/// ```
+/// # use fogbow::math::float::floor_i32;
+/// assert_eq!((floor_i32(1.5), floor_i32(-1.5)), (1, -2));
+/// assert_eq!((floor_i32(1e20), floor_i32(f32::NAN)), (i32::MAX, 0));
+/// ```
 #[inline]
 #[must_use]
 pub fn floor_i32(x: f32) -> i32 {
@@ -159,6 +283,13 @@ pub fn floor_i32(x: f32) -> i32 {
 }
 
 /// `a·b − c·d` with one rounding of each product (in `f64`), for determinants that cancel.
+///
+/// ```
+/// # use fogbow::math::float::difference_of_products;
+/// let (a, b, c, d) = (4097.0_f32, 4097.0, 4096.0, 4098.0);
+/// assert_eq!(difference_of_products(a, b, c, d), 1.0);
+/// assert_eq!(a * b - c * d, 0.0);   // 4097² has one digit too many
+/// ```
 #[inline]
 #[must_use]
 pub fn difference_of_products(a: f32, b: f32, c: f32, d: f32) -> f32 {

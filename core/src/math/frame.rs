@@ -37,6 +37,12 @@ impl Frame {
     }
 
     /// From frame coordinates to the world.
+    ///
+    /// ```
+    /// # use fogbow::math::{Frame, Vec3};
+    /// let axis = Vec3::new(0.6, 0.0, 0.8);
+    /// assert_eq!(Frame::around(axis).to_world(Vec3::Z), axis);   // the third axis
+    /// ```
     #[inline]
     #[must_use]
     pub fn to_world(&self, local: Vec3) -> Vec3 {
@@ -44,6 +50,14 @@ impl Frame {
     }
 
     /// From the world to frame coordinates.
+    ///
+    /// ```
+    /// # use fogbow::math::{Frame, Vec3};
+    /// let frame = Frame::around(Vec3::new(0.6, 0.0, 0.8));
+    /// let wind = Vec3::new(1.0, 2.0, 3.0);
+    /// assert!((frame.to_local(wind).z - 3.0).abs() < 1e-6);   // 0.6 · 1 + 0.8 · 3
+    /// assert!((frame.to_world(frame.to_local(wind)) - wind).length() < 1e-6);
+    /// ```
     #[inline]
     #[must_use]
     pub fn to_local(&self, world: Vec3) -> Vec3 {

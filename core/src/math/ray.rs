@@ -3,6 +3,14 @@
 use glam::Vec3;
 
 /// A straight path from `origin` along the unit vector `direction`, `length` metres long.
+///
+/// ```
+/// # use fogbow::math::{Ray, Vec3};
+/// let view = Ray::new(Vec3::ZERO, Vec3::X);
+/// assert_eq!(view.length, f32::INFINITY);
+/// let to_wall = view.with_length(3.0);
+/// assert_eq!(to_wall.at(to_wall.length), Vec3::new(3.0, 0.0, 0.0));
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Ray {
     /// Start (m).

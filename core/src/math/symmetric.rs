@@ -11,6 +11,16 @@ use super::float;
 const HUGE: f32 = 1e30;
 
 /// `[[xx, xy], [xy, yy]]`.
+///
+/// ```
+/// # use fogbow::math::Symmetric2;
+/// let a = Symmetric2::new(2.0, 1.0, 2.0);
+/// assert_eq!((a.trace(), a.determinant()), (4.0, 3.0));
+/// assert_eq!((a.along(1.0, 1.0), a.along(1.0, -1.0)), (6.0, 2.0));   // λ |x|² for the eigenvalues 3 and 1
+/// let unit = Symmetric2::diagonal(1.0, 1.0);
+/// assert_eq!(a.plus(&unit).determinant(), 8.0);   // both eigenvalues are larger by one
+/// assert_eq!(unit.scaled(3.0, 3.0), unit.times(9.0));
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Default, Pod, Zeroable)]
 #[repr(C)]
 pub struct Symmetric2 {
@@ -23,6 +33,16 @@ pub struct Symmetric2 {
 }
 
 /// A symmetric 3×3 matrix, upper triangle row by row.
+///
+/// ```
+/// # use fogbow::math::{Symmetric3, Vec3};
+/// let upper = [2.0, 1.0, 0.0, 2.0, 0.0, 5.0];
+/// let a = Symmetric3::from_upper(upper);
+/// assert_eq!((a.trace(), a.to_upper()), (9.0, upper));
+/// let x = Vec3::new(1.0, 1.0, 0.0);
+/// assert_eq!((a.applied(x), a.along(x)), (3.0 * x, 6.0));   // an eigenvector of 3: A x = 3 x, xᵀ A x = 3 |x|²
+/// assert_eq!(a.plus(&a), a.times(2.0));
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Default, Pod, Zeroable)]
 #[repr(C)]
 pub struct Symmetric3 {
@@ -190,6 +210,14 @@ impl Symmetric2 {
     }
 
     /// Eigenvalues and eigenvectors.
+    ///
+    /// ```
+    /// # use fogbow::math::Symmetric2;
+    /// let eigen = Symmetric2::new(2.0, 1.0, 2.0).eigen();
+    /// assert!((eigen.values[0] - 3.0).abs() < 1e-6 && (eigen.values[1] - 1.0).abs() < 1e-6);
+    /// let [x, y] = eigen.vectors[0];
+    /// assert!((x - y).abs() < 1e-6);   // along the diagonal
+    /// ```
     #[must_use]
     pub fn eigen(&self) -> Eigen<2> {
         jacobi([[self.xx, self.xy], [self.xy, self.yy]])
@@ -306,6 +334,12 @@ impl Symmetric3 {
     }
 
     /// `R A Rᵀ` with the columns `u`, `v` of `R`: a matrix in a plane, in space.
+    ///
+    /// ```
+    /// # use fogbow::math::{Symmetric2, Symmetric3, Vec3};
+    /// let floor = Symmetric3::embedded(&Symmetric2::diagonal(4.0, 9.0), Vec3::Y, Vec3::X);
+    /// assert_eq!((floor.along(Vec3::Y), floor.along(Vec3::X), floor.along(Vec3::Z)), (4.0, 9.0, 0.0));
+    /// ```
     #[inline]
     #[must_use]
     pub fn embedded(a: &Symmetric2, u: Vec3, v: Vec3) -> Self {
@@ -321,6 +355,13 @@ impl Symmetric3 {
     }
 
     /// `Rᵀ A R` with the columns `u`, `v` of `R`: what the matrix says within a plane.
+    ///
+    /// ```
+    /// # use fogbow::math::{Symmetric2, Symmetric3, Vec3};
+    /// let flat = Symmetric2::new(4.0, 1.0, 9.0);
+    /// let space = Symmetric3::embedded(&flat, Vec3::Y, Vec3::Z);
+    /// assert_eq!(space.within(Vec3::Y, Vec3::Z), flat);   // undoes `embedded`
+    /// ```
     #[inline]
     #[must_use]
     pub fn within(&self, u: Vec3, v: Vec3) -> Symmetric2 {
@@ -411,12 +452,24 @@ impl Symmetric3 {
     }
 
     /// The matrix with the absolute values of the eigenvalues.
+    ///
+    /// ```
+    /// # use fogbow::math::Symmetric3;
+    /// let saddle = Symmetric3::from_upper([-1.0, 0.0, 0.0, 2.0, 0.0, -3.0]);
+    /// assert_eq!(saddle.absolute().to_upper(), [1.0, 0.0, 0.0, 2.0, 0.0, 3.0]);
+    /// ```
     #[must_use]
     pub fn absolute(&self) -> Self {
         Self::from_rows(rebuilt(&self.eigen(), f32::abs))
     }
 
     /// Moore–Penrose inverse; eigenvalues below a millionth of the largest count as 0.
+    ///
+    /// ```
+    /// # use fogbow::math::Symmetric3;
+    /// let flat = Symmetric3::from_upper([2.0, 0.0, 0.0, 4.0, 0.0, 0.0]);
+    /// assert_eq!(flat.pseudo_inverse().to_upper(), [0.5, 0.0, 0.0, 0.25, 0.0, 0.0]);   // 0 stays 0
+    /// ```
     #[must_use]
     pub fn pseudo_inverse(&self) -> Self {
         Self::from_rows(inverted(&self.eigen()))

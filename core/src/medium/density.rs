@@ -6,6 +6,14 @@ use super::MediumError;
 
 /// Densities of the cells of a grid, x fastest: cell `(x, y, z)` of `(nx, ny, nz)` has index
 /// `(z·ny + y)·nx + x`.
+///
+/// ```
+/// # use fogbow::medium::Density;
+/// let bytes = Density::U8(&[0, 51, 255]);
+/// assert_eq!((bytes.len(), bytes.is_empty()), (3, false));
+/// assert!((bytes.value(1) - 0.2).abs() < 1e-7);   // 51/255
+/// assert_eq!(bytes.value(7), 0.0);   // beyond the last
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Density<'a> {
     /// Any finite value that is not negative.

@@ -142,6 +142,17 @@ impl<'a> Grid<'a> {
     ///
     /// # Errors
     /// As in [`Grid::new`].
+    ///
+    /// ```
+    /// # use fogbow::{host::Medium, math::{Affine3, Vec3}, medium::{Density, Grid, MinMax}, phase::Phase, spectrum::Spectrum};
+    /// let (mut blocks, mut more) = ([MinMax::default()], [MinMax::default()]);
+    /// let (steam, unit) = (Density::F32(&[2.0]), Spectrum::ONE);
+    /// let grid = Grid::new([1; 3], steam, unit, unit, Phase::ISOTROPIC, Affine3::IDENTITY, &mut blocks)?
+    ///     .with_absorption_grid(Density::F32(&[0.5]), &mut more)?;
+    /// let inside = grid.properties(Vec3::splat(0.5));
+    /// assert_eq!((inside.scattering[0], inside.absorption[0]), (2.0, 0.5));
+    /// # Ok::<(), fogbow::medium::MediumError>(())
+    /// ```
     pub fn with_absorption_grid(mut self, density: Density<'a>, blocks: &'a mut [MinMax]) -> Result<Self, MediumError> {
         self.absorption_density = Some(Field::new(density, self.size, blocks)?);
         self.thickest = (self.scattering.max_element(), self.absorption.max_element());
@@ -152,6 +163,17 @@ impl<'a> Grid<'a> {
     ///
     /// # Errors
     /// Emission that is negative or not finite.
+    ///
+    /// ```
+    /// # use fogbow::{host::Medium, math::{Affine3, Vec3}, medium::{Density, Grid, MinMax}, phase::Phase, spectrum::Spectrum};
+    /// let mut blocks = [MinMax::default()];
+    /// let (fire, unit) = (Density::F32(&[2.0]), Spectrum::ONE);
+    /// let grid = Grid::new([1; 3], fire, unit, unit, Phase::ISOTROPIC, Affine3::IDENTITY, &mut blocks)?
+    ///     .with_emission(Spectrum::splat(10.0))?;
+    /// assert!(grid.is_emissive());
+    /// assert_eq!(grid.properties(Vec3::splat(0.5)).emission[0], 20.0);   // where there is twice as much, twice as bright
+    /// # Ok::<(), fogbow::medium::MediumError>(())
+    /// ```
     pub fn with_emission(mut self, emission: Spectrum) -> Result<Self, MediumError> {
         self.emission = emission;
         self.check()
@@ -162,6 +184,16 @@ impl<'a> Grid<'a> {
     ///
     /// # Errors
     /// As in [`Grid::new`]; emission that is negative or not finite.
+    ///
+    /// ```
+    /// # use fogbow::{host::Medium, math::{Affine3, Vec3}, medium::{Density, Grid, MinMax}, phase::Phase, spectrum::Spectrum};
+    /// let (mut blocks, mut more) = ([MinMax::default()], [MinMax::default()]);
+    /// let (soot, unit) = (Density::F32(&[2.0]), Spectrum::ONE);
+    /// let grid = Grid::new([1; 3], soot, unit, unit, Phase::ISOTROPIC, Affine3::IDENTITY, &mut blocks)?
+    ///     .with_emission_grid(Density::F32(&[0.5]), Spectrum::splat(10.0), &mut more)?;
+    /// assert_eq!(grid.properties(Vec3::splat(0.5)).emission[0], 5.0);   // whatever the density of what absorbs
+    /// # Ok::<(), fogbow::medium::MediumError>(())
+    /// ```
     pub fn with_emission_grid(
         mut self,
         density: Density<'a>,
@@ -183,6 +215,14 @@ impl<'a> Grid<'a> {
     }
 
     /// Angular law of scattering; the same everywhere.
+    ///
+    /// ```
+    /// # use fogbow::{math::Affine3, medium::{Density, Grid, MinMax}, phase::{Lobe, Phase}, spectrum::Spectrum};
+    /// let (mut blocks, smoke, unit) = ([MinMax::default()], Density::F32(&[1.0]), Spectrum::ONE);
+    /// let grid = Grid::new([1; 3], smoke, unit, unit, Lobe::Rayleigh, Affine3::IDENTITY, &mut blocks)?;
+    /// assert_eq!(grid.phase(), Phase::from(Lobe::Rayleigh));
+    /// # Ok::<(), fogbow::medium::MediumError>(())
+    /// ```
     #[inline]
     #[must_use]
     pub fn phase(&self) -> Phase {
@@ -190,12 +230,30 @@ impl<'a> Grid<'a> {
     }
 
     /// The unit cube's place in the world.
+    ///
+    /// ```
+    /// # use fogbow::{math::{Affine3, Vec3}, medium::{Density, Grid, MinMax, Region}, phase::Phase, spectrum::Spectrum};
+    /// let (mut blocks, smoke, unit) = ([MinMax::default()], Density::F32(&[1.0]), Spectrum::ONE);
+    /// let place = Affine3::from_translation(5.0 * Vec3::X);
+    /// let grid = Grid::new([1; 3], smoke, unit, unit, Phase::ISOTROPIC, place, &mut blocks)?;
+    /// let region = Region::Box(grid.region());
+    /// assert!(region.contains(Vec3::new(5.5, 0.5, 0.5)) && !region.contains(Vec3::splat(0.5)));
+    /// # Ok::<(), fogbow::medium::MediumError>(())
+    /// ```
     #[must_use]
     pub fn region(&self) -> BoxRegion {
         self.region
     }
 
     /// Number of cells along each axis.
+    ///
+    /// ```
+    /// # use fogbow::{math::Affine3, medium::{Density, Grid, MinMax}, phase::Phase, spectrum::Spectrum};
+    /// let (mut blocks, smoke, unit) = ([MinMax::default()], Density::F32(&[1.0; 6]), Spectrum::ONE);
+    /// let grid = Grid::new([3, 2, 1], smoke, unit, unit, Phase::ISOTROPIC, Affine3::IDENTITY, &mut blocks)?;
+    /// assert_eq!(grid.size(), [3, 2, 1]);
+    /// # Ok::<(), fogbow::medium::MediumError>(())
+    /// ```
     #[must_use]
     pub fn size(&self) -> [u32; 3] {
         self.size

@@ -37,6 +37,15 @@ impl Homogeneous {
     ///
     /// # Errors
     /// Emission that is negative or not finite.
+    ///
+    /// ```
+    /// # use fogbow::{host::Medium, math::Vec3, medium::{Homogeneous, MediumError}, phase::Lobe, spectrum::Spectrum};
+    /// let soot = Homogeneous::new(Spectrum::ONE, Spectrum::ZERO, Lobe::Isotropic)?;
+    /// let flame = soot.with_emission(Spectrum::splat(10.0))?;
+    /// assert!(!soot.is_emissive() && flame.properties(Vec3::ZERO).emission == Spectrum::splat(10.0));
+    /// assert_eq!(soot.with_emission(Spectrum::splat(-1.0)), Err(MediumError::Emission));
+    /// # Ok::<(), MediumError>(())
+    /// ```
     pub fn with_emission(mut self, emission: Spectrum) -> Result<Self, MediumError> {
         if !emission.is_valid() {
             return Err(MediumError::Emission);
@@ -46,6 +55,13 @@ impl Homogeneous {
     }
 
     /// Angular law of scattering; the same everywhere.
+    ///
+    /// ```
+    /// # use fogbow::{medium::Homogeneous, phase::Lobe, spectrum::Spectrum};
+    /// let haze = Homogeneous::new(Spectrum::ZERO, Spectrum::ONE, Lobe::HenyeyGreenstein { g: 0.7 })?;
+    /// assert_eq!(haze.phase().mean_cosine()[0], 0.7);
+    /// # Ok::<(), fogbow::medium::MediumError>(())
+    /// ```
     #[inline]
     #[must_use]
     pub fn phase(&self) -> Phase {

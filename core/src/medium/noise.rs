@@ -86,6 +86,14 @@ impl FractalNoise {
     }
 
     /// Density at a point.
+    ///
+    /// ```
+    /// # use fogbow::{math::Vec3, medium::FractalNoise};
+    /// let even = FractalNoise { amplitude: 0.0, offset: 0.3, ..FractalNoise::default() };
+    /// assert_eq!(even.density(Vec3::new(1.0, 2.0, 3.0)), 0.3);
+    /// let clouds = FractalNoise { offset: -0.2, ..FractalNoise::default() };
+    /// assert!((0..1000).any(|i| clouds.density(0.37 * i as f32 * Vec3::X) == 0.0));   // never negative: vacuum between
+    /// ```
     #[inline]
     #[must_use]
     pub fn density(self, point: Vec3) -> f32 {
@@ -94,6 +102,13 @@ impl FractalNoise {
     }
 
     /// Gradient of density (m⁻¹); zero where it is clamped.
+    ///
+    /// ```
+    /// # use fogbow::{math::Vec3, medium::FractalNoise};
+    /// let (clouds, point) = (FractalNoise::default(), Vec3::new(0.3, 0.4, 0.6));
+    /// let difference = clouds.density(point + 1e-3 * Vec3::X) - clouds.density(point - 1e-3 * Vec3::X);
+    /// assert!((clouds.density_gradient(point).x - difference / 2e-3).abs() < 1e-3);
+    /// ```
     #[must_use]
     pub fn density_gradient(self, point: Vec3) -> Vec3 {
         let (mut sum, mut gradient) = (self.offset, Vec3::ZERO);
@@ -202,6 +217,14 @@ impl Noise {
     ///
     /// # Errors
     /// Emission that is negative or not finite.
+    ///
+    /// ```
+    /// # use fogbow::{host::Medium, math::Vec3, medium::{FractalNoise, Noise}, phase::Phase, spectrum::Spectrum};
+    /// let (shape, point) = (FractalNoise::default(), Vec3::new(0.3, 0.4, 0.6));
+    /// let flames = Noise::new(shape, Spectrum::ONE, Spectrum::ZERO, Phase::ISOTROPIC)?.with_emission(Spectrum::splat(10.0))?;
+    /// assert_eq!(flames.properties(point).emission[0], 10.0 * shape.density(point));
+    /// # Ok::<(), fogbow::medium::MediumError>(())
+    /// ```
     pub fn with_emission(mut self, emission: Spectrum) -> Result<Self, MediumError> {
         if !(emission.is_valid() && (emission * self.shape.max_density).is_finite()) {
             return Err(MediumError::Emission);
@@ -211,6 +234,13 @@ impl Noise {
     }
 
     /// Angular law of scattering; the same everywhere.
+    ///
+    /// ```
+    /// # use fogbow::{medium::{FractalNoise, Noise}, phase::{Lobe, Phase}, spectrum::Spectrum};
+    /// let cloud = Noise::new(FractalNoise::default(), Spectrum::ZERO, Spectrum::ONE, Lobe::Rayleigh)?;
+    /// assert_eq!(cloud.phase(), Phase::from(Lobe::Rayleigh));
+    /// # Ok::<(), fogbow::medium::MediumError>(())
+    /// ```
     #[inline]
     #[must_use]
     pub fn phase(&self) -> Phase {
@@ -218,6 +248,14 @@ impl Noise {
     }
 
     /// Shape of the density.
+    ///
+    /// ```
+    /// # use fogbow::{host::Medium, math::Vec3, medium::{FractalNoise, Noise}, phase::Phase, spectrum::Spectrum};
+    /// let cloud = Noise::new(FractalNoise::default(), Spectrum::ZERO, Spectrum::splat(5.0), Phase::ISOTROPIC)?;
+    /// let point = Vec3::new(0.3, 0.4, 0.6);
+    /// assert_eq!(cloud.extinction(point)[0], 5.0 * cloud.shape().density(point));
+    /// # Ok::<(), fogbow::medium::MediumError>(())
+    /// ```
     #[inline]
     #[must_use]
     pub fn shape(&self) -> FractalNoise {

@@ -40,6 +40,13 @@ impl<'a, M: Medium> Overlap<'a, M> {
     }
 
     /// The media.
+    ///
+    /// ```
+    /// # use fogbow::{medium::{Homogeneous, Overlap}, phase::Phase, spectrum::Spectrum};
+    /// let both = [Homogeneous::new(Spectrum::ZERO, Spectrum::ONE, Phase::ISOTROPIC)?; 2];
+    /// assert_eq!(Overlap::new(&both, Homogeneous::phase)?.media(), both);
+    /// # Ok::<(), fogbow::medium::MediumError>(())
+    /// ```
     #[must_use]
     pub fn media(&self) -> &'a [M] {
         self.0

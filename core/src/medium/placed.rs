@@ -46,6 +46,15 @@ impl<M> Placed<'_, M> {
     }
 
     /// The medium, as if it were everywhere.
+    ///
+    /// ```
+    /// # use fogbow::{host::Medium, math::Vec3, medium::{Homogeneous, Placed, Region}, phase::Phase, spectrum::Spectrum};
+    /// let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::ONE, Phase::ISOTROPIC)?;
+    /// let ball = Placed::new(fog, Region::sphere(Vec3::ZERO, 2.0)?);
+    /// let outside = 3.0 * Vec3::X;
+    /// assert_eq!((ball.extinction(outside), ball.medium().extinction(outside)), (Spectrum::ZERO, Spectrum::ONE));
+    /// # Ok::<(), fogbow::medium::MediumError>(())
+    /// ```
     #[inline]
     #[must_use]
     pub fn medium(&self) -> &M {
@@ -53,6 +62,13 @@ impl<M> Placed<'_, M> {
     }
 
     /// Where it is placed.
+    ///
+    /// ```
+    /// # use fogbow::{host::Empty, math::Vec3, medium::{Placed, Region}};
+    /// let ball = Region::sphere(Vec3::ZERO, 2.0)?;
+    /// assert_eq!(Placed::new(Empty, ball).region(), &ball);
+    /// # Ok::<(), fogbow::medium::MediumError>(())
+    /// ```
     #[inline]
     #[must_use]
     pub fn region(&self) -> &Region {
@@ -60,6 +76,14 @@ impl<M> Placed<'_, M> {
     }
 
     /// Where it is not.
+    ///
+    /// ```
+    /// # use fogbow::{host::Empty, math::Vec3, medium::{Placed, Region}};
+    /// let bubbles = [Region::sphere(Vec3::ZERO, 1.0)?];
+    /// let solid = Placed::new(Empty, Region::sphere(Vec3::ZERO, 2.0)?);
+    /// assert_eq!((solid.holes(), solid.with_holes(&bubbles).holes()), (&[][..], &bubbles[..]));
+    /// # Ok::<(), fogbow::medium::MediumError>(())
+    /// ```
     #[inline]
     #[must_use]
     pub fn holes(&self) -> &[Region] {
@@ -67,6 +91,15 @@ impl<M> Placed<'_, M> {
     }
 
     /// Whether the medium is there at `point`.
+    ///
+    /// ```
+    /// # use fogbow::{host::Empty, math::Vec3, medium::{Placed, Region}};
+    /// let bubbles = [Region::sphere(Vec3::ZERO, 1.0)?];
+    /// let ball = Placed::new(Empty, Region::sphere(Vec3::ZERO, 2.0)?).with_holes(&bubbles);
+    /// let inside = [0.5, 1.5, 2.5].map(|x| ball.contains(x * Vec3::X));
+    /// assert_eq!(inside, [false, true, false]);   // in the hole, in the medium, outside
+    /// # Ok::<(), fogbow::medium::MediumError>(())
+    /// ```
     #[inline]
     #[must_use]
     pub fn contains(&self, point: Vec3) -> bool {

@@ -90,12 +90,30 @@ impl<M> Pyramid<'_, M> {
     }
 
     /// The medium.
+    ///
+    /// ```
+    /// # use fogbow::{math::{Bounds, Vec3}, medium::{Homogeneous, Pyramid}, phase::Phase, spectrum::Spectrum};
+    /// let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::ONE, Phase::ISOTROPIC)?;
+    /// let mut cells = [Spectrum::ZERO; 1];
+    /// let pyramid = Pyramid::new(fog, Bounds { min: Vec3::ZERO, max: Vec3::ONE }, [1; 3], &mut cells)?;
+    /// assert_eq!(pyramid.medium(), &fog);
+    /// # Ok::<(), fogbow::medium::MediumError>(())
+    /// ```
     #[must_use]
     pub fn medium(&self) -> &M {
         &self.medium
     }
 
     /// Number of levels; the last is one cell.
+    ///
+    /// ```
+    /// # use fogbow::{math::{Bounds, Vec3}, medium::{Homogeneous, Pyramid}, phase::Phase, spectrum::Spectrum};
+    /// let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::ONE, Phase::ISOTROPIC)?;
+    /// let mut cells = [Spectrum::ZERO; 32 + 4 + 1];
+    /// let pyramid = Pyramid::new(fog, Bounds { min: Vec3::ZERO, max: Vec3::ONE }, [4, 4, 2], &mut cells)?;
+    /// assert_eq!(pyramid.levels(), 3);   // 4 × 4 × 2, 2 × 2 × 1, 1 × 1 × 1
+    /// # Ok::<(), fogbow::medium::MediumError>(())
+    /// ```
     #[must_use]
     pub fn levels(&self) -> u32 {
         self.levels
@@ -103,6 +121,20 @@ impl<M> Pyramid<'_, M> {
 
     /// Size of a level, and the mean extinction (m⁻¹) of its cells, x fastest; cells start at the box's smallest
     /// corner. `None` beyond the last.
+    ///
+    /// ```
+    /// # use fogbow::{math::{Bounds, Vec3}, medium::{Homogeneous, Placed, Pyramid, Region}, phase::Phase, spectrum::Spectrum};
+    /// // Fog in the left half of a box of two cells.
+    /// let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::ONE, Phase::ISOTROPIC)?;
+    /// let left = Region::bounds(Bounds { min: Vec3::ZERO, max: Vec3::ONE })?;
+    /// let (bounds, mut cells) = (Bounds { min: Vec3::ZERO, max: Vec3::new(2.0, 1.0, 1.0) }, [Spectrum::ZERO; 3]);
+    /// let pyramid = Pyramid::new(Placed::new(fog, left), bounds, [2, 1, 1], &mut cells)?;
+    /// assert_eq!(pyramid.level(0), Some(([2, 1, 1], &[Spectrum::ONE, Spectrum::ZERO][..])));
+    /// // The one cell of the last level is as high and deep as it is wide: three quarters of it stick out of the box.
+    /// assert_eq!(pyramid.level(1), Some(([1; 3], &[Spectrum::splat(0.125)][..])));
+    /// assert_eq!(pyramid.level(2), None);
+    /// # Ok::<(), fogbow::medium::MediumError>(())
+    /// ```
     #[must_use]
     pub fn level(&self, level: u32) -> Option<([u32; 3], &[Spectrum])> {
         let range = *self.starts.get(level as usize)?..*self.starts.get(level as usize + 1)?;

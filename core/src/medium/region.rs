@@ -52,6 +52,14 @@ impl Region {
     ///
     /// # Errors
     /// Bounds that are empty, flat, or infinite on some sides only.
+    ///
+    /// ```
+    /// # use fogbow::{math::{Bounds, Vec3}, medium::Region};
+    /// let room = Region::bounds(Bounds { min: Vec3::ZERO, max: Vec3::ONE })?;
+    /// assert!(room.contains(Vec3::ONE) && !room.contains(Vec3::new(1.1, 0.5, 0.5)));
+    /// assert_eq!(Region::bounds(Bounds::EVERYTHING), Ok(Region::Everywhere));
+    /// # Ok::<(), fogbow::medium::MediumError>(())
+    /// ```
     pub fn bounds(bounds: Bounds) -> Result<Self, MediumError> {
         if bounds == Bounds::EVERYTHING {
             return Ok(Self::Everywhere);
@@ -124,6 +132,15 @@ impl Region {
 
     /// Where the infinite line of `ray` enters and leaves, with the faces' normals; `None` if it
     /// misses or there is no face.
+    ///
+    /// ```
+    /// # use fogbow::{math::{Ray, Vec3}, medium::Region};
+    /// let ball = Region::sphere(Vec3::ZERO, 2.0)?;
+    /// let [enter, leave] = ball.crossings(&Ray::new(-5.0 * Vec3::X, Vec3::X)).unwrap();
+    /// assert_eq!((enter.distance, enter.normal), (3.0, Vec3::NEG_X));
+    /// assert_eq!((leave.distance, leave.normal), (7.0, Vec3::X));   // normals point out of the region
+    /// # Ok::<(), fogbow::medium::MediumError>(())
+    /// ```
     #[must_use]
     pub fn crossings(&self, ray: &Ray) -> Option<[Crossing; 2]> {
         match self {
@@ -153,6 +170,14 @@ impl BoxRegion {
     }
 
     /// From the world to the unit cube.
+    ///
+    /// ```
+    /// # use fogbow::{math::{Affine3, Mat3, Vec3}, medium::Region};
+    /// let place = Affine3 { matrix3: Mat3::from_diagonal(Vec3::splat(2.0)), translation: Vec3::X };
+    /// let Region::Box(cube) = Region::unit_cube(place)? else { unreachable!() };
+    /// assert_eq!(cube.local_from_world().transform_point3(Vec3::new(3.0, 0.0, 0.0)), Vec3::X);   // its corner
+    /// # Ok::<(), fogbow::medium::MediumError>(())
+    /// ```
     #[inline]
     #[must_use]
     pub fn local_from_world(&self) -> Affine3 {

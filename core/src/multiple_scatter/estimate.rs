@@ -74,6 +74,24 @@ pub fn sample<M: Medium + ?Sized, S: Scene + ?Sized>(
 
 /// [`sample`] for all directions at once: adds to the expansion's coefficients; the sums returned
 /// are of the mean over directions, `L₀₀ Y₀₀`.
+///
+/// ```
+/// # use fogbow::{host::Empty, light::{Light, PointLight}, math::Vec3, medium::Homogeneous, phase::{Lobe, Phase}};
+/// # use fogbow::multiple_scatter::{Settings, Walk, sample_directional};
+/// # use fogbow::{sampling::Generator, sh::Coefficient, single_scatter::{Directional, moments}};
+/// # use fogbow::{spectrum::Spectrum, transmittance::thickness::Steps};
+/// let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::ONE, Lobe::Isotropic).unwrap();
+/// let lights = [Light::Point(PointLight::new(Vec3::Z, Spectrum::ONE).unwrap())];
+/// let settings = Settings::new(Steps::Length(0.1));
+/// let walk = Walk { medium: &fog, scene: &Empty, lights: &lights, settings };
+/// let f = moments(&Phase::ISOTROPIC, 1);
+/// let mut coefficients = [Coefficient::ZERO; 4];
+/// let mut into = Directional { moments: &f[..2], coefficients: &mut coefficients };
+/// let dark = |_: &_, _: &_| Spectrum::ZERO;
+/// let sums = sample_directional(&walk, Vec3::ZERO, dark, 8, &mut Generator::new(1), &mut into);
+/// assert!((coefficients[0].value[0] * 0.28209479 / sums.value[0] - 1.0).abs() < 1e-5);   // times Y₀₀: the mean
+/// assert_eq!(coefficients[2].value, Spectrum::ZERO);   // isotropic fog scatters alike in all directions
+/// ```
 pub fn sample_directional<M: Medium + ?Sized, S: Scene + ?Sized>(
     walk: &Walk<'_, M, S>,
     point: Vec3,

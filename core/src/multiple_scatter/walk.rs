@@ -44,6 +44,12 @@ pub struct Settings {
 
 impl Settings {
     /// Walks of up to 64 vertices, tracked, with roulette from the fourth vertex on.
+    ///
+    /// ```
+    /// # use fogbow::{multiple_scatter::{Lengths, Settings}, transmittance::thickness::Steps};
+    /// let settings = Settings { max_vertices: 8, ..Settings::new(Steps::Length(0.1)) };
+    /// assert_eq!((settings.roulette_from, settings.lengths), (4, Lengths::Tracking));
+    /// ```
     #[must_use]
     pub const fn new(steps: Steps) -> Self {
         Self { max_vertices: 64, roulette_from: 4, lengths: Lengths::Tracking, steps, one_light: false, closest: 0.0 }
@@ -78,6 +84,18 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Walk<'_, M, S> {
     /// `outgoing(ray, hit)` is the radiance a surface sends back along the ray, as for
     /// [`crate::single_scatter::visit_surfaces`]; it is asked where the walk meets a surface after its first
     /// collision.
+    ///
+    /// ```
+    /// # use fogbow::{host::Empty, light::{Light, PointLight}, math::{Vec2, Vec3}, sampling::{Generator, warp}};
+    /// # use fogbow::{multiple_scatter::{Settings, Walk}, spectrum::Spectrum, transmittance::thickness::Steps};
+    /// let lights = [Light::Point(PointLight::new(Vec3::Z, Spectrum::ONE).unwrap())];
+    /// let settings = Settings::new(Steps::Length(0.1));
+    /// let walk = Walk { medium: &Empty, scene: &Empty, lights: &lights, settings };
+    /// let first = Vec2::new(0.3, 0.6);
+    /// let incoming = walk.path(Vec3::ZERO, first, |_, _| Spectrum::ONE, &mut Generator::new(1));
+    /// assert_eq!(incoming.to_light, warp::uniform_sphere(first));
+    /// assert_eq!(incoming.irradiance, Spectrum::ZERO);   // in vacuum nothing is scattered on the way
+    /// ```
     pub fn path(
         &self,
         point: Vec3,
@@ -95,6 +113,17 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Walk<'_, M, S> {
 
     /// The flight on the first segment, on `ray` up to its `end`, decided by `u` in [0, 1); with the thickness of the
     /// whole segment where light comes to its `end`, too (`to_end`).
+    ///
+    /// ```
+    /// # use fogbow::{host::Empty, math::{Ray, Vec3}, medium::Homogeneous, phase::Lobe, sampling::Generator};
+    /// # use fogbow::{multiple_scatter::{Settings, Walk}, spectrum::Spectrum, transmittance::thickness::Steps};
+    /// let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::splat(2.0), Lobe::Isotropic).unwrap();
+    /// let settings = Settings::new(Steps::Length(0.1));
+    /// let walk = Walk { medium: &fog, scene: &Empty, lights: &[], settings };
+    /// let flown = walk.first(&Ray::new(Vec3::ZERO, Vec3::X), None, 0.5, false, &mut Generator::new(1));
+    /// let median = flown.collision.unwrap().distance;
+    /// assert!((median - core::f32::consts::LN_2 / 2.0).abs() < 1e-6);   // half of all light comes farther
+    /// ```
     pub fn first(&self, ray: &Ray, end: Option<&Hit>, u: f32, to_end: bool, rng: &mut (impl Rng + ?Sized)) -> Flown {
         let rng = &mut own(rng);
         let ray = ray.with_length(end.map_or(f32::INFINITY, |hit| hit.distance));
@@ -109,6 +138,23 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Walk<'_, M, S> {
     /// `known(point, to_eye, properties)` may answer for all light but that straight from the lights walks
     /// connect to (those that are no sky) that is scattered towards `to_eye` at a collision (W·m⁻²·sr⁻¹), with its gradients as the point moves
     /// and as `to_eye` turns: then the path ends there. Other arguments as for [`Walk::path`].
+    ///
+    /// ```
+    /// # use fogbow::{host::Empty, math::{Ray, Vec3, float::PI}, medium::Homogeneous, phase::Lobe, sampling::Generator};
+    /// # use fogbow::{multiple_scatter::{Settings, Walk}, single_scatter::Contribution, spectrum::{Gradient, Spectrum}};
+    /// # use fogbow::{sampling::warp, transmittance::thickness::Steps};
+    /// // Fog that absorbs nothing, where all light is known: 1 from everywhere.
+    /// let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::splat(2.0), Lobe::Isotropic).unwrap();
+    /// let settings = Settings::new(Steps::Length(0.1));
+    /// let walk = Walk { medium: &fog, scene: &Empty, lights: &[], settings };
+    /// let (ray, mut rng) = (Ray::new(Vec3::ZERO, Vec3::X), Generator::new(1));
+    /// let first = walk.first(&ray, None, 0.3, false, &mut rng).collision;
+    /// let one = (Contribution { radiance: Spectrum::ONE, gradient: Gradient::ZERO }, Gradient::ZERO);
+    /// let dark = |_: &_, _: &_| Spectrum::ZERO;
+    /// let pdf = warp::uniform_sphere_pdf();
+    /// let incoming = walk.along(ray, None, pdf, first, dark, |_, _, _| Some(one), &mut rng);
+    /// assert!((incoming.irradiance[0] - 4.0 * PI).abs() < 1e-4);   // then it is 1 from here, too
+    /// ```
     pub fn along(
         &self,
         mut ray: Ray,

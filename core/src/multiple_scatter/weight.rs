@@ -131,6 +131,17 @@ impl Weight {
     ///
     /// `thickness` gives the gradients; its value is not used. Source: J's Eq. 30 by the
     /// change of variables that [`Shift`] describes, exact but for visibility.
+    ///
+    /// ```
+    /// # use fogbow::{math::Vec3, multiple_scatter::{Shift, Weight}, spectrum::{Gradient, Spectrum}};
+    /// # use fogbow::transmittance::thickness::Thickness;
+    /// // Half-way to a wall a vertex moves half as far as the start; it scatters more towards +x.
+    /// let shift = Shift { share: 0.5, ..Shift::TRANSLATION };
+    /// let (one, even) = (Spectrum::ONE, Thickness::default());
+    /// let denser = Gradient::outer(one, Vec3::X);
+    /// let weight = Weight::ONE.advance_by(&shift, one, one, &even, one, &denser);
+    /// assert_eq!((weight.value, weight.gradient.x, weight.moved), (one, one * 0.5, 0.5));
+    /// ```
     #[inline]
     #[must_use]
     pub fn advance_by(
@@ -174,6 +185,15 @@ impl Weight {
 
     /// [`Weight::carry`] of light that changes with the direction in which it leaves the last vertex, too:
     /// `turned` is its tangential gradient (W·m⁻²·sr⁻¹ per radian).
+    ///
+    /// ```
+    /// # use fogbow::{math::Vec3, multiple_scatter::Weight, single_scatter::Contribution, spectrum::{Gradient, Spectrum}};
+    /// // As the start moves by a metre, the last direction turns by half a radian.
+    /// let weight = Weight { last_turn: 0.5, ..Weight::ONE };
+    /// let turned = Gradient::outer(Spectrum::ONE, Vec3::X);
+    /// let carried = weight.carry_turned(&Contribution::ZERO, &turned);
+    /// assert_eq!(carried.gradient, turned * 0.5);
+    /// ```
     #[inline]
     #[must_use]
     pub fn carry_turned(&self, light: &Contribution, turned: &Gradient) -> Contribution {
@@ -183,6 +203,12 @@ impl Weight {
     }
 
     /// Both parts times a factor: one over a probability of survival.
+    ///
+    /// ```
+    /// # use fogbow::{multiple_scatter::Weight, spectrum::Spectrum};
+    /// // Two out of three survive, and stand for the third.
+    /// assert_eq!(Weight::ONE.scaled(1.5).value, Spectrum::splat(1.5));
+    /// ```
     #[inline]
     #[must_use]
     pub fn scaled(&self, factor: f32) -> Self {

@@ -67,6 +67,13 @@ pub struct Radiance {
 
 impl Radiance {
     /// All components together.
+    ///
+    /// ```
+    /// # use fogbow::{path::Radiance, spectrum::Spectrum};
+    /// let lamp = Radiance { emitted: Spectrum::splat(2.0), ..Radiance::default() };
+    /// let seen = Radiance { medium_single: Spectrum::ONE, collisions: 3, ..lamp };
+    /// assert_eq!(seen.total(), Spectrum::splat(3.0));
+    /// ```
     #[inline]
     #[must_use]
     pub fn total(&self) -> Spectrum {

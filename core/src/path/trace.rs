@@ -94,6 +94,27 @@ pub fn radiance<M: Medium + ?Sized, S: Scene + ?Sized>(
 
 /// What a path leaves to another method: see [`radiance_beyond`]. A function `(segment, most, rng)` is one that
 /// computes the medium's light alone.
+///
+/// ```
+/// # use fogbow::{host::{Empty, Hit}, math::{Ray, Vec3}, medium::Homogeneous, phase::Phase, sampling::Generator};
+/// # use fogbow::{path::{Delegate, InScattered, Settings, radiance_beyond}, spectrum::Spectrum};
+/// # use fogbow::path::World;
+/// struct Known;   // fog that looks as if it scattered 1 W·m⁻²·sr⁻¹ along every ray
+/// impl Delegate for Known {
+///     fn in_scattered(&mut self, _: &Ray, _: Spectrum, _: u32, _: &mut Generator) -> InScattered {
+///         InScattered { single: Spectrum::ONE, multiple: Spectrum::ZERO }
+///     }
+///     fn reflected(&mut self, _: &Ray, _: &Hit, _: Spectrum, _: u32, _: &mut Generator) -> Option<Spectrum> {
+///         Some(Spectrum::ZERO)   // surfaces reflect nothing but what comes straight from the lights
+///     }
+/// }
+/// let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::ONE, Phase::ISOTROPIC)?;
+/// let world = World { medium: &fog, scene: &Empty, lights: &[] };
+/// let (ray, mut rng) = (Ray::new(Vec3::ZERO, Vec3::X), Generator::new(1));
+/// let seen = radiance_beyond(&ray, &world, &Settings::default(), &mut rng, Known);
+/// assert_eq!((seen.medium_single, seen.total()), (Spectrum::ONE, Spectrum::ONE));
+/// # Ok::<(), fogbow::medium::MediumError>(())
+/// ```
 pub trait Delegate {
     /// Light that the medium scatters towards the origin of `segment`, attenuated on its way there, of light
     /// scattered `most` times at most, here included. It will be multiplied by `throughput`.

@@ -33,6 +33,13 @@ pub fn value(deflection: Deflection, g: f32, alpha: f32) -> f32 {
 }
 
 /// `dp / d cos θ = p (3g/D + 2αc/(1 + αc²))` (sr⁻¹).
+///
+/// ```
+/// # use fogbow::phase::{draine, rayleigh, Deflection};
+/// let sideways = Deflection::from_cos(0.3);
+/// let (slope, rayleigh) = (draine::derivative(sideways, 0.0, 1.0), rayleigh::derivative(sideways));
+/// assert!((slope - rayleigh).abs() < 1e-7);   // Rayleigh where g = 0 and α = 1
+/// ```
 #[inline]
 #[must_use]
 pub fn derivative(deflection: Deflection, g: f32, alpha: f32) -> f32 {
@@ -42,6 +49,13 @@ pub fn derivative(deflection: Deflection, g: f32, alpha: f32) -> f32 {
 }
 
 /// `d²p / d(cos θ)² = p (15g²/D² + (12αgc/D + 2α)/(1 + αc²))` (sr⁻¹).
+///
+/// ```
+/// # use fogbow::phase::{draine, henyey_greenstein, Deflection};
+/// let sideways = Deflection::from_cos(0.3);
+/// let draine = draine::second_derivative(sideways, 0.5, 0.0);
+/// assert!((draine - henyey_greenstein::second_derivative(sideways, 0.5)).abs() < 1e-6);   // Henyey–Greenstein where α = 0
+/// ```
 #[inline]
 #[must_use]
 pub fn second_derivative(deflection: Deflection, g: f32, alpha: f32) -> f32 {
@@ -98,6 +112,13 @@ impl Powers for f64 {
 ///
 /// Safeguarded Newton iteration on the closed-form distribution; at most 60 bisections, about 6
 /// steps in practice.
+///
+/// ```
+/// # use fogbow::phase::draine;
+/// let cosines = (0..1000).map(|i| draine::sample((i as f32 + 0.5) / 1000.0, 0.5, 2.0).deflection.cos);
+/// let mean = cosines.sum::<f32>() / 1000.0;
+/// assert!((mean - draine::moment(0.5, 2.0, 1)).abs() < 1e-4);   // the mean cosine is the first moment
+/// ```
 #[must_use]
 pub fn sample(u: f32, g: f32, alpha: f32) -> CosineSample {
     let (target, g64, alpha64) = (f64::from(u), f64::from(g), f64::from(alpha));
@@ -129,6 +150,12 @@ pub fn sample(u: f32, g: f32, alpha: f32) -> CosineSample {
 }
 
 /// Legendre moment (sheet § 1.3): `f_l = (gˡ + α m_l) / (1 + α(1 + 2g²)/3)`.
+///
+/// ```
+/// # use fogbow::phase::draine::moment;
+/// assert!((moment(0.7, 3.0, 0) - 1.0).abs() < 1e-6);   // normalised
+/// assert!((moment(0.0, 1.0, 2) - 0.1).abs() < 1e-7);   // Rayleigh
+/// ```
 #[must_use]
 pub fn moment(g: f32, alpha: f32, degree: usize) -> f32 {
     let power = |n: i32| if n < 0 { 0.0 } else { henyey_greenstein::moment(g, n as usize) };

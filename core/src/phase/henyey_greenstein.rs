@@ -36,6 +36,13 @@ pub(super) fn denominator(deflection: Deflection, g: f32) -> f32 {
 }
 
 /// [`henyey_greenstein`] for a deflection that knows its distance from the peak.
+///
+/// ```
+/// # use fogbow::phase::{henyey_greenstein, henyey_greenstein::value, Deflection};
+/// let beside = Deflection { cos: 1.0, one_minus_cos: 1e-9, one_plus_cos: 2.0 };
+/// let peak = henyey_greenstein(1.0, 0.9999);
+/// assert!(value(beside, 0.9999) < 0.8 * peak);   // a cosine rounded to 1 does not know that
+/// ```
 #[inline]
 #[must_use]
 pub fn value(deflection: Deflection, g: f32) -> f32 {
@@ -45,6 +52,12 @@ pub fn value(deflection: Deflection, g: f32) -> f32 {
 }
 
 /// `dp / d cos θ = 3 g p / D` (sr⁻¹).
+///
+/// ```
+/// # use fogbow::phase::{henyey_greenstein, henyey_greenstein::derivative, Deflection};
+/// let difference = (henyey_greenstein(0.01, 0.5) - henyey_greenstein(-0.01, 0.5)) / 0.02;
+/// assert!((derivative(Deflection::from_cos(0.0), 0.5) - difference).abs() < 1e-4);
+/// ```
 #[inline]
 #[must_use]
 pub fn derivative(deflection: Deflection, g: f32) -> f32 {
@@ -52,6 +65,14 @@ pub fn derivative(deflection: Deflection, g: f32) -> f32 {
 }
 
 /// `d²p / d(cos θ)² = 15 g² p / D²` (sr⁻¹).
+///
+/// ```
+/// # use fogbow::phase::henyey_greenstein::{derivative, second_derivative};
+/// # use fogbow::phase::Deflection;
+/// let [before, at, after] = [-0.01, 0.0, 0.01].map(Deflection::from_cos);
+/// let difference = (derivative(after, 0.5) - derivative(before, 0.5)) / 0.02;
+/// assert!((second_derivative(at, 0.5) - difference).abs() < 1e-4);
+/// ```
 #[inline]
 #[must_use]
 pub fn second_derivative(deflection: Deflection, g: f32) -> f32 {
@@ -66,6 +87,13 @@ pub fn second_derivative(deflection: Deflection, g: f32) -> f32 {
 /// ```
 ///
 /// No division by `g`: exact for `g = 0` and near ±1 (sheet § 1.3).
+///
+/// ```
+/// # use fogbow::phase::henyey_greenstein::sample;
+/// let mean = (0..1000).map(|i| sample((i as f32 + 0.5) / 1000.0, 0.5).deflection.cos).sum::<f32>() / 1000.0;
+/// assert!((mean - 0.5).abs() < 1e-4);   // g is the mean cosine
+/// assert_eq!(sample(0.0, 0.5).deflection.cos, -1.0);
+/// ```
 #[inline]
 #[must_use]
 pub fn sample(u: f32, g: f32) -> CosineSample {
@@ -87,6 +115,12 @@ pub fn sample(u: f32, g: f32) -> CosineSample {
 }
 
 /// Legendre moment `f_l = gˡ`.
+///
+/// ```
+/// # use fogbow::{math::float::PI, math::quadrature::integrate, phase::{henyey_greenstein, henyey_greenstein::moment}};
+/// let second = 2.0 * PI * integrate(-1.0, 1.0, |c| henyey_greenstein(c, 0.3) * (1.5 * c * c - 0.5));   // P₂(c)
+/// assert!((moment(0.3, 2) - 0.09).abs() < 1e-7 && (second - 0.09).abs() < 1e-5);
+/// ```
 #[must_use]
 pub fn moment(g: f32, degree: usize) -> f32 {
     (0..degree).fold(1.0, |power, _| power * g)

@@ -60,6 +60,12 @@ impl Lobe {
     ///
     /// # Errors
     /// The parameter that does not.
+    ///
+    /// ```
+    /// # use fogbow::phase::{Lobe, LobeError};
+    /// assert!(Lobe::HenyeyGreenstein { g: 0.9 }.check().is_ok());
+    /// assert_eq!(Lobe::HenyeyGreenstein { g: 1.0 }.check(), Err(LobeError::Anisotropy(1.0)));
+    /// ```
     pub fn check(self) -> Result<Self, LobeError> {
         match self {
             Self::HenyeyGreenstein { g: a } | Self::Schlick { k: a } | Self::Draine { g: a, .. }
@@ -92,6 +98,13 @@ impl Lobe {
     }
 
     /// Derivative of the value with respect to `cos θ` (sr⁻¹).
+    ///
+    /// ```
+    /// # use fogbow::phase::{Deflection, Lobe};
+    /// let sideways = Deflection::from_cos(0.0);
+    /// assert_eq!((Lobe::Isotropic.derivative(sideways), Lobe::Rayleigh.derivative(sideways)), (0.0, 0.0));
+    /// assert!(Lobe::HenyeyGreenstein { g: 0.5 }.derivative(sideways) > 0.0);   // more light straight on
+    /// ```
     #[inline]
     #[must_use]
     pub fn derivative(&self, deflection: Deflection) -> f32 {
@@ -105,6 +118,13 @@ impl Lobe {
     }
 
     /// Second derivative of the value with respect to `cos θ` (sr⁻¹).
+    ///
+    /// ```
+    /// # use fogbow::phase::{Deflection, Lobe};
+    /// let [back, forward] = [-0.5, 0.5].map(Deflection::from_cos);
+    /// let curve = Lobe::Rayleigh.second_derivative(forward);   // a parabola over cos θ: the same everywhere
+    /// assert!((Lobe::Rayleigh.derivative(forward) - Lobe::Rayleigh.derivative(back) - curve).abs() < 1e-7);
+    /// ```
     #[inline]
     #[must_use]
     pub fn second_derivative(&self, deflection: Deflection) -> f32 {
@@ -118,6 +138,14 @@ impl Lobe {
     }
 
     /// Draws a cosine with density [`Lobe::value`].
+    ///
+    /// ```
+    /// # use fogbow::phase::Lobe;
+    /// let fog = Lobe::HenyeyGreenstein { g: 0.9 };
+    /// let sample = fog.sample(0.5);
+    /// assert!(sample.deflection.cos > 0.97);   // half of the light is turned by less than 14°
+    /// assert!((sample.pdf / fog.value(sample.deflection) - 1.0).abs() < 1e-4);
+    /// ```
     #[inline]
     #[must_use]
     pub fn sample(&self, u: f32) -> CosineSample {
@@ -131,6 +159,13 @@ impl Lobe {
     }
 
     /// Legendre moment `f_l = 2π ∫ p(c) P_l(c) dc`: `f_0 = 1`, `f_1` the mean cosine.
+    ///
+    /// ```
+    /// # use fogbow::phase::Lobe;
+    /// let g = 0.5;
+    /// let moments = [0, 1, 2].map(|degree| Lobe::HenyeyGreenstein { g }.moment(degree));
+    /// assert_eq!(moments, [1.0, g, g * g]);
+    /// ```
     #[must_use]
     pub fn moment(&self, degree: usize) -> f32 {
         match *self {

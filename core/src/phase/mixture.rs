@@ -70,6 +70,11 @@ impl Phase {
     };
 
     /// Whether light is scattered alike in all directions.
+    ///
+    /// ```
+    /// # use fogbow::phase::{Lobe, Phase};
+    /// assert!(Phase::ISOTROPIC.is_isotropic() && !Phase::from(Lobe::Rayleigh).is_isotropic());
+    /// ```
     #[inline]
     #[must_use]
     pub fn is_isotropic(&self) -> bool {
@@ -99,6 +104,15 @@ impl Phase {
     ///
     /// # Errors
     /// [`TooManyLobes`] if more than [`MAX_LOBES`] different lobes scatter.
+    ///
+    /// ```
+    /// # use fogbow::{phase::{Lobe, Phase}, spectrum::Spectrum};
+    /// let (red, blue) = (Spectrum::new(1.0, 0.0, 0.0), Spectrum::new(0.0, 0.0, 1.0));
+    /// let forward = Phase::from(Lobe::HenyeyGreenstein { g: 0.5 });
+    /// let mixed = Phase::mix([(red, forward), (blue, Phase::ISOTROPIC)]).unwrap();
+    /// // Nothing scatters green, whose phase function is the mean of the others.
+    /// assert_eq!(mixed.mean_cosine(), Spectrum::new(0.5, 0.25, 0.0));
+    /// ```
     pub fn mix(parts: impl IntoIterator<Item = (Spectrum, Self)>) -> Result<Self, TooManyLobes> {
         let mut mixed = Self { count: 0, ..Self::ISOTROPIC };
         let mut total = Spectrum::ZERO;
@@ -136,12 +150,24 @@ impl Phase {
     ///
     /// # Errors
     /// The parameter that does not.
+    ///
+    /// ```
+    /// # use fogbow::phase::{Lobe, LobeError, Phase};
+    /// assert_eq!(Phase::from(Lobe::Schlick { k: -2.0 }).check(), Err(LobeError::Anisotropy(-2.0)));
+    /// ```
     pub fn check(self) -> Result<Self, LobeError> {
         self.lobes().try_for_each(|(lobe, _)| lobe.check().map(drop))?;
         Ok(self)
     }
 
     /// The lobes and their weights.
+    ///
+    /// ```
+    /// # use fogbow::{phase::Phase, spectrum::Spectrum};
+    /// let cloud = Phase::droplets(20.0).unwrap();
+    /// let weights: Spectrum = cloud.lobes().map(|(_, weight)| weight).sum();
+    /// assert!(cloud.lobes().count() == 2 && (weights[0] - 1.0).abs() < 1e-6);
+    /// ```
     pub fn lobes(&self) -> impl Iterator<Item = (Lobe, Spectrum)> + '_ {
         (0..self.count).map(|i| (self.lobes[i], self.weights[i]))
     }
@@ -162,6 +188,14 @@ impl Phase {
     }
 
     /// Derivative of the value with respect to `cos θ` (sr⁻¹).
+    ///
+    /// ```
+    /// # use fogbow::phase::{Deflection, Phase};
+    /// let cloud = Phase::droplets(20.0).unwrap();
+    /// assert_eq!(Phase::ISOTROPIC.derivative(Deflection::from_cos(0.5))[0], 0.0);
+    /// assert!(cloud.derivative(Deflection::from_cos(0.99))[0] > 0.0);   // towards the peak
+    /// assert!(cloud.derivative(Deflection::from_cos(-0.9))[0] < 0.0);   // towards the glory
+    /// ```
     #[inline]
     #[must_use]
     pub fn derivative(&self, deflection: Deflection) -> Spectrum {
@@ -169,6 +203,14 @@ impl Phase {
     }
 
     /// Second derivative of the value with respect to `cos θ` (sr⁻¹).
+    ///
+    /// ```
+    /// # use fogbow::phase::{Deflection, Phase};
+    /// let cloud = Phase::droplets(20.0).unwrap();
+    /// let [before, at, after] = [0.29, 0.3, 0.31].map(Deflection::from_cos);
+    /// let difference = (cloud.derivative(after)[0] - cloud.derivative(before)[0]) / 0.02;
+    /// assert!((cloud.second_derivative(at)[0] / difference - 1.0).abs() < 1e-2);
+    /// ```
     #[inline]
     #[must_use]
     pub fn second_derivative(&self, deflection: Deflection) -> Spectrum {
@@ -182,6 +224,14 @@ impl Phase {
     /// ```
     ///
     /// Source: sheet § 1.3 (Jarosz et al. 2008, Eq. 43–45 with the sign corrected).
+    ///
+    /// ```
+    /// # use fogbow::{math::Vec3, phase::{Lobe, Phase, deflection}};
+    /// let (fog, lamp, to_eye) = (Phase::from(Lobe::HenyeyGreenstein { g: 0.5 }), 2.0 * Vec3::Z, Vec3::X);
+    /// let value = |point: Vec3| fog.value(deflection((lamp - point).normalize(), to_eye))[0];
+    /// let difference = (value(0.01 * Vec3::X) - value(-0.01 * Vec3::X)) / 0.02;
+    /// assert!((fog.gradient(Vec3::Z, to_eye, 2.0).x[0] - difference).abs() < 1e-5);
+    /// ```
     #[inline]
     #[must_use]
     pub fn gradient(&self, to_light: Vec3, to_eye: Vec3, distance: f32) -> Gradient {
@@ -190,6 +240,12 @@ impl Phase {
     }
 
     /// Density (sr⁻¹) with which [`Phase::sample`] draws directions: the mixture with grey weights.
+    ///
+    /// ```
+    /// # use fogbow::phase::{Deflection, Phase};
+    /// let (cloud, forward) = (Phase::droplets(20.0).unwrap(), Deflection::from_cos(0.9));
+    /// assert!((cloud.pdf(forward) / cloud.value(forward)[0] - 1.0).abs() < 1e-6);   // the same without colours
+    /// ```
     #[inline]
     #[must_use]
     pub fn pdf(&self, deflection: Deflection) -> f32 {
@@ -200,6 +256,15 @@ impl Phase {
     }
 
     /// Draws the direction from which light is received, for light that leaves towards `to_eye`.
+    ///
+    /// ```
+    /// # use fogbow::{math::{Vec2, Vec3}, phase::{Phase, deflection}};
+    /// let cloud = Phase::droplets(20.0).unwrap();
+    /// let sample = cloud.sample(Vec3::Z, Vec2::new(0.9, 0.2));
+    /// assert!(sample.to_light.z < -0.9);   // most light that leaves towards +z comes from below
+    /// let value = cloud.value(deflection(sample.to_light, Vec3::Z))[0];
+    /// assert!((sample.weight[0] * sample.pdf / value - 1.0).abs() < 1e-3);
+    /// ```
     #[inline]
     #[must_use]
     pub fn sample(&self, to_eye: Vec3, u: Vec2) -> PhaseSample {
@@ -224,6 +289,13 @@ impl Phase {
     }
 
     /// Legendre moment `f_l` per channel.
+    ///
+    /// ```
+    /// # use fogbow::{phase::{Lobe, Phase}, spectrum::Spectrum};
+    /// let fog = Phase::from(Lobe::HenyeyGreenstein { g: 0.5 });
+    /// assert_eq!((fog.moment(0), fog.moment(1)), (Spectrum::ONE, fog.mean_cosine()));
+    /// assert_eq!(fog.moment(2), Spectrum::splat(0.25));
+    /// ```
     #[must_use]
     pub fn moment(&self, degree: usize) -> Spectrum {
         self.sum(|lobe| lobe.moment(degree))

@@ -41,6 +41,13 @@ impl Deflection {
     /// From the cosine alone; a cosine outside [−1, 1] is clamped.
     ///
     /// Near ±1 the other two fields carry the cosine's rounding; [`deflection`] does better.
+    ///
+    /// ```
+    /// # use fogbow::phase::Deflection;
+    /// let turned = Deflection::from_cos(0.25);
+    /// assert_eq!((turned.one_minus_cos, turned.one_plus_cos), (0.75, 1.25));
+    /// assert_eq!(Deflection::from_cos(1.000_001).cos, 1.0);
+    /// ```
     #[inline]
     #[must_use]
     pub fn from_cos(cos: f32) -> Self {
@@ -76,6 +83,15 @@ pub fn deflection(to_light: Vec3, to_eye: Vec3) -> Deflection {
 /// ```
 ///
 /// Jarosz et al. 2008 print its negative in the appendix (sheet § 1.3).
+///
+/// ```
+/// # use fogbow::{math::Vec3, phase::{deflection, deflection_gradient}};
+/// let (lamp, to_eye) = (2.0 * Vec3::Z, Vec3::X);
+/// let cos = |point: Vec3| deflection((lamp - point).normalize(), to_eye).cos;
+/// let gradient = deflection_gradient(Vec3::Z, to_eye, 2.0);
+/// assert_eq!(gradient, Vec3::X / 2.0);
+/// assert!(((cos(0.01 * Vec3::X) - cos(Vec3::ZERO)) / 0.01 - gradient.x).abs() < 1e-4);
+/// ```
 #[inline]
 #[must_use]
 pub fn deflection_gradient(to_light: Vec3, to_eye: Vec3, distance: f32) -> Vec3 {
@@ -102,6 +118,12 @@ impl CosineSample {
     }
 
     /// `sin θ`.
+    ///
+    /// ```
+    /// # use fogbow::phase::Lobe;
+    /// let sample = Lobe::HenyeyGreenstein { g: 0.9 }.sample(0.7);
+    /// assert!((sample.sin().powi(2) + sample.deflection.cos.powi(2) - 1.0).abs() < 1e-6);
+    /// ```
     #[inline]
     #[must_use]
     pub fn sin(&self) -> f32 {

@@ -21,6 +21,13 @@ pub fn value(deflection: Deflection) -> f32 {
 }
 
 /// `dp / d cos θ = 3 cos θ / (8π)` (sr⁻¹).
+///
+/// ```
+/// # use fogbow::phase::{rayleigh, Deflection};
+/// let [before, at, after] = [0.3, 0.4, 0.5].map(Deflection::from_cos);
+/// let difference = (rayleigh::value(after) - rayleigh::value(before)) / 0.2;   // exact for a parabola
+/// assert!((rayleigh::derivative(at) - difference).abs() < 1e-6);
+/// ```
 #[inline]
 #[must_use]
 pub fn derivative(deflection: Deflection) -> f32 {
@@ -33,6 +40,13 @@ pub const SECOND_DERIVATIVE: f32 = 3.0 / (8.0 * PI);
 /// Draws a cosine with density [`value`] from the uniform number `u`; `u = 0` gives −1.
 ///
 /// Inverts `c³ + 3c = 4(2u − 1)` by Cardano's formula, in the form that does not cancel.
+///
+/// ```
+/// # use fogbow::phase::rayleigh;
+/// let cosines = (0..1000).map(|i| rayleigh::sample((i as f32 + 0.5) / 1000.0).deflection.cos);
+/// let square = cosines.map(|cos| cos * cos).sum::<f32>() / 1000.0;
+/// assert!((square - 0.4).abs() < 1e-4);   // ∫ p cos² dω = 2/5; 1/3 if it were isotropic
+/// ```
 #[inline]
 #[must_use]
 pub fn sample(u: f32) -> CosineSample {
@@ -44,6 +58,11 @@ pub fn sample(u: f32) -> CosineSample {
 }
 
 /// Legendre moments `f_0 = 1`, `f_2 = 1/10`, all others 0.
+///
+/// ```
+/// # use fogbow::phase::rayleigh::moment;
+/// assert_eq!([0, 1, 2, 3].map(moment), [1.0, 0.0, 0.1, 0.0]);
+/// ```
 #[must_use]
 pub fn moment(degree: usize) -> f32 {
     match degree {

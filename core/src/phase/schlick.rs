@@ -29,6 +29,13 @@ fn denominator(deflection: Deflection, k: f32) -> f32 {
 }
 
 /// [`schlick`] for a deflection that knows its distance from the peak.
+///
+/// ```
+/// # use fogbow::{math::float::PI, phase::schlick::value, phase::Deflection};
+/// let peak = Deflection { cos: 1.0, one_minus_cos: 0.0, one_plus_cos: 2.0 };
+/// let k = 0.5;
+/// assert!((value(peak, k) - (1.0 + k) / (4.0 * PI * (1.0 - k))).abs() < 1e-6);
+/// ```
 #[inline]
 #[must_use]
 pub fn value(deflection: Deflection, k: f32) -> f32 {
@@ -38,6 +45,12 @@ pub fn value(deflection: Deflection, k: f32) -> f32 {
 }
 
 /// `dp / d cos θ = 2 k p / D` (sr⁻¹).
+///
+/// ```
+/// # use fogbow::phase::{schlick, schlick::derivative, Deflection};
+/// let difference = (schlick(0.01, 0.5) - schlick(-0.01, 0.5)) / 0.02;
+/// assert!((derivative(Deflection::from_cos(0.0), 0.5) - difference).abs() < 1e-4);
+/// ```
 #[inline]
 #[must_use]
 pub fn derivative(deflection: Deflection, k: f32) -> f32 {
@@ -45,6 +58,13 @@ pub fn derivative(deflection: Deflection, k: f32) -> f32 {
 }
 
 /// `d²p / d(cos θ)² = 6 k² p / D²` (sr⁻¹).
+///
+/// ```
+/// # use fogbow::phase::{schlick::{derivative, second_derivative}, Deflection};
+/// let [before, at, after] = [-0.01, 0.0, 0.01].map(Deflection::from_cos);
+/// let difference = (derivative(after, 0.5) - derivative(before, 0.5)) / 0.02;
+/// assert!((second_derivative(at, 0.5) - difference).abs() < 1e-4);
+/// ```
 #[inline]
 #[must_use]
 pub fn second_derivative(deflection: Deflection, k: f32) -> f32 {
@@ -56,6 +76,13 @@ pub fn second_derivative(deflection: Deflection, k: f32) -> f32 {
 ///
 /// ```text
 /// e = 1 − k + 2 k u,   1 + c = 2(1+k) u / e,   1 − c = 2(1−k)(1−u) / e
+/// ```
+///
+/// ```
+/// # use fogbow::phase::schlick::{mean_cosine, sample};
+/// let mean = (0..1000).map(|i| sample((i as f32 + 0.5) / 1000.0, 0.5).deflection.cos).sum::<f32>() / 1000.0;
+/// assert!((mean - mean_cosine(0.5)).abs() < 1e-4);
+/// assert_eq!(sample(0.5, 0.0).deflection.cos, 0.0);   // k = 0 is isotropic
 /// ```
 #[inline]
 #[must_use]
@@ -76,6 +103,12 @@ pub fn sample(u: f32, k: f32) -> CosineSample {
 ///
 /// converges for every |k| < 1, more slowly near 1; its closed form cancels for small `k`. The sum
 /// stops where the rest no longer shows in an `f32`. Accumulated in `f64`.
+///
+/// ```
+/// # use fogbow::phase::schlick::{mean_cosine, moment};
+/// assert_eq!(moment(0.7, 0), 1.0);
+/// assert!((moment(0.7, 1) - mean_cosine(0.7)).abs() < 1e-6);   // a sum and a closed form
+/// ```
 #[must_use]
 pub fn moment(k: f32, degree: usize) -> f32 {
     if degree == 0 {
@@ -106,12 +139,25 @@ pub fn moment(k: f32, degree: usize) -> f32 {
 }
 
 /// The Schlick parameter usually matched to a Henyey–Greenstein `g`: `1.55 g − 0.55 g³`.
+///
+/// ```
+/// # use fogbow::phase::schlick::{from_mean_cosine, mean_cosine};
+/// for g in [-0.8, 0.2, 0.5, 0.9] {
+///     assert!((mean_cosine(from_mean_cosine(g)) - g).abs() < 0.08);   // near, not equal
+/// }
+/// ```
 #[must_use]
 pub fn from_mean_cosine(g: f32) -> f32 {
     1.55 * g - 0.55 * g * g * g
 }
 
 /// Mean cosine of the deflection: `1/k − (1/k² − 1) atanh k`.
+///
+/// ```
+/// # use fogbow::{math::float::PI, math::quadrature::integrate, phase::schlick, phase::schlick::mean_cosine};
+/// let mean = 2.0 * PI * integrate(-1.0, 1.0, |cos| cos * schlick(cos, 0.5));
+/// assert!((mean_cosine(0.5) - mean).abs() < 1e-5);
+/// ```
 #[must_use]
 pub fn mean_cosine(k: f32) -> f32 {
     if k.abs() < 0.5 {

@@ -52,6 +52,13 @@ pub fn choose<T>(entries: impl IntoIterator<Item = (f32, T)>, u: f32) -> Option<
 
 /// Writes the running sums of `weights`, scaled to end at 1, over the weights themselves.
 /// Returns their sum; where it is 0 or not finite the table stays as it was.
+///
+/// ```
+/// # use fogbow::sampling::discrete::cumulate;
+/// let mut table = [1.0, 0.0, 3.0];
+/// assert_eq!(cumulate(&mut table), 4.0);
+/// assert_eq!(table, [0.25, 0.25, 1.0]);
+/// ```
 pub fn cumulate(weights: &mut [f32]) -> f32 {
     let total: f64 = weights.iter().map(|&w| f64::from(w)).sum();
     if !(total > 0.0 && total.is_finite()) {
@@ -69,6 +76,15 @@ pub fn cumulate(weights: &mut [f32]) -> f32 {
 }
 
 /// Chooses from a table made by [`cumulate`], in logarithmic time.
+///
+/// `u` lies in [0, 1).
+///
+/// ```
+/// # use fogbow::sampling::discrete::choose_cumulated;
+/// let table = [0.25, 0.25, 1.0];   // of the weights 1, 0 and 3
+/// let choice = choose_cumulated(&table, 0.625);
+/// assert_eq!((choice.index, choice.probability, choice.remainder), (2, 0.75, 0.5));
+/// ```
 #[inline]
 #[must_use]
 pub fn choose_cumulated(table: &[f32], u: f32) -> Choice {
@@ -93,6 +109,15 @@ pub struct Table2<'a> {
 impl<'a> Table2<'a> {
     /// Turns `weights` (row by row, `width × height`) into running sums in place and `column`
     /// (`height` entries) into theirs. `None` if sizes disagree or no weight is positive.
+    ///
+    /// ```
+    /// # use fogbow::{math::Vec2, sampling::discrete::Table2};
+    /// let (mut weights, mut column) = ([0.0, 1.0, 0.0, 3.0], [0.0; 2]);
+    /// let sky = Table2::build(2, &mut weights, &mut column).unwrap();
+    /// // Three quarters of the light come from a quarter of the square.
+    /// assert_eq!(sky.pdf(Vec2::new(0.7, 0.7)), 0.75 / 0.25);
+    /// assert!(Table2::build(2, &mut [0.0; 4], &mut [0.0; 2]).is_none());
+    /// ```
     pub fn build(width: usize, weights: &'a mut [f32], column: &'a mut [f32]) -> Option<Self> {
         if width == 0 || weights.len() != width * column.len() {
             return None;
@@ -110,6 +135,15 @@ impl<'a> Table2<'a> {
     }
 
     /// A point of the unit square and its density.
+    ///
+    /// ```
+    /// # use fogbow::{math::Vec2, sampling::discrete::Table2};
+    /// let (mut weights, mut column) = ([0.0, 1.0, 0.0, 3.0], [0.0; 2]);
+    /// let sky = Table2::build(2, &mut weights, &mut column).unwrap();
+    /// let (point, pdf) = sky.sample(Vec2::splat(0.5));
+    /// assert!(point.x >= 0.5);   // the left half is dark
+    /// assert_eq!(pdf, sky.pdf(point));
+    /// ```
     #[inline]
     #[must_use]
     pub fn sample(&self, u: Vec2) -> (Vec2, f32) {
@@ -121,6 +155,14 @@ impl<'a> Table2<'a> {
     }
 
     /// Density of [`Table2::sample`] at a point of the unit square.
+    ///
+    /// ```
+    /// # use fogbow::{math::Vec2, sampling::discrete::Table2};
+    /// let (mut weights, mut column) = ([0.0, 1.0, 0.0, 3.0], [0.0; 2]);
+    /// let sky = Table2::build(2, &mut weights, &mut column).unwrap();
+    /// let cells = [0.25, 0.75].map(|y| [0.25, 0.75].map(|x| sky.pdf(Vec2::new(x, y))));
+    /// assert_eq!(cells, [[0.0, 1.0], [0.0, 3.0]]);   // the mean over the square is 1
+    /// ```
     #[inline]
     #[must_use]
     pub fn pdf(&self, point: Vec2) -> f32 {

@@ -3,6 +3,13 @@
 use crate::math::float;
 
 /// Exponential distance (m) with rate `extinction` (m⁻¹); infinite where the rate is 0.
+///
+/// ```
+/// # use fogbow::sampling::distance::exponential;
+/// let median = exponential(0.5, 2.0);
+/// assert!(((-2.0 * median).exp() - 0.5).abs() < 1e-6);   // half of the light comes farther
+/// assert_eq!(exponential(0.0, 0.0), f32::INFINITY);   // vacuum stops nothing
+/// ```
 #[inline]
 #[must_use]
 pub fn exponential(u: f32, extinction: f32) -> f32 {
@@ -11,6 +18,13 @@ pub fn exponential(u: f32, extinction: f32) -> f32 {
 }
 
 /// Density (m⁻¹) of [`exponential`].
+///
+/// ```
+/// # use fogbow::sampling::distance::exponential_pdf;
+/// assert_eq!(exponential_pdf(0.0, 2.0), 2.0);   // the rate itself
+/// let transmittance = exponential_pdf(1.5, 2.0) / exponential_pdf(0.0, 2.0);
+/// assert!((transmittance - (-3.0_f32).exp()).abs() < 1e-7);
+/// ```
 #[inline]
 #[must_use]
 pub fn exponential_pdf(distance: f32, extinction: f32) -> f32 {
@@ -62,6 +76,18 @@ pub fn truncated_exponential(u: f32, extinction: f32, limit: f32) -> Truncated {
 
 /// Distances along a ray drawn in proportion to `1/r²`, `r` the distance to a point light: the
 /// angle seen from the light is uniform (Kulla and Fajardo 2012).
+///
+/// ```
+/// # use fogbow::{math::Vec3, sampling::distance::Equiangular};
+/// // Two metres of a ray, and a lamp one metre beside their middle: seen from it they span a right angle.
+/// let lamp = Vec3::new(1.0, 1.0, 0.0);
+/// let part = Equiangular::new(Vec3::ZERO, Vec3::X, lamp, 0.0, 2.0).unwrap();
+/// assert!((part.sample(0.5) - 1.0).abs() < 1e-6);
+/// assert!((part.weight() - core::f32::consts::FRAC_PI_2).abs() < 1e-6);   // ∫ dt/(1 + t²) from −1 to 1
+/// let t = part.sample(0.2);
+/// let squared = (Vec3::X * t).distance_squared(lamp);
+/// assert!((part.pdf(t) * part.weight() * squared - 1.0).abs() < 1e-5);   // proportional to 1/r²
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Equiangular {
     /// Distance along the ray of the point nearest to the light (m).

@@ -2,6 +2,12 @@
 
 /// Balance heuristic: weight of the strategy with density `pdf` beside one with density `other`.
 /// 0 when both are 0.
+///
+/// ```
+/// # use fogbow::sampling::mis::balance;
+/// assert!((balance(3.0, 1.0) - 0.75).abs() < 1e-6);
+/// assert!((balance(3.0, 1.0) + balance(1.0, 3.0) - 1.0).abs() < 1e-6);   // nothing counts twice
+/// ```
 #[inline]
 #[must_use]
 pub fn balance(pdf: f32, other: f32) -> f32 {

@@ -9,12 +9,25 @@ use rand_core::{Rng, TryRng};
 pub const ONE_MINUS_EPSILON: f32 = 1.0 - f32::EPSILON / 2.0;
 
 /// A uniform number in [0, 1), a multiple of 2⁻²⁴.
+///
+/// ```
+/// # use fogbow::sampling::{Generator, uniform};
+/// let mut rng = Generator::new(1);
+/// let mean = (0..10_000).map(|_| uniform(&mut rng)).sum::<f32>() / 10_000.0;
+/// assert!((mean - 0.5).abs() < 0.01);   // its standard deviation is √(1/12)/100 = 0.003
+/// ```
 #[inline]
 pub fn uniform(rng: &mut (impl Rng + ?Sized)) -> f32 {
     (rng.next_u32() >> 8) as f32 * (1.0 / 16_777_216.0)
 }
 
 /// A uniform point in the unit square.
+///
+/// ```
+/// # use fogbow::sampling::{Generator, uniform, uniform2};
+/// let (mut rng, mut same) = (Generator::new(1), Generator::new(1));
+/// assert_eq!(uniform2(&mut rng).to_array(), [uniform(&mut same), uniform(&mut same)]);   // x, then y
+/// ```
 #[inline]
 pub fn uniform2(rng: &mut (impl Rng + ?Sized)) -> Vec2 {
     let x = uniform(rng);
@@ -47,6 +60,13 @@ impl Generator {
     }
 
     /// A generator seeded by one draw from `rng`.
+    ///
+    /// ```
+    /// # use fogbow::sampling::{Generator, uniform};
+    /// let mut rng = Generator::new(1);
+    /// let (mut first, mut second) = (Generator::child(&mut rng), Generator::child(&mut rng));
+    /// assert_ne!(uniform(&mut first), uniform(&mut second));
+    /// ```
     #[inline]
     #[must_use]
     pub fn child(rng: &mut (impl Rng + ?Sized)) -> Self {
@@ -55,6 +75,12 @@ impl Generator {
 }
 
 /// Finaliser of SplitMix64 (Steele et al. 2014): every input bit reaches every output bit.
+///
+/// ```
+/// # use fogbow::sampling::uniform::mix;
+/// let changed = (0..64).map(|bit| (mix(7) ^ mix(7 ^ 1 << bit)).count_ones()).sum::<u32>();
+/// assert!((changed / 64).abs_diff(32) < 2);   // one bit in changes half of the bits out
+/// ```
 #[inline]
 #[must_use]
 pub fn mix(value: u64) -> u64 {

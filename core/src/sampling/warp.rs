@@ -7,6 +7,11 @@ use crate::math::float::{self, INV_FOUR_PI, PI};
 /// Unit vector with the given cosine to +z and azimuth `2π·u`.
 ///
 /// `sine` is an argument because callers know it without cancellation.
+///
+/// ```
+/// # use fogbow::{math::Vec3, sampling::warp::spherical};
+/// assert!((spherical(0.0, 1.0, 0.25) - Vec3::Y).length() < 1e-6);   // a quarter turn from +x
+/// ```
 #[inline]
 #[must_use]
 pub fn spherical(cosine: f32, sine: f32, u: f32) -> Vec3 {
@@ -15,6 +20,13 @@ pub fn spherical(cosine: f32, sine: f32, u: f32) -> Vec3 {
 }
 
 /// A direction uniform over the sphere.
+///
+/// ```
+/// # use fogbow::{math::Vec2, sampling::warp::uniform_sphere};
+/// let direction = uniform_sphere(Vec2::new(0.2, 0.7));
+/// assert!((direction.z - 0.6).abs() < 1e-6);   // heights are uniform (Archimedes): z = 1 − 2 u.x
+/// assert!((direction.length() - 1.0).abs() < 1e-6);
+/// ```
 #[inline]
 #[must_use]
 pub fn uniform_sphere(u: Vec2) -> Vec3 {
@@ -23,6 +35,11 @@ pub fn uniform_sphere(u: Vec2) -> Vec3 {
 }
 
 /// Density (sr⁻¹) of [`uniform_sphere`].
+///
+/// ```
+/// # use fogbow::{math::float::PI, sampling::warp::uniform_sphere_pdf};
+/// assert!((4.0 * PI * uniform_sphere_pdf() - 1.0).abs() < 1e-6);   // over 4π steradians
+/// ```
 #[inline]
 #[must_use]
 pub fn uniform_sphere_pdf() -> f32 {
@@ -30,6 +47,12 @@ pub fn uniform_sphere_pdf() -> f32 {
 }
 
 /// A direction in the upper hemisphere with density proportional to its cosine.
+///
+/// ```
+/// # use fogbow::{math::Vec2, sampling::warp::cosine_hemisphere};
+/// let direction = cosine_hemisphere(Vec2::new(0.75, 0.1));
+/// assert!((direction.z - 0.5).abs() < 1e-6);   // z² is uniform: a disc, seen from above
+/// ```
 #[inline]
 #[must_use]
 pub fn cosine_hemisphere(u: Vec2) -> Vec3 {
@@ -37,6 +60,13 @@ pub fn cosine_hemisphere(u: Vec2) -> Vec3 {
 }
 
 /// Density (sr⁻¹) of [`cosine_hemisphere`].
+///
+/// ```
+/// # use fogbow::{math::{float::PI, quadrature::integrate}, sampling::warp::cosine_hemisphere_pdf};
+/// let total = 2.0 * PI * integrate(0.0, 1.0, cosine_hemisphere_pdf);   // over the hemisphere: dω = 2π d cos
+/// assert!((total - 1.0).abs() < 1e-6);
+/// assert_eq!(cosine_hemisphere_pdf(-0.5), 0.0);
+/// ```
 #[inline]
 #[must_use]
 pub fn cosine_hemisphere_pdf(cosine: f32) -> f32 {
@@ -44,6 +74,13 @@ pub fn cosine_hemisphere_pdf(cosine: f32) -> f32 {
 }
 
 /// A direction in the upper hemisphere with density proportional to `cosⁿ`.
+///
+/// ```
+/// # use fogbow::{math::Vec2, sampling::warp::{cosine_hemisphere, cosine_power}};
+/// let u = Vec2::new(0.3, 0.6);
+/// assert!((cosine_power(u, 1.0) - cosine_hemisphere(u)).length() < 1e-6);   // exponent 1
+/// assert!(cosine_power(u, 1000.0).z > 0.999);   // large exponents: close to the axis
+/// ```
 #[inline]
 #[must_use]
 pub fn cosine_power(u: Vec2, exponent: f32) -> Vec3 {
@@ -52,6 +89,12 @@ pub fn cosine_power(u: Vec2, exponent: f32) -> Vec3 {
 }
 
 /// Density (sr⁻¹) of [`cosine_power`].
+///
+/// ```
+/// # use fogbow::{math::{float::PI, quadrature::integrate}, sampling::warp::cosine_power_pdf};
+/// let total = 2.0 * PI * integrate(0.0, 1.0, |cosine| cosine_power_pdf(cosine, 6.0));
+/// assert!((total - 1.0).abs() < 1e-6);
+/// ```
 #[inline]
 #[must_use]
 pub fn cosine_power_pdf(cosine: f32, exponent: f32) -> f32 {
@@ -60,6 +103,13 @@ pub fn cosine_power_pdf(cosine: f32, exponent: f32) -> f32 {
 
 /// A direction uniform within a cone around +z; `one_minus_cos` is `1 − cos` of its half angle,
 /// which narrow cones know without cancellation.
+///
+/// ```
+/// # use fogbow::{math::Vec2, sampling::warp::{uniform_cone, uniform_sphere}};
+/// let u = Vec2::new(0.3, 0.6);
+/// assert!((uniform_cone(u, 2.0) - uniform_sphere(u)).length() < 1e-6);   // half angle π: the whole sphere
+/// assert!((uniform_cone(Vec2::X, 1e-8).x / 2e-8_f32.sqrt() - 1.0).abs() < 1e-6);   // sin² ≈ 2 (1 − cos)
+/// ```
 #[inline]
 #[must_use]
 pub fn uniform_cone(u: Vec2, one_minus_cos: f32) -> Vec3 {
@@ -68,6 +118,11 @@ pub fn uniform_cone(u: Vec2, one_minus_cos: f32) -> Vec3 {
 }
 
 /// Density (sr⁻¹) of [`uniform_cone`] inside the cone.
+///
+/// ```
+/// # use fogbow::{math::float::PI, sampling::warp::uniform_cone_pdf};
+/// assert!((2.0 * PI * uniform_cone_pdf(1.0) - 1.0).abs() < 1e-6);   // the hemisphere has 2π steradians
+/// ```
 #[inline]
 #[must_use]
 pub fn uniform_cone_pdf(one_minus_cos: f32) -> f32 {
@@ -76,6 +131,12 @@ pub fn uniform_cone_pdf(one_minus_cos: f32) -> f32 {
 
 /// Barycentric coordinates `(b₁, b₂)` of a uniform point in a triangle, without a fold
 /// (Heitz 2019); area density 1 / area.
+///
+/// ```
+/// # use fogbow::{math::Vec2, sampling::warp::uniform_triangle};
+/// assert_eq!((uniform_triangle(Vec2::X), uniform_triangle(Vec2::Y)), (Vec2::X, Vec2::Y));   // two corners
+/// assert_eq!(uniform_triangle(Vec2::ONE), Vec2::splat(0.5));   // the middle of the edge between them
+/// ```
 #[inline]
 #[must_use]
 pub fn uniform_triangle(u: Vec2) -> Vec2 {

@@ -33,6 +33,16 @@ pub fn coefficients(moments: &[Spectrum], axis: Vec3, out: &mut [Spectrum]) {
 
 /// [`coefficients`] with their gradients when the axis is the direction of light from a fixed
 /// point `distance` (m) away: `∇c_lm = f_l ∇Y_lm(u(x))`. Calls `visit(k, c_k, ∇c_k)`.
+///
+/// ```
+/// # use fogbow::{math::Vec3, sh::zonal, spectrum::{Gradient, Spectrum}};
+/// let moments = [Spectrum::ONE, Spectrum::splat(0.5)];   // mean cosine 0.5
+/// let mut gradients = [Gradient::ZERO; 4];
+/// zonal::coefficients_with_gradients(&moments, Vec3::Z, 2.0, |k, _, gradient| gradients[k] = gradient);
+/// // As the point moves by dx, light from 2 m away turns by dx/2: Y₁₁ = √(3/4π) x grows, times f₁ = 0.5.
+/// assert!((gradients[3].x[0] - 0.5 * 0.48860251 / 2.0).abs() < 1e-7);
+/// assert_eq!(gradients[2], Gradient::ZERO);   // Y₁₀ is at its top
+/// ```
 #[inline]
 pub fn coefficients_with_gradients(
     moments: &[Spectrum],

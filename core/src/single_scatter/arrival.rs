@@ -123,6 +123,18 @@ impl Arrival {
     ///
     /// The hit stays where it is while the point moves, the density is frozen, and `c` is at least
     /// 10⁻³ in the gradient. Source: sheet § 1.5 (Jarosz et al. 2008, Eq. 9–13; Eq. 13 lacks 1/(4π)).
+    ///
+    /// ```
+    /// # use fogbow::{host::{Empty, Hit}, math::{Ray, Vec3, float::PI}, spectrum::Spectrum, surface::Surface};
+    /// # use fogbow::{single_scatter::Arrival, transmittance::thickness::Marching};
+    /// // A wall two metres ahead, in vacuum; its direction was drawn uniformly from the sphere.
+    /// let wall = Hit { distance: 2.0, normal: Vec3::NEG_X, surface: Surface::BLACK, light: None };
+    /// let (ray, pdf) = (Ray::new(Vec3::ZERO, Vec3::X), 1.0 / (4.0 * PI));
+    /// let arrival = Arrival::from_surface(&ray, &wall, Spectrum::ONE, pdf, &Empty, Marching::midpoints(1)).unwrap();
+    /// assert!((arrival.irradiance[0] - 4.0 * PI).abs() < 1e-5);
+    /// // Closer by dx, a piece of the wall is seen larger by 2 dx/r.
+    /// assert!((arrival.gradient.x[0] / arrival.irradiance[0] - 2.0 / 2.0).abs() < 1e-6);
+    /// ```
     #[must_use]
     pub fn from_surface(
         ray: &Ray,
@@ -138,6 +150,17 @@ impl Arrival {
     }
 
     /// [`Arrival::from_surface`] where transmittance is known, or is asked for if needed.
+    ///
+    /// ```
+    /// # use fogbow::{host::Hit, math::{Ray, Vec3}, spectrum::{Gradient, Spectrum}, surface::Surface};
+    /// # use fogbow::{single_scatter::Arrival, transmittance::thickness::Transmittance};
+    /// let wall = Hit { distance: 2.0, normal: Vec3::NEG_X, surface: Surface::BLACK, light: None };
+    /// let still = Gradient::ZERO;
+    /// let half = || Transmittance { value: Spectrum::splat(0.5), gradient_fixed: still, gradient_joint: still };
+    /// let arrival = Arrival::from_surface_through(&Ray::new(Vec3::ZERO, Vec3::X), &wall, Spectrum::ONE, 1.0, half).unwrap();
+    /// assert_eq!(arrival.irradiance, Spectrum::splat(0.5));
+    /// assert_eq!(arrival.turning, arrival.irradiance / 2.0);   // over the distance
+    /// ```
     #[must_use]
     pub fn from_surface_through(
         ray: &Ray,
@@ -162,6 +185,15 @@ impl Arrival {
 
     /// [`Arrival::from_surface_through`] for the `end` of a ray: a surface, or, without one, the sky
     /// ([`crate::light::sky`]), a surface infinitely far.
+    ///
+    /// ```
+    /// # use fogbow::{math::{Ray, Vec3}, spectrum::{Gradient, Spectrum}};
+    /// # use fogbow::{single_scatter::Arrival, transmittance::thickness::Transmittance};
+    /// let still = Gradient::ZERO;
+    /// let clear = || Transmittance { value: Spectrum::ONE, gradient_fixed: still, gradient_joint: still };
+    /// let sky = Arrival::from_end(&Ray::new(Vec3::ZERO, Vec3::Z), None, Spectrum::ONE, 0.5, clear).unwrap();
+    /// assert_eq!((sky.irradiance, sky.gradient, sky.turning), (Spectrum::splat(2.0), still, Spectrum::ZERO));
+    /// ```
     #[must_use]
     pub fn from_end(
         ray: &Ray,
@@ -197,6 +229,16 @@ impl Arrival {
 
     /// Scattered once towards `to_eye` (unit): `L = p E`, `∇L = E ∇p + p ∇E`. Nothing where that leaves
     /// the range of `f32`.
+    ///
+    /// ```
+    /// # use fogbow::{math::{Vec3, float::INV_FOUR_PI}, phase::Phase, single_scatter::Arrival};
+    /// # use fogbow::spectrum::{Gradient, Spectrum};
+    /// let gradient = Gradient::outer(Spectrum::ONE, Vec3::Z);
+    /// let arrival = Arrival { to_light: Vec3::Z, irradiance: Spectrum::splat(2.0), gradient, turning: Spectrum::ONE };
+    /// let scattered = arrival.scatter(Vec3::X, &Phase::ISOTROPIC);
+    /// assert!((scattered.radiance[0] - 2.0 * INV_FOUR_PI).abs() < 1e-7);
+    /// assert_eq!(scattered.gradient, gradient * INV_FOUR_PI);   // isotropic: that light turns does not matter
+    /// ```
     #[inline]
     #[must_use]
     pub fn scatter(&self, to_eye: Vec3, phase: &Phase) -> Contribution {
@@ -211,6 +253,16 @@ impl Arrival {
 
     /// How what is scattered towards `to_eye` changes as that direction turns: a tangential gradient
     /// (W·m⁻²·sr⁻¹ per radian).
+    ///
+    /// ```
+    /// # use fogbow::{math::Vec3, phase::{Lobe, Phase}, single_scatter::Arrival, spectrum::{Gradient, Spectrum}};
+    /// let fog = Phase::from(Lobe::HenyeyGreenstein { g: 0.5 });
+    /// let (irradiance, gradient, turning) = (Spectrum::ONE, Gradient::ZERO, Spectrum::ZERO);
+    /// let arrival = Arrival { to_light: Vec3::Z, irradiance, gradient, turning };
+    /// let seen = |angle: f32| arrival.scatter(Vec3::new(angle.cos(), 0.0, -angle.sin()), &fog).radiance[0];
+    /// let difference = (seen(0.01) - seen(-0.01)) / 0.02;   // per radian, towards −z
+    /// assert!((arrival.turned(Vec3::X, &fog).along(Vec3::NEG_Z)[0] - difference).abs() < 1e-4);
+    /// ```
     #[inline]
     #[must_use]
     pub fn turned(&self, to_eye: Vec3, phase: &Phase) -> Gradient {
@@ -228,6 +280,19 @@ impl Arrival {
     ///
     /// Source: Jarosz et al. 2008, Eq. 23–26; sheet § 1.6. The expansion is evaluated at `to_eye`.
     /// As many whole degrees take part as have a moment and fit into `expansion`.
+    ///
+    /// ```
+    /// # use fogbow::{math::Vec3, phase::{Lobe, Phase}, sh::{Coefficient, expansion}};
+    /// # use fogbow::{single_scatter::{Arrival, moments}, spectrum::{Gradient, Spectrum}};
+    /// let fog = Phase::from(Lobe::HenyeyGreenstein { g: 0.2 });
+    /// let (irradiance, gradient, turning) = (Spectrum::ONE, Gradient::ZERO, Spectrum::ZERO);
+    /// let arrival = Arrival { to_light: Vec3::Z, irradiance, gradient, turning };
+    /// let mut coefficients = [Coefficient::ZERO; 49];
+    /// arrival.scatter_directional(&moments(&fog, 6)[..7], 1.0, &mut coefficients);
+    /// let to_eye = Vec3::new(0.6, 0.0, 0.8);
+    /// let expanded = expansion::value_with_gradient(&coefficients, to_eye).0[0];
+    /// assert!((expanded - arrival.scatter(to_eye, &fog).radiance[0]).abs() < 1e-4);   // 0.2⁷ is left out
+    /// ```
     pub fn scatter_directional(
         &self,
         moments: &[Spectrum],

@@ -46,6 +46,13 @@ impl Sums {
     }
 
     /// Adds to the norms alone: change (W·m⁻³·sr⁻¹) of which no direction is known.
+    ///
+    /// ```
+    /// # use fogbow::{single_scatter::Sums, spectrum::{Gradient, Spectrum}};
+    /// let mut sums = Sums::default();
+    /// sums.add_norm(Spectrum::ONE);
+    /// assert_eq!((sums.gradient, sums.gradient_norms), (Gradient::ZERO, Spectrum::ONE));
+    /// ```
     #[inline]
     pub fn add_norm(&mut self, norm: Spectrum) {
         self.gradient_norms += norm;
@@ -53,6 +60,16 @@ impl Sums {
     }
 
     /// Adds the summands of another estimate.
+    ///
+    /// ```
+    /// # use fogbow::{single_scatter::{Contribution, Sums}, spectrum::{Gradient, Spectrum}};
+    /// let light = Contribution { radiance: Spectrum::ONE, gradient: Gradient::ZERO };
+    /// let (mut lit, mut shadowed) = (Sums::default(), Sums::default());
+    /// lit.add(&light, true);
+    /// shadowed.add(&light, false);
+    /// lit.merge(&shadowed);
+    /// assert_eq!((lit.value, lit.unshadowed), (Spectrum::ONE, Spectrum::splat(2.0)));
+    /// ```
     #[inline]
     pub fn merge(&mut self, other: &Self) {
         self.value += other.value;

@@ -71,6 +71,12 @@ impl Surface {
     pub const BLACK: Self = Self::Lambert { reflectance: Spectrum::ZERO };
 
     /// Whether light leaves in discrete directions only.
+    ///
+    /// ```
+    /// # use fogbow::{spectrum::Spectrum, surface::Surface};
+    /// assert!(Surface::Mirror { reflectance: Spectrum::ONE }.is_discrete() && Surface::Null.is_discrete());
+    /// assert!(!Surface::Lambert { reflectance: Spectrum::ONE }.is_discrete());
+    /// ```
     #[inline]
     #[must_use]
     pub fn is_discrete(&self) -> bool {
@@ -101,6 +107,16 @@ impl Surface {
     }
 
     /// Density (sr⁻¹) with which [`Surface::sample`] draws `to_light`; 0 for discrete surfaces.
+    ///
+    /// ```
+    /// # use fogbow::{math::{Vec2, Vec3}, spectrum::Spectrum, surface::Surface};
+    /// let grey = Spectrum::splat(0.3);
+    /// let floor = Surface::Phong { diffuse: grey, specular: grey, exponent: 20.0 };
+    /// let to_eye = Vec3::new(0.6, 0.0, 0.8);
+    /// let sample = floor.sample(Vec3::Z, to_eye, 0.9, Vec2::new(0.3, 0.6)).unwrap();
+    /// assert_eq!(sample.pdf, floor.pdf(Vec3::Z, to_eye, sample.to_light));   // of both lobes, whichever was drawn
+    /// assert_eq!(floor.pdf(Vec3::Z, to_eye, Vec3::NEG_Z), 0.0);
+    /// ```
     #[inline]
     #[must_use]
     pub fn pdf(&self, normal: Vec3, to_eye: Vec3, to_light: Vec3) -> f32 {
@@ -121,6 +137,15 @@ impl Surface {
     /// Draws the direction from which light is received. `None` where nothing is reflected.
     ///
     /// `choice` selects between lobes, or between reflection and refraction; `u` the direction.
+    ///
+    /// ```
+    /// # use fogbow::{math::{Vec2, Vec3}, spectrum::Spectrum, surface::Surface};
+    /// let mirror = Surface::Mirror { reflectance: Spectrum::splat(0.9) };
+    /// let sample = mirror.sample(Vec3::Z, Vec3::new(0.6, 0.0, 0.8), 0.5, Vec2::ZERO).unwrap();
+    /// assert_eq!(sample.weight, Spectrum::splat(0.9));
+    /// assert!((sample.to_light - Vec3::new(-0.6, 0.0, 0.8)).length() < 1e-6 && sample.pdf == 0.0);
+    /// assert!(mirror.sample(Vec3::Z, Vec3::NEG_Z, 0.5, Vec2::ZERO).is_none());   // from behind
+    /// ```
     #[inline]
     #[must_use]
     pub fn sample(&self, normal: Vec3, to_eye: Vec3, choice: f32, u: Vec2) -> Option<SurfaceSample> {
@@ -154,6 +179,13 @@ impl Surface {
     }
 
     /// An upper bound of the share of light that goes on, whatever the directions.
+    ///
+    /// ```
+    /// # use fogbow::{spectrum::Spectrum, surface::Surface};
+    /// let (diffuse, specular) = (Spectrum::splat(0.5), Spectrum::splat(0.25));
+    /// assert_eq!(Surface::Phong { diffuse, specular, exponent: 10.0 }.albedo(), Spectrum::splat(0.75));
+    /// assert_eq!((Surface::Null.albedo(), Surface::BLACK.albedo()), (Spectrum::ONE, Spectrum::ZERO));
+    /// ```
     #[inline]
     #[must_use]
     pub fn albedo(&self) -> Spectrum {

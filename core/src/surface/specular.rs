@@ -7,6 +7,11 @@ use crate::math::float;
 use crate::spectrum::Spectrum;
 
 /// The mirror image of `direction` (leaving the surface) about `normal`.
+///
+/// ```
+/// # use fogbow::{math::Vec3, surface::specular::mirrored};
+/// assert!((mirrored(Vec3::new(0.6, 0.0, 0.8), Vec3::Z) - Vec3::new(-0.6, 0.0, 0.8)).length() < 1e-6);
+/// ```
 #[inline]
 #[must_use]
 pub fn mirrored(direction: Vec3, normal: Vec3) -> Vec3 {
@@ -54,6 +59,15 @@ pub fn refract(direction: Vec3, normal: Vec3, eta: f32) -> Refraction {
 ///
 /// The weight of refraction holds the factor `1/η²` by which radiance changes as its cone of
 /// directions widens or narrows; it cancels when the path comes out again.
+///
+/// ```
+/// # use fogbow::{math::Vec3, spectrum::Spectrum, surface::specular::sample_dielectric};
+/// let one = Spectrum::ONE;
+/// let through = |to_eye| sample_dielectric(Vec3::Z, to_eye, 1.5, one, one, 0.5).unwrap();
+/// let (into, out) = (through(Vec3::Z), through(Vec3::NEG_Z));
+/// assert_eq!((into.to_light, out.to_light), (Vec3::NEG_Z, Vec3::Z));   // head on: straight through
+/// assert!(((into.weight * out.weight)[0] - 1.0).abs() < 1e-6);   // 1/η² on the way in, η² on the way out
+/// ```
 #[inline]
 #[must_use]
 pub fn sample_dielectric(

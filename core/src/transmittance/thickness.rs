@@ -38,6 +38,14 @@ pub enum Steps {
 }
 
 /// How to march: steps, and the offset within them.
+///
+/// ```
+/// # use fogbow::transmittance::thickness::{Marching, Steps};
+/// let marching = Marching::new(0.1, 0.3);
+/// assert_eq!((marching.steps, marching.offset), (Steps::Length(0.1), 0.3));
+/// assert_eq!(marching.at(0.7), Marching { offset: 0.7, ..marching });
+/// assert_eq!(Marching::midpoints(8), Marching { steps: Steps::Count(8), offset: 0.5 });
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Marching {
     /// How fine.
@@ -116,6 +124,15 @@ pub struct Transmittance {
 
 impl Thickness {
     /// `T = e^{−τ}`, `∇T = −T ∇τ`; where `τ` exceeds [`OPAQUE`](crate::math::float::OPAQUE) all three are 0.
+    ///
+    /// ```
+    /// # use fogbow::{math::Vec3, spectrum::{Gradient, Spectrum}, transmittance::thickness::Thickness};
+    /// let slope = Gradient::outer(Spectrum::splat(3.0), Vec3::X);
+    /// let thickness = Thickness { value: Spectrum::splat(2.0), gradient_fixed: slope, gradient_joint: slope };
+    /// let through = thickness.transmittance();
+    /// assert!((through.value[0] - (-2.0_f32).exp()).abs() < 1e-6);
+    /// assert_eq!(through.gradient_fixed.x, through.value * -3.0);   // ∇T = −T ∇τ
+    /// ```
     #[inline]
     #[must_use]
     pub fn transmittance(&self) -> Transmittance {

@@ -62,6 +62,12 @@ pub struct Flight {
 
 impl Flight {
     /// The flight to the end of `ray` as if there were no medium.
+    ///
+    /// ```
+    /// # use fogbow::{math::{Ray, Vec3}, spectrum::Spectrum, transmittance::Flight};
+    /// let clear = Flight::through(&Ray::between(Vec3::ZERO, 2.0 * Vec3::X));
+    /// assert!(clear.collision.is_none() && clear.distance == 2.0 && clear.weight == Spectrum::ONE);
+    /// ```
     #[inline]
     #[must_use]
     pub fn through(ray: &Ray) -> Self {

@@ -12,6 +12,18 @@ use crate::math::{Bounds, float};
 /// ```
 ///
 /// `D` is the cosine at a surface and 1 in a medium. Engelhardt et al. 2012, § 3.4 and Eq. 3 (sheet § 3.3).
+///
+/// ```
+/// # use fogbow::vpl::Bound;
+/// let bound = Bound::within(0.5)?;
+/// assert_eq!((bound.value(), bound.radius()), (4.0, 0.5));   // b = 1/d²
+/// // What is left of a connection over 0.25 m and what is missing make all of it.
+/// let (geometry, missing) = (1.0 / 0.0625, bound.missing(0.0625, 1.0));
+/// assert_eq!(bound.clamped(geometry), 4.0);
+/// assert_eq!(bound.clamped(geometry) + missing * geometry, geometry);
+/// assert_eq!(bound.missing(0.25, 1.0), 0.0);   // nothing, farther away
+/// # Ok::<(), fogbow::vpl::NoBound>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, PartialOrd)]
 pub struct Bound(f32);
 
@@ -91,6 +103,12 @@ impl Bound {
 
 /// `Ĝ` (m⁻²) of two points `distance2` (m²) apart, with the product of their cosines; 0 where they turn away from each
 /// other, infinite where they coincide.
+///
+/// ```
+/// # use fogbow::vpl::geometry;
+/// assert_eq!((geometry(4.0, 1.0), geometry(4.0, 0.5)), (0.25, 0.125));
+/// assert_eq!((geometry(4.0, -1.0), geometry(0.0, 1.0)), (0.0, f32::INFINITY));
+/// ```
 #[inline]
 #[must_use]
 pub fn geometry(distance2: f32, cosines: f32) -> f32 {
@@ -175,6 +193,18 @@ const LOOKS: u32 = 24;
 /// Larger radii clamp more, and leave smoother light to the virtual lights; but more has to be brought back. `σ̄` is the
 /// extinction where light collides, `∫ σₜ² dV/∫ σₜ dV`, from a lattice of points in `bounds`. Engelhardt et
 /// al. 2012 leave the bound to the user.
+///
+/// ```
+/// # use fogbow::{math::{Bounds, Vec3}, medium::Homogeneous, phase::Lobe, spectrum::Spectrum};
+/// # use fogbow::vpl::{contraction, usual_bound};
+/// let dense = Homogeneous::new(Spectrum::ZERO, Spectrum::splat(4.0), Lobe::Isotropic)?;
+/// let room = Bounds { min: Vec3::ZERO, max: Vec3::splat(3.0) };
+/// let radius = usual_bound(&dense, &room).radius();
+/// assert!((contraction(4.0, 1.0, radius) - 0.25).abs() < 1e-3);   // a step leaves a quarter
+/// let thin = Homogeneous::new(Spectrum::ZERO, Spectrum::splat(0.01), Lobe::Isotropic)?;
+/// assert!((usual_bound(&thin, &room).radius() / room.size().length() - 0.09).abs() < 1e-4);
+/// # Ok::<(), fogbow::medium::MediumError>(())
+/// ```
 #[must_use]
 pub fn usual_bound(medium: &(impl Medium + ?Sized), bounds: &Bounds) -> Bound {
     let size = bounds.size();

@@ -83,6 +83,21 @@ const MEAN_WITHIN: f32 = 0.5;
 /// is per metre), m⁻¹ the other way. Unbiased, but for [`Flights::LocallyHomogeneous`] where extinction varies.
 /// `None` where the path ends. Engelhardt et al. 2012, Eq. 3–5 with the sheet's § 3.3 and 3.4: the paper leaves out the
 /// integral over distance and, in its pseudo-code, `σₛ(y)`.
+///
+/// ```
+/// # use fogbow::{host::{Empty, Medium}, math::Vec3, medium::Homogeneous, phase::Phase, sampling::Generator};
+/// # use fogbow::{spectrum::Spectrum, vpl::{Bound, Compensation, Receiver, contraction, next_vertex}};
+/// # use fogbow::path::World;
+/// let fog = Homogeneous::new(Spectrum::splat(0.2), Spectrum::splat(0.8), Phase::ISOTROPIC)?;
+/// let world = World { medium: &fog, scene: &Empty, lights: &[] };
+/// let receiver = Receiver::in_medium(Vec3::ZERO, Vec3::Z, &fog.properties(Vec3::ZERO)).unwrap();
+/// let (bound, mut rng) = (Bound::within(1.2)?, Generator::new(1));
+/// let mut next = || next_vertex(&world, &receiver, bound, &Compensation::APPROXIMATE, &mut rng);
+/// // The mean weight is what a step makes of the light it is given.
+/// let mean = (0..4000).filter_map(|_| Some(next()?.1[0] / 4000.0)).sum::<f32>();
+/// assert!((mean - contraction(1.0, 0.8, 1.2)).abs() < 0.02);
+/// # Ok::<(), Box<dyn core::error::Error>>(())
+/// ```
 #[must_use]
 pub fn next_vertex<M: Medium + ?Sized, S: Scene + ?Sized>(
     world: &World<'_, M, S>,

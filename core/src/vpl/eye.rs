@@ -34,6 +34,12 @@ pub struct EyeSettings {
 
 impl EyeSettings {
     /// One point for each light, four samples of single scattering, two compensation paths.
+    ///
+    /// ```
+    /// # use fogbow::{path::Settings, vpl::EyeSettings};
+    /// let settings = EyeSettings { points: 4, ..EyeSettings::new(Settings::default()) };
+    /// assert_eq!((settings.single, settings.primary, settings.sees_medium), (4, 2, true));
+    /// ```
     #[must_use]
     pub fn new(paths: path::Settings) -> Self {
         Self { paths, points: 1, single: 4, primary: 2, sees_medium: true }
@@ -59,6 +65,23 @@ pub struct Seen {
 /// Light that is scattered once, and what is seen in mirrors, comes as in path tracing; light of surfaces and of the
 /// medium scattered more often from the virtual lights. In segments through a medium, points are drawn by the light
 /// they scatter ([`scattering_points`]).
+///
+/// ```
+/// # use fogbow::{host::Empty, math::{Ray, Vec3}, medium::Homogeneous, path::Settings, phase::Phase, sampling::Generator};
+/// # use fogbow::{spectrum::Spectrum, vpl::{Bound, EyeSettings, Gatherer, VirtualLight, radiance}};
+/// # use fogbow::path::World;
+/// let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::splat(0.1), Phase::ISOTROPIC)?;
+/// let world = World { medium: &fog, scene: &Empty, lights: &[] };
+/// let gatherer = Gatherer { world, bound: Bound::NONE, compensation: None, has_mirrors: false };
+/// let settings = EyeSettings::new(Settings::default());
+/// let ray = Ray::between(Vec3::ZERO, 2.0 * Vec3::Z);
+/// let light = VirtualLight::in_medium(Vec3::new(3.0, 0.0, 1.0), Vec3::X, Spectrum::ONE, 1, &Phase::ISOTROPIC);
+/// let see = |lights: &[VirtualLight], share| radiance(&ray, &gatherer, lights, share, &settings, &mut Generator::new(1));
+/// let seen = see(&[light], 1.0);
+/// assert!(seen.clamped[0] > 0.0 && seen.radiance.total() == seen.clamped);   // this world has no other light
+/// assert_eq!(see(&[light], 8.0).clamped, seen.clamped * 8.0);   // one of eight
+/// # Ok::<(), fogbow::medium::MediumError>(())
+/// ```
 pub fn radiance<M: Medium + ?Sized, S: Scene + ?Sized>(
     ray: &Ray,
     gatherer: &Gatherer<'_, M, S>,
@@ -76,6 +99,23 @@ pub fn radiance<M: Medium + ?Sized, S: Scene + ?Sized>(
 /// what light from there counts for in the picture. For each segment, behind mirrors and glass, too.
 ///
 /// By what lights send to a few such points it is seen which of them matter: see [`select`](super::select).
+///
+/// ```
+/// # use fogbow::{host::Empty, math::{Ray, Vec3}, medium::Homogeneous, path::Settings, phase::Phase, sampling::Generator};
+/// # use fogbow::{spectrum::Spectrum, vpl::receivers};
+/// # use fogbow::path::World;
+/// let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::splat(0.5), Phase::ISOTROPIC)?;
+/// let world = World { medium: &fog, scene: &Empty, lights: &[] };
+/// let (ray, mut rng, mut opacity) = (Ray::between(Vec3::ZERO, 2.0 * Vec3::Z), Generator::new(1), 0.0);
+/// for _ in 0..1000 {
+///     receivers(&ray, &world, &Settings::default(), &mut rng, |receiver, weight| {
+///         assert!(receiver.point.z < 2.0);
+///         opacity += weight[0] * 0.5 / 1000.0;   // weight × σₛ
+///     });
+/// }
+/// assert!((opacity - (1.0 - (-1.0_f32).exp())).abs() < 0.02);
+/// # Ok::<(), fogbow::medium::MediumError>(())
+/// ```
 pub fn receivers<M: Medium + ?Sized, S: Scene + ?Sized>(
     ray: &Ray,
     world: &World<'_, M, S>,

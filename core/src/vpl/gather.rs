@@ -22,6 +22,17 @@ const ROULETTE_AFTER: u32 = 4;
 const MAX_STEPS: u32 = 1000;
 
 /// What is gathered, by how it was found; in a medium per metre, W·m⁻³·sr⁻¹, else W·m⁻²·sr⁻¹.
+///
+/// ```
+/// # use fogbow::{spectrum::Spectrum, vpl::Gathered};
+/// let one = Spectrum::ONE;
+/// let found = Gathered { clamped: one, compensated: [one * 0.5, one * 0.25, one * 0.0, one * 0.0], ..Gathered::default() };
+/// assert_eq!(found.total(), one * 1.75);
+/// let mut mean = Gathered::default();
+/// mean.add(&found, one * 0.5);
+/// mean.add(&Gathered::default(), one * 0.5);
+/// assert_eq!(mean.total(), one * 0.875);   // over both samples
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Gathered {
     /// Of the virtual lights, clamped.
@@ -60,6 +71,27 @@ impl Gathered {
 }
 
 /// Gathers at points: the world, and how.
+///
+/// ```
+/// # use fogbow::{host::{Empty, Medium}, math::{Vec3, float::INV_FOUR_PI}, medium::Homogeneous, phase::Phase};
+/// # use fogbow::{sampling::Generator, spectrum::Spectrum};
+/// # use fogbow::vpl::{Bound, Compensation, Gatherer, Receiver, VirtualLight};
+/// # use fogbow::path::World;
+/// // Thin fog, and a virtual light of 1 W at half the distance within which connections are clamped.
+/// let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::splat(1e-3), Phase::ISOTROPIC)?;
+/// let world = World { medium: &fog, scene: &Empty, lights: &[] };
+/// let bound = Bound::within(2.0)?;
+/// let gatherer = Gatherer { world, bound, compensation: Some(Compensation::FULL), has_mirrors: false };
+/// let receiver = Receiver::in_medium(Vec3::ZERO, Vec3::Z, &fog.properties(Vec3::ZERO)).unwrap();
+/// let light = VirtualLight::in_medium(Vec3::X, Vec3::X, Spectrum::ONE, 1, &Phase::ISOTROPIC);
+/// let mut rng = Generator::new(1);
+/// let seen = gatherer.connected(&receiver, &light, &mut rng);
+/// assert!((seen[0] / (1e-3 * INV_FOUR_PI * INV_FOUR_PI * 0.25) - 1.0).abs() < 0.01);   // b = ¼ m⁻², not 1/r² = 1 m⁻²
+/// let gathered = gatherer.gather(&receiver, &[light], u32::MAX, &mut rng);
+/// assert_eq!(gathered.clamped, seen);
+/// assert_eq!(gatherer.of_the_lights(&receiver, 8, &mut rng).total(), Spectrum::ZERO);   // this world has none
+/// # Ok::<(), Box<dyn core::error::Error>>(())
+/// ```
 #[derive(Debug)]
 pub struct Gatherer<'a, M: ?Sized, S: ?Sized> {
     /// Medium, surfaces, lights.

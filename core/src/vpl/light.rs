@@ -70,6 +70,15 @@ impl VirtualLight {
     }
 
     /// On a surface, where `flux` (W) arrives. `None` for surfaces that send light on in discrete directions.
+    ///
+    /// ```
+    /// # use fogbow::{math::Vec3, spectrum::Spectrum, surface::Surface, vpl::{Scatterer, VirtualLight}};
+    /// let one = Spectrum::ONE;
+    /// let on = |surface: Surface| VirtualLight::on_surface(Vec3::ZERO, Vec3::NEG_Z, one, 1, Vec3::Z, &surface);
+    /// let wall = Surface::Lambert { reflectance: Spectrum::splat(0.5) };
+    /// assert_eq!(on(wall).unwrap().scatterer(), Scatterer::Surface { normal: Vec3::Z, surface: wall });
+    /// assert!(on(Surface::Mirror { reflectance: one }).is_none());
+    /// ```
     #[must_use]
     pub fn on_surface(
         position: Vec3,
@@ -93,6 +102,12 @@ impl VirtualLight {
     }
 
     /// The same, `factor` times as bright.
+    ///
+    /// ```
+    /// # use fogbow::{math::Vec3, phase::Phase, spectrum::Spectrum, vpl::VirtualLight};
+    /// let light = VirtualLight::in_medium(Vec3::ZERO, Vec3::Z, Spectrum::ONE, 1, &Phase::ISOTROPIC);
+    /// assert_eq!(light.scaled(1.0 / 8.0).flux, Spectrum::splat(0.125));   // one of eight paths
+    /// ```
     #[inline]
     #[must_use]
     pub fn scaled(self, factor: f32) -> Self {
@@ -100,6 +115,14 @@ impl VirtualLight {
     }
 
     /// Whether it lies on a surface.
+    ///
+    /// ```
+    /// # use fogbow::{math::Vec3, phase::Phase, spectrum::Spectrum, surface::Surface, vpl::VirtualLight};
+    /// let wall = Surface::Lambert { reflectance: Spectrum::ONE };
+    /// let on_wall = VirtualLight::on_surface(Vec3::ZERO, Vec3::NEG_Z, Spectrum::ONE, 1, Vec3::Z, &wall).unwrap();
+    /// let in_fog = VirtualLight::in_medium(Vec3::ZERO, Vec3::Z, Spectrum::ONE, 1, &Phase::ISOTROPIC);
+    /// assert!(on_wall.is_on_surface() && !in_fog.is_on_surface());
+    /// ```
     #[inline]
     #[must_use]
     pub fn is_on_surface(&self) -> bool {
@@ -107,6 +130,13 @@ impl VirtualLight {
     }
 
     /// How it scatters its flux; a medium's `σₛ` counts as 1, because the flux holds it.
+    ///
+    /// ```
+    /// # use fogbow::{math::Vec3, phase::{Lobe, Phase}, spectrum::Spectrum, vpl::{Scatterer, VirtualLight}};
+    /// let phase = Phase::from(Lobe::HenyeyGreenstein { g: 0.5 });
+    /// let light = VirtualLight::in_medium(Vec3::ZERO, Vec3::Z, Spectrum::splat(3.0), 1, &phase);
+    /// assert_eq!(light.scatterer(), Scatterer::Medium { scattering: Spectrum::ONE, phase });
+    /// ```
     #[inline]
     #[must_use]
     pub fn scatterer(&self) -> Scatterer {
@@ -207,6 +237,16 @@ pub struct Connection {
 impl Connection {
     /// What is scattered towards the eye (W·m⁻³·sr⁻¹ in a medium, W·m⁻²·sr⁻¹ at a surface), of the part that `bound`
     /// leaves; `reach` is the transmittance along [`Self::way`], 0 where it is blocked.
+    ///
+    /// ```
+    /// # use fogbow::{math::{Ray, Vec3}, spectrum::Spectrum, vpl::{Bound, Connection}};
+    /// let way = Ray::between(Vec3::ZERO, 0.1 * Vec3::X);
+    /// let connection = Connection { way, geometry: 100.0, strength: Spectrum::splat(0.5) };
+    /// let half = Spectrum::splat(0.5);
+    /// assert_eq!(connection.radiance(Bound::NONE, half), Spectrum::splat(25.0));
+    /// assert_eq!(connection.radiance(Bound::new(4.0)?, half), Spectrum::ONE);   // as from half a metre
+    /// # Ok::<(), fogbow::vpl::NoBound>(())
+    /// ```
     #[inline]
     #[must_use]
     pub fn radiance(&self, bound: Bound, reach: Spectrum) -> Spectrum {
@@ -214,6 +254,13 @@ impl Connection {
     }
 
     /// The ray that asks whether [`Self::way`] is blocked: it ends before the light's own surface.
+    ///
+    /// ```
+    /// # use fogbow::{math::{Ray, Vec3}, spectrum::Spectrum, vpl::Connection};
+    /// let way = Ray::between(Vec3::ZERO, 2.0 * Vec3::X);
+    /// let ray = Connection { way, geometry: 0.25, strength: Spectrum::ONE }.shadow_ray();
+    /// assert!(ray.length < 2.0 && ray.length > 1.999);
+    /// ```
     #[inline]
     #[must_use]
     pub fn shadow_ray(&self) -> Ray {

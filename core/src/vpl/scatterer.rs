@@ -9,6 +9,19 @@ use crate::surface::Surface;
 use crate::world::leave;
 
 /// What scatters light at a point: `f̂` of Engelhardt et al. 2012, with its cosine `D`.
+///
+/// ```
+/// # use fogbow::{math::{Vec2, Vec3, float::{INV_FOUR_PI, PI}}, phase::Phase, spectrum::Spectrum, surface::Surface};
+/// # use fogbow::vpl::Scatterer;
+/// let fog = Scatterer::Medium { scattering: Spectrum::splat(2.0), phase: Phase::ISOTROPIC };
+/// let wall = Scatterer::Surface { normal: Vec3::Z, surface: Surface::Lambert { reflectance: Spectrum::splat(0.5) } };
+/// let values = [fog, wall].map(|scatterer| scatterer.value(Vec3::Z, Vec3::new(0.6, 0.0, 0.8))[0]);
+/// assert!((values[0] - 2.0 * INV_FOUR_PI).abs() < 1e-6 && (values[1] - 0.5 / PI).abs() < 1e-6);
+/// assert_eq!([fog, wall].map(|scatterer| scatterer.cosine(Vec3::NEG_Z)), [1.0, 0.0]);
+/// // Drawn in proportion to all of it, what is left is the scattering coefficient and the albedo.
+/// let weights = [fog, wall].map(|scatterer| scatterer.sample(Vec3::Z, 0.5, Vec2::new(0.3, 0.6)).unwrap().1[0]);
+/// assert_eq!(weights, [2.0, 0.5]);
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Scatterer {
     /// A medium: `f̂ = σₛ p`, `D = 1`.
@@ -79,6 +92,14 @@ pub struct Receiver {
 
 impl Receiver {
     /// A point of a medium; `None` where nothing scatters.
+    ///
+    /// ```
+    /// # use fogbow::{host::Properties, math::Vec3, spectrum::Spectrum, vpl::Receiver};
+    /// let fog = Properties { scattering: Spectrum::ONE, ..Properties::VACUUM };
+    /// let receiver = Receiver::in_medium(Vec3::X, Vec3::Z, &fog).unwrap();
+    /// assert_eq!(receiver.scatterer.cosine(Vec3::Z), 1.0);
+    /// assert!(Receiver::in_medium(Vec3::X, Vec3::Z, &Properties::VACUUM).is_none());
+    /// ```
     #[inline]
     #[must_use]
     pub fn in_medium(point: Vec3, to_eye: Vec3, properties: &Properties) -> Option<Self> {
@@ -91,6 +112,15 @@ impl Receiver {
     }
 
     /// A point of a surface; `None` for surfaces that send light on in discrete directions, and for black ones.
+    ///
+    /// ```
+    /// # use fogbow::{host::Hit, math::Vec3, spectrum::Spectrum, surface::Surface, vpl::Receiver};
+    /// let hit = |surface| Hit { distance: 1.0, normal: Vec3::Z, surface, light: None };
+    /// let wall = hit(Surface::Lambert { reflectance: Spectrum::ONE });
+    /// assert!(Receiver::on_surface(Vec3::ZERO, Vec3::Z, &wall).is_some());
+    /// assert!(Receiver::on_surface(Vec3::ZERO, Vec3::NEG_Z, &wall).is_none());   // from behind
+    /// assert!(Receiver::on_surface(Vec3::ZERO, Vec3::Z, &hit(Surface::Mirror { reflectance: Spectrum::ONE })).is_none());
+    /// ```
     #[inline]
     #[must_use]
     pub fn on_surface(point: Vec3, to_eye: Vec3, hit: &Hit) -> Option<Self> {
@@ -103,6 +133,17 @@ impl Receiver {
     }
 
     /// Where a ray towards `direction` starts (m).
+    ///
+    /// ```
+    /// # use fogbow::{host::{Hit, Properties}, math::Vec3, spectrum::Spectrum, surface::Surface, vpl::Receiver};
+    /// let surface = Surface::Lambert { reflectance: Spectrum::ONE };
+    /// let hit = Hit { distance: 1.0, normal: Vec3::Z, surface, light: None };
+    /// let on_wall = Receiver::on_surface(4.0 * Vec3::Z, Vec3::Z, &hit).unwrap();
+    /// let start = on_wall.origin(Vec3::Z).z;
+    /// assert!(start > 4.0 && start < 4.001);   // off the wall, by a few roundings
+    /// let fog = Properties { scattering: Spectrum::ONE, ..Properties::VACUUM };
+    /// assert_eq!(Receiver::in_medium(Vec3::X, Vec3::Z, &fog).unwrap().origin(Vec3::Z), Vec3::X);
+    /// ```
     #[inline]
     #[must_use]
     pub fn origin(&self, direction: Vec3) -> Vec3 {
