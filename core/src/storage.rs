@@ -58,7 +58,8 @@ impl<T: Copy> List<'_, T> {
     ///
     /// ```
     /// # use fogbow::storage::List;
-    /// let mut list = List::from(&mut [0.0; 3][..]);
+    /// let mut slots = [0.0; 3];
+    /// let mut list = List::from(&mut slots[..]);
     /// assert_eq!((list.push(1.0), list.room()), (Ok(()), 2));
     /// ```
     #[must_use]

@@ -79,7 +79,7 @@ impl Mixture<'_> {
 /// # use fogbow::{cache::Estimator, host::{Empty, Hit}, light::{Light, PointLight}, math::{Ray, Vec2, Vec3, float::PI}};
 /// # use fogbow::{multiple_scatter, path, phase::Phase, sampling::Generator, spectrum::Spectrum, surface::Surface};
 /// # use fogbow::transmittance::thickness::Steps;
-/// # use fogbow::path::World;
+/// # use fogbow::world::World;
 /// // A lamp of 1 W/sr two metres above, and a grey floor; in vacuum, as if there were a last bit of fog.
 /// let lamps = [Light::Point(PointLight::new(2.0 * Vec3::Z, Spectrum::ONE)?)];
 /// let world = World { medium: &Empty, scene: &Empty, lights: &lamps };

@@ -213,7 +213,7 @@ pub struct Place {
 /// ```
 /// # use fogbow::{cache::{EyeSettings, places}, host::Empty, math::{Ray, Vec3}, medium::Homogeneous, phase::Phase};
 /// # use fogbow::{sampling::Generator, spectrum::Spectrum};
-/// # use fogbow::path::World;
+/// # use fogbow::world::World;
 /// let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::ONE, Phase::ISOTROPIC)?;
 /// let world = World { medium: &fog, scene: &Empty, lights: &[] };
 /// let settings = EyeSettings { density: 8.0, connections: 1, lights_visible: true, indirect: true };
@@ -300,7 +300,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized, F: FnMut(Place)> Sight for Wanted<'_
 /// # use fogbow::{cache::{Basis, Cache, Caches, Estimator, EyeSettings, Reader, Reading, Record, VolumeCache, radiance}};
 /// # use fogbow::{host::Empty, math::{Ray, Vec3}, medium::Homogeneous, multiple_scatter, path, phase::Phase};
 /// # use fogbow::{sampling::Generator, spectrum::{Gradient, Spectrum}, transmittance::thickness::Steps};
-/// # use fogbow::path::World;
+/// # use fogbow::world::World;
 /// # #[cfg(feature = "alloc")] {
 /// let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::ONE, Phase::ISOTROPIC)?;
 /// let world = World { medium: &fog, scene: &Empty, lights: &[] };
@@ -335,7 +335,7 @@ pub fn radiance<M: Medium + ?Sized, S: Scene + ?Sized>(
 /// # use fogbow::{cache::{Caches, Estimator, EyeSettings, radiance_beyond}, host::Empty, light::Light};
 /// # use fogbow::{math::{Ray, Vec3}, medium::{Homogeneous, Placed, Region}, multiple_scatter, path, phase::Phase};
 /// # use fogbow::{sampling::Generator, spectrum::Spectrum, transmittance::thickness::Steps};
-/// # use fogbow::path::World;
+/// # use fogbow::world::World;
 /// // A sky of 1, seen through a ball of fog two metres wide.
 /// let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::ONE, Phase::ISOTROPIC)?;
 /// let (ball, lights) = (Placed::new(fog, Region::sphere(Vec3::ZERO, 1.0)?), [Light::Constant(Spectrum::ONE)]);

@@ -25,7 +25,7 @@ use crate::world::World;
 /// ```
 /// # use fogbow::{covariance::{FrequencyPhotons, Grid, Lattice, Voxel}, math::{Bounds, Vec3, float::PI}};
 /// # use fogbow::{host::Empty, light::{Light, PointLight}, path::Settings, photon, sampling::Generator, spectrum::Spectrum};
-/// # use fogbow::path::World;
+/// # use fogbow::world::World;
 /// // A lamp of 4π W in the middle of a vacuum: at 2 m its fluence is 1/4 W·m⁻².
 /// let lamps = [Light::Point(PointLight::from_flux(Vec3::ZERO, Spectrum::splat(4.0 * PI))?)];
 /// let world = World { medium: &Empty, scene: &Empty, lights: &lamps };

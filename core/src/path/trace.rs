@@ -98,7 +98,7 @@ pub fn radiance<M: Medium + ?Sized, S: Scene + ?Sized>(
 /// ```
 /// # use fogbow::{host::{Empty, Hit}, math::{Ray, Vec3}, medium::Homogeneous, phase::Phase, sampling::Generator};
 /// # use fogbow::{path::{Delegate, InScattered, Settings, radiance_beyond}, spectrum::Spectrum};
-/// # use fogbow::path::World;
+/// # use fogbow::world::World;
 /// struct Known;   // fog that looks as if it scattered 1 W·m⁻²·sr⁻¹ along every ray
 /// impl Delegate for Known {
 ///     fn in_scattered(&mut self, _: &Ray, _: Spectrum, _: u32, _: &mut Generator) -> InScattered {

@@ -87,7 +87,7 @@ const MEAN_WITHIN: f32 = 0.5;
 /// ```
 /// # use fogbow::{host::{Empty, Medium}, math::Vec3, medium::Homogeneous, phase::Phase, sampling::Generator};
 /// # use fogbow::{spectrum::Spectrum, vpl::{Bound, Compensation, Receiver, contraction, next_vertex}};
-/// # use fogbow::path::World;
+/// # use fogbow::world::World;
 /// let fog = Homogeneous::new(Spectrum::splat(0.2), Spectrum::splat(0.8), Phase::ISOTROPIC)?;
 /// let world = World { medium: &fog, scene: &Empty, lights: &[] };
 /// let receiver = Receiver::in_medium(Vec3::ZERO, Vec3::Z, &fog.properties(Vec3::ZERO)).unwrap();

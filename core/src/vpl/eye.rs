@@ -69,7 +69,7 @@ pub struct Seen {
 /// ```
 /// # use fogbow::{host::Empty, math::{Ray, Vec3}, medium::Homogeneous, path::Settings, phase::Phase, sampling::Generator};
 /// # use fogbow::{spectrum::Spectrum, vpl::{Bound, EyeSettings, Gatherer, VirtualLight, radiance}};
-/// # use fogbow::path::World;
+/// # use fogbow::world::World;
 /// let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::splat(0.1), Phase::ISOTROPIC)?;
 /// let world = World { medium: &fog, scene: &Empty, lights: &[] };
 /// let gatherer = Gatherer { world, bound: Bound::NONE, compensation: None, has_mirrors: false };
@@ -103,7 +103,7 @@ pub fn radiance<M: Medium + ?Sized, S: Scene + ?Sized>(
 /// ```
 /// # use fogbow::{host::Empty, math::{Ray, Vec3}, medium::Homogeneous, path::Settings, phase::Phase, sampling::Generator};
 /// # use fogbow::{spectrum::Spectrum, vpl::receivers};
-/// # use fogbow::path::World;
+/// # use fogbow::world::World;
 /// let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::splat(0.5), Phase::ISOTROPIC)?;
 /// let world = World { medium: &fog, scene: &Empty, lights: &[] };
 /// let (ray, mut rng, mut opacity) = (Ray::between(Vec3::ZERO, 2.0 * Vec3::Z), Generator::new(1), 0.0);

@@ -76,7 +76,7 @@ impl Gathered {
 /// # use fogbow::{host::{Empty, Medium}, math::{Vec3, float::INV_FOUR_PI}, medium::Homogeneous, phase::Phase};
 /// # use fogbow::{sampling::Generator, spectrum::Spectrum};
 /// # use fogbow::vpl::{Bound, Compensation, Gatherer, Receiver, VirtualLight};
-/// # use fogbow::path::World;
+/// # use fogbow::world::World;
 /// // Thin fog, and a virtual light of 1 W at half the distance within which connections are clamped.
 /// let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::splat(1e-3), Phase::ISOTROPIC)?;
 /// let world = World { medium: &fog, scene: &Empty, lights: &[] };
