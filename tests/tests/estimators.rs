@@ -4,20 +4,25 @@ use fogbow::host::{Empty, Medium};
 use fogbow::light::{Light, PointLight, Sun};
 use fogbow::march::eye_ray;
 use fogbow::math::{Ray, Vec3};
-use fogbow::multiple_scatter::{self, Lengths, Settings, Walk};
+use fogbow::multiple_scatter::{self, Lengths, Settings, Start, Walk};
 use fogbow::phase::{Lobe, Phase};
 use fogbow::sampling::Generator;
 use fogbow::sh::{Coefficient, expansion};
-use fogbow::single_scatter::{self, Directional, Sums, moments};
+use fogbow::single_scatter::{self, Directional, Sums, Towards, moments};
 use fogbow::spectrum::Spectrum;
 use fogbow::surface::Surface;
 use fogbow::transmittance::thickness::Steps;
+use fogbow::world::World;
 use fogbow_tests::analytic::{INFINITE_MEDIUM_MULTIPLE, mean_and_error};
 use fogbow_tests::hosts::{Analytic, Ball, Body, Complaining, Field, Filled};
 use fogbow_tests::tolerance::STANDARD_ERRORS;
 
 const STEPS: Steps = Steps::Length(0.1);
 const NO_SURFACE: fn(&Ray, &fogbow::host::Hit) -> Spectrum = |_, _| Spectrum::ZERO;
+
+fn samples(samples: u32) -> single_scatter::Settings {
+    single_scatter::Settings { samples, steps: STEPS }
+}
 
 fn ball_of(field: Field, albedo: f32, g: f32, radius: f32) -> Filled<Analytic> {
     let medium = Analytic { phase: Phase::from(Lobe::HenyeyGreenstein { g }), ..Analytic::grey(field, albedo) };
@@ -44,11 +49,11 @@ fn single_and_multiple_scattering_add_up_to_one_in_a_white_furnace() {
         let medium = Complaining::new(ball_of(field, 1.0, g, 1.0));
         for lengths in [Lengths::Tracking, Lengths::Marched] {
             let settings = Settings { lengths, max_vertices: 1000, ..Settings::new(STEPS) };
-            let walk = Walk { medium: &medium, scene: &Empty, lights: &lights, settings };
-            let phase = medium.inner.medium.phase;
+            let walk = Walk { world: World { medium: &medium, scene: &Empty, lights: &lights }, settings };
+            let towards = Towards { to_eye: Vec3::Z, phase: &medium.inner.medium.phase };
             assert_mean(&format!("white furnace, {lengths:?}"), 400, 1.0, |rng| {
-                let once = single_scatter::sample(x, Vec3::Z, &phase, &medium, &Empty, &lights, 16, STEPS, rng);
-                let more = multiple_scatter::sample(&walk, x, Vec3::Z, &phase, NO_SURFACE, 16, rng);
+                let once = single_scatter::sample(x, &towards, &walk.world, &samples(16), rng);
+                let more = multiple_scatter::sample(x, &towards, &walk, NO_SURFACE, 16, rng);
                 f64::from(once.value[1] + more.value[1])
             });
         }
@@ -63,10 +68,11 @@ fn multiple_scattering_in_an_infinite_medium_agrees_with_the_fourier_solution() 
     let lights = [Light::Point(lamp)];
     for lengths in [Lengths::Tracking, Lengths::Marched, Lengths::Exponential { floor: 0.05 }] {
         let settings = Settings { lengths, max_vertices: 1000, ..Settings::new(STEPS) };
-        let walk = Walk { medium: &medium, scene: &Empty, lights: &lights, settings };
+        let walk = Walk { world: World { medium: &medium, scene: &Empty, lights: &lights }, settings };
         let x = Vec3::new(0.0, 1.5, 0.0);
+        let towards = Towards { to_eye: Vec3::X, phase: &Phase::ISOTROPIC };
         assert_mean(&format!("{lengths:?}"), 500, INFINITE_MEDIUM_MULTIPLE, |rng| {
-            f64::from(multiple_scatter::sample(&walk, x, Vec3::X, &Phase::ISOTROPIC, NO_SURFACE, 256, rng).value[0])
+            f64::from(multiple_scatter::sample(x, &towards, &walk, NO_SURFACE, 256, rng).value[0])
         });
     }
 }
@@ -78,11 +84,11 @@ fn one_light_at_a_time_has_the_same_mean_as_all_of_them() {
     let sun = Light::Sun(Sun::new(Vec3::new(0.3, 0.2, 1.0), Spectrum::ONE).unwrap());
     let lights = [lamp(0.0, 1.0), lamp(2.5, 3.0), sun, lamp(-0.5, 0.2)];
     let x = Vec3::new(-0.4, 0.1, 0.3);
-    let phase = medium.medium.phase;
+    let towards = Towards { to_eye: Vec3::X, phase: &medium.medium.phase };
     let estimate = |one_light: bool| {
         let settings = Settings { one_light, ..Settings::new(STEPS) };
-        let walk = Walk { medium: &medium, scene: &Empty, lights: &lights, settings };
-        let one = |i| multiple_scatter::sample(&walk, x, Vec3::X, &phase, NO_SURFACE, 64, &mut Generator::new(i)).value;
+        let walk = Walk { world: World { medium: &medium, scene: &Empty, lights: &lights }, settings };
+        let one = |i| multiple_scatter::sample(x, &towards, &walk, NO_SURFACE, 64, &mut Generator::new(i)).value;
         mean_and_error(&(0..300).map(|i| f64::from(one(i)[0])).collect::<Vec<_>>())
     };
     let ((all, e), (one, f)) = (estimate(false), estimate(true));
@@ -98,8 +104,9 @@ fn no_sample_of_light_along_a_ray_towards_a_lamp_is_an_outlier() {
     let ray = Ray::new(Vec3::ZERO, Vec3::X);
     let along = |lights: &[Light<'_>], seed: u64| {
         let settings = Settings { one_light: true, max_vertices: 1, ..Settings::new(STEPS) };
-        let walk = Walk { medium: &medium, scene: &Empty, lights, settings };
-        let incoming = walk.along(ray, None, 1.0, None, NO_SURFACE, |_, _, _| None, &mut Generator::new(seed));
+        let walk = Walk { world: World { medium: &medium, scene: &Empty, lights }, settings };
+        let start = Start { ray, end: None, pdf: 1.0, collision: None };
+        let incoming = walk.along(&start, NO_SURFACE, |_, _, _| None, &mut Generator::new(seed));
         f64::from(incoming.irradiance[0])
     };
     let samples = |lights: &[Light<'_>]| (0..4000).map(|seed| along(lights, seed)).collect::<Vec<_>>();
@@ -119,12 +126,12 @@ fn mean_gradient_of_multiple_scattering_agrees_with_differences_of_means() {
     let mut medium = ball_of(field, 0.9, 0.5, 2.5);
     medium.medium.tint = Spectrum::new(1.0, 0.5, 0.25);
     let lights = [Light::Sun(Sun::new(Vec3::Y, Spectrum::ONE).unwrap())];
-    let walk = Walk { medium: &medium, scene: &Empty, lights: &lights, settings: Settings::new(STEPS) };
-    let phase = medium.medium.phase;
+    let walk =
+        Walk { world: World { medium: &medium, scene: &Empty, lights: &lights }, settings: Settings::new(STEPS) };
+    let towards = Towards { to_eye: Vec3::X, phase: &medium.medium.phase };
     let (x, h) = (Vec3::new(0.4, 0.3, 0.0), 0.1);
-    let run = |p: Vec3, seed: u64| {
-        multiple_scatter::sample(&walk, p, Vec3::X, &phase, NO_SURFACE, 64, &mut Generator::new(seed))
-    };
+    let run =
+        |p: Vec3, seed: u64| multiple_scatter::sample(p, &towards, &walk, NO_SURFACE, 64, &mut Generator::new(seed));
     for axis in [Vec3::X, Vec3::Y] {
         for channel in 0..3 {
             let (mut gradients, mut slopes) = (Vec::new(), Vec::new());
@@ -150,21 +157,23 @@ fn expansions_agree_with_single_directions() {
     let (x, to_eye) = (Vec3::new(0.1, 0.2, 0.3), Vec3::new(0.48, -0.6, 0.64));
     let phase = medium.medium.phase;
     let f = moments(&phase, 16);
-    let walk = Walk { medium: &medium, scene: &wall, lights: &lights, settings: Settings::new(STEPS) };
+    let walk = Walk { world: World { medium: &medium, scene: &wall, lights: &lights }, settings: Settings::new(STEPS) };
     let glow = |ray: &Ray, hit: &fogbow::host::Hit| Spectrum::splat(1.0 + ray.at(hit.distance).y.max(0.0));
+    let towards = Towards { to_eye, phase: &phase };
+    let open = World { medium: &medium, scene: &Empty, lights: &lights };
     let rng = || Generator::new(5);
     let plain: [Sums; 3] = [
-        single_scatter::sample(x, to_eye, &phase, &medium, &Empty, &lights, 8, STEPS, &mut rng()),
-        single_scatter::sample_surfaces(x, to_eye, &phase, &medium, &wall, glow, 32, STEPS, &mut rng()),
-        multiple_scatter::sample(&walk, x, to_eye, &phase, glow, 32, &mut rng()),
+        single_scatter::sample(x, &towards, &open, &samples(8), &mut rng()),
+        single_scatter::sample_surfaces(x, &towards, &walk.world, glow, &samples(32), &mut rng()),
+        multiple_scatter::sample(x, &towards, &walk, glow, 32, &mut rng()),
     ];
     for (i, plain) in plain.iter().enumerate() {
         let mut coefficients = [Coefficient::ZERO; 289];
         let mut into = Directional { moments: &f, coefficients: &mut coefficients };
         let mean = match i {
-            0 => single_scatter::sample_directional(x, &medium, &Empty, &lights, 8, STEPS, &mut rng(), &mut into),
-            1 => single_scatter::sample_surfaces_directional(x, &medium, &wall, glow, 32, STEPS, &mut rng(), &mut into),
-            _ => multiple_scatter::sample_directional(&walk, x, glow, 32, &mut rng(), &mut into),
+            0 => single_scatter::sample_directional(x, &mut into, &open, &samples(8), &mut rng()),
+            1 => single_scatter::sample_surfaces_directional(x, &mut into, &walk.world, glow, &samples(32), &mut rng()),
+            _ => multiple_scatter::sample_directional(x, &mut into, &walk, glow, 32, &mut rng()),
         };
         let (value, gradient) = expansion::value_with_gradient(&coefficients, to_eye);
         let slope = (gradient - plain.gradient).norm();
@@ -183,17 +192,9 @@ fn a_glowing_sphere_seen_from_its_centre_through_soot() {
     let wall = Complaining::new(Ball { centre: Vec3::ZERO, radius: 2.0, surface: Surface::BLACK });
     let mut rng = Generator::new(1);
     let glow = |_: &Ray, _: &fogbow::host::Hit| Spectrum::ONE;
-    let seen = single_scatter::sample_surfaces(
-        Vec3::ZERO,
-        Vec3::X,
-        &Phase::ISOTROPIC,
-        &soot,
-        &wall,
-        glow,
-        64,
-        STEPS,
-        &mut rng,
-    );
+    let world = World { medium: &soot, scene: &wall, lights: &[] };
+    let towards = Towards { to_eye: Vec3::X, phase: &Phase::ISOTROPIC };
+    let seen = single_scatter::sample_surfaces(Vec3::ZERO, &towards, &world, glow, &samples(64), &mut rng);
     assert!((seen.value[0] - (-1.0_f32).exp()).abs() < 1e-6, "{:?}", seen.value);
     assert!(seen.gradient.norm()[0] < 0.2 * seen.gradient_norms[0], "opposite sides cancel");
     assert_eq!(wall.counts()[2], 64);
@@ -206,8 +207,9 @@ fn shadowed_lights_count_in_the_unshadowed_sums_only() {
     let blocker = Ball { centre: Vec3::X * 1.5, radius: 0.2, surface: Surface::BLACK };
     let lights = [lamp(3.0), lamp(-3.0)];
     let mut rng = Generator::new(1);
-    let phase = Phase::ISOTROPIC;
-    let sums = single_scatter::sample(Vec3::ZERO, Vec3::Z, &phase, &Empty, &blocker, &lights, 1, STEPS, &mut rng);
+    let towards = Towards { to_eye: Vec3::Z, phase: &Phase::ISOTROPIC };
+    let world = World { medium: &Empty, scene: &blocker, lights: &lights };
+    let sums = single_scatter::sample(Vec3::ZERO, &towards, &world, &samples(1), &mut rng);
     assert!((sums.unshadowed[0] / sums.value[0] - 2.0).abs() < 1e-6);
     assert!((sums.unshadowed_gradient_norms[0] / sums.gradient_norms[0] - 2.0).abs() < 1e-6);
 }

@@ -9,7 +9,7 @@ use fogbow::multiple_scatter::{self, Shift, Walk, Weight};
 use fogbow::path;
 use fogbow::phase::{Lobe, Phase};
 use fogbow::sampling::{Generator, warp::uniform_sphere};
-use fogbow::single_scatter::Sums;
+use fogbow::single_scatter::{Sums, Towards};
 use fogbow::spectrum::Spectrum;
 use fogbow::surface::Surface;
 use fogbow::transmittance::thickness::{Marching, Steps, optical_thickness, optical_thickness_with_gradients};
@@ -265,17 +265,17 @@ const PLACES: [(Vec3, Vec3); 2] =
 /// `sample` towards one direction, by walks of up to so many vertices.
 fn check_samples(lobe: Lobe, max_vertices: u32, paths: u32) {
     let (medium, scene, phase) = (fog(lobe), room(0.5), Phase::from(lobe));
-    let to_eye = Vec3::new(0.36, 0.48, 0.8);
+    let towards = Towards { to_eye: Vec3::new(0.36, 0.48, 0.8), phase: &phase };
     for light in [bulb(), panel()] {
         let lights = [light];
         let mut make = estimator(&medium, &scene, &lights);
         make.walk.max_vertices = max_vertices;
-        let walk = Walk { medium: &medium, scene: &scene, lights: &lights, settings: make.walk };
+        let walk = Walk { world: make.world, settings: make.walk };
         for (point, axis) in PLACES {
             check(point, axis, &format!("{lobe:?}, {lights:?}"), |point, rng| {
                 let mut child = Generator::child(rng);
                 let outgoing = |ray: &Ray, hit: &Hit| make.outgoing(ray, hit, &mut child);
-                first(&multiple_scatter::sample(&walk, point, to_eye, &phase, outgoing, paths, rng))
+                first(&multiple_scatter::sample(point, &towards, &walk, outgoing, paths, rng))
             });
         }
     }

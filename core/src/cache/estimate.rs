@@ -11,13 +11,13 @@ use super::store::{SurfaceCache, VolumeCache};
 use crate::host::{Hit, Medium, Properties, Rng, Scene};
 use crate::light::{Light, sky};
 use crate::math::{Frame, Ray, float};
-use crate::multiple_scatter::{self, Collision, Cones, Incoming, Walk};
+use crate::multiple_scatter::{self, Cones, Incoming, Start, Walk};
 use crate::path;
 use crate::phase::Phase;
 use crate::sampling::discrete::choose;
 use crate::sampling::{Generator, uniform, uniform2, warp};
 use crate::sh::{Coefficient, MAX_DEGREE};
-use crate::single_scatter::{self, Arrival, Contribution, Directional, Sums};
+use crate::single_scatter::{self, Arrival, Contribution, Directional, Sums, Towards};
 use crate::spectrum::{Gradient, Spectrum};
 use crate::surface::{Surface, lambert};
 use crate::transmittance::thickness::{Marching, Transmittance, transmittance, transmittance_with_gradients};
@@ -148,12 +148,11 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
     /// the expansion of `phase` of degree 1 and more added to `higher`.
     pub fn single(&self, point: Vec3, phase: &Phase, higher: &mut [Coefficient], rng: &mut impl Rng) -> Sums {
         self.expanded(phase, higher, |into| {
-            let World { medium, scene, .. } = self.world;
-            let (samples, steps) = (self.light_samples, self.walk.steps);
+            let settings = single_scatter::Settings { samples: self.light_samples, steps: self.walk.steps };
             let mut sums = Sums::default();
             for lights in self.lights_but_sky() {
-                let of = single_scatter::sample_directional(point, medium, scene, lights, samples, steps, rng, into);
-                sums.merge(&of);
+                let world = World { lights, ..self.world };
+                sums.merge(&single_scatter::sample_directional(point, into, &world, &settings, rng));
             }
             sums
         })
@@ -222,8 +221,8 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
                 let (to_light, pdf) = mixture.direction(j, warp::uniform_sphere, |_| warp::uniform_sphere_pdf());
                 let ray = Ray::new(point, to_light);
                 let end = nearest_surface(&ray, self.world.scene);
-                let flown = walk.first(&ray, end.as_ref(), third(j, offset), false, rng);
-                let incoming = self.walked(&walk, ray, end.as_ref(), pdf, flown.collision, rng) * share;
+                let collision = walk.first(&ray, end.as_ref(), third(j, offset), false, rng).collision;
+                let incoming = self.walked(&walk, &Start { ray, end, pdf, collision }, rng) * share;
                 if let Some(learnt) = &mut learnt {
                     learnt.add(to_light, incoming.irradiance.mean() * count as f32, pdf, count);
                 }
@@ -239,15 +238,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
     }
 
     /// Light scattered in the medium along a ray, by one walk that ends where caches know the rest.
-    fn walked(
-        &self,
-        walk: &Walk<'_, M, S>,
-        ray: Ray,
-        end: Option<&Hit>,
-        pdf: f32,
-        first: Option<Collision>,
-        rng: &mut impl Rng,
-    ) -> Incoming {
+    fn walked(&self, walk: &Walk<'_, M, S>, start: &Start, rng: &mut impl Rng) -> Incoming {
         let mut child = Generator::child(rng);
         let outgoing = |ray: &Ray, hit: &Hit| self.outgoing(ray, hit, &mut child);
         let known = |point: Vec3, to_eye: Vec3, _: &Properties| {
@@ -258,7 +249,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
             light += more;
             Some((light, turned + turned_more))
         };
-        self.steadied(walk.along(ray, end, pdf, first, outgoing, known, rng))
+        self.steadied(walk.along(start, outgoing, known, rng))
     }
 
     /// An arrival whose gradient is no larger than [`Estimator::finest`] lets it be.
@@ -319,8 +310,8 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
                 total += light;
             }
             openings.add_surface(end.as_ref(), pdf / cosine);
-            let light = self.walked(&walk, ray, end.as_ref(), 1.0, flown.collision, rng);
-            let light = tilted(&light, tilt) * weight;
+            let start = Start { ray, end, pdf: 1.0, collision: flown.collision };
+            let light = tilted(&self.walked(&walk, &start, rng), tilt) * weight;
             scattered.add(to_light, &light);
             total += light;
             if let Some(learnt) = &mut learnt {
@@ -448,20 +439,20 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
         point: Vec3,
         hit: &Hit,
         to_eye: Vec3,
-        surface: Surface,
         random: (f32, Vec2),
         rng: &mut Generator,
     ) -> Spectrum {
         let origin = |to_light: Vec3| leave(point, hit.normal, to_light, hit.distance);
-        let value = |to_light: Vec3| surface.value(hit.normal, to_eye, to_light) * hit.normal.dot(to_light).max(0.0);
+        let value =
+            |to_light: Vec3| hit.surface.value(hit.normal, to_eye, to_light) * hit.normal.dot(to_light).max(0.0);
         self.connected(point, origin, |light| light.importance(point), value, random, rng)
     }
 
     /// Light of all lights but a sky, scattered once at `point` towards `to_eye`: one sample of each.
     pub fn towards(&self, point: Vec3, to_eye: Vec3, phase: &Phase, rng: &mut Generator) -> Spectrum {
-        let World { medium, scene, .. } = self.world;
-        let steps = self.walk.steps;
-        let of = |lights| single_scatter::sample(point, to_eye, phase, medium, scene, lights, 1, steps, rng).value;
+        let (towards, world) = (Towards { to_eye, phase }, self.world);
+        let settings = single_scatter::Settings { samples: 1, steps: self.walk.steps };
+        let of = |lights| single_scatter::sample(point, &towards, &World { lights, ..world }, &settings, rng).value;
         self.lights_but_sky().map(of).sum()
     }
 
@@ -480,7 +471,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
     pub fn multiple_towards(&self, point: Vec3, to_eye: Vec3, phase: &Phase, rng: &mut Generator) -> Spectrum {
         let mut child = Generator::child(rng);
         let outgoing = |ray: &Ray, hit: &Hit| self.outgoing(ray, hit, &mut child);
-        multiple_scatter::sample(&self.walker(), point, to_eye, phase, outgoing, 1, rng).value
+        multiple_scatter::sample(point, &Towards { to_eye, phase }, &self.walker(), outgoing, 1, rng).value
     }
 
     /// Radiance at the origin of a ray but for emission seen directly, by one path.
@@ -490,8 +481,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
     }
 
     fn walker(&self) -> Walk<'_, M, S> {
-        let World { medium, scene, lights } = self.world;
-        Walk { medium, scene, lights, settings: self.walk }
+        Walk { world: self.world, settings: self.walk }
     }
 
     /// Runs a directional estimate and cuts off its degree 0, which the record itself holds.

@@ -526,8 +526,8 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Sight for Gather<'_, M, S> {
                 }
                 lambert::value(reflectance)
             }
-            surface => {
-                let light = self.estimator.reflected(point, hit, to_eye, surface, self.surface, &mut self.rng);
+            _ => {
+                let light = self.estimator.reflected(point, hit, to_eye, self.surface, &mut self.rng);
                 self.seen.surface_direct += weight * light;
                 return;
             }

@@ -5,15 +5,14 @@ use glam::{Vec2, Vec3};
 use super::walk::{Incoming, Walk};
 use crate::host::{Hit, Medium, Rng, Scene};
 use crate::math::Ray;
-use crate::phase::Phase;
 use crate::sampling::{uniform, uniform2};
-use crate::single_scatter::{Contribution, Directional, Sums};
+use crate::single_scatter::{Contribution, Directional, Sums, Towards};
 use crate::spectrum::Spectrum;
 
 /// Walks `paths` paths whose first directions are stratified in their cosine.
 fn for_each_path<M: Medium + ?Sized, S: Scene + ?Sized>(
-    walk: &Walk<'_, M, S>,
     point: Vec3,
+    walk: &Walk<'_, M, S>,
     mut outgoing: impl FnMut(&Ray, &Hit) -> Spectrum,
     paths: u32,
     rng: &mut (impl Rng + ?Sized),
@@ -34,7 +33,7 @@ fn for_each_path<M: Medium + ?Sized, S: Scene + ?Sized>(
     }
 }
 
-/// Multiply scattered radiance at `point` towards `to_eye` (unit), with its gradient and the sums of
+/// Multiply scattered radiance at `point`, by `paths` walks, with its gradient and the sums of
 /// J's Eq. 34. There, each path is one summand, its vertices' gradients added as vectors; here all paths
 /// that start into the same twenty-fourth of the sphere are: the norms of single walks would
 /// measure their noise, and radii shrink as if light changed where it does not.
@@ -46,28 +45,28 @@ fn for_each_path<M: Medium + ?Sized, S: Scene + ?Sized>(
 /// ```
 /// # use fogbow::{host::Empty, light::{Light, Sun}, math::Vec3, medium::Homogeneous, phase::{Lobe, Phase}};
 /// # use fogbow::multiple_scatter::{Settings, Walk, sample};
-/// # use fogbow::{sampling::Generator, spectrum::Spectrum, transmittance::thickness::Steps};
-/// let dark = Homogeneous::new(Spectrum::ONE, Spectrum::ZERO, Lobe::Isotropic).unwrap();
-/// let lights = [Light::Sun(Sun::new(Vec3::Z, Spectrum::ONE).unwrap())];
-/// let settings = Settings::new(Steps::Length(0.1));
-/// let walk = Walk { medium: &dark, scene: &Empty, lights: &lights, settings };
-/// let phase = Phase::ISOTROPIC;
-/// let sums = sample(&walk, Vec3::ZERO, Vec3::X, &phase, |_, _| Spectrum::ZERO, 8, &mut Generator::new(1));
+/// # use fogbow::{sampling::Generator, single_scatter::Towards, spectrum::Spectrum, transmittance::thickness::Steps, world::World};
+/// let dark = Homogeneous::new(Spectrum::ONE, Spectrum::ZERO, Lobe::Isotropic)?;
+/// let lights = [Light::Sun(Sun::new(Vec3::Z, Spectrum::ONE)?)];
+/// let world = World { medium: &dark, scene: &Empty, lights: &lights };
+/// let walk = Walk { world, settings: Settings::new(Steps::Length(0.1)) };
+/// let towards = Towards { to_eye: Vec3::X, phase: &Phase::ISOTROPIC };
+/// let sums = sample(Vec3::ZERO, &towards, &walk, |_, _| Spectrum::ZERO, 8, &mut Generator::new(1));
 /// assert_eq!(sums.value, Spectrum::ZERO);   // soot scatters nothing
+/// # Ok::<(), Box<dyn core::error::Error>>(())
 /// ```
 #[must_use]
 pub fn sample<M: Medium + ?Sized, S: Scene + ?Sized>(
-    walk: &Walk<'_, M, S>,
     point: Vec3,
-    to_eye: Vec3,
-    phase: &Phase,
+    towards: &Towards<'_>,
+    walk: &Walk<'_, M, S>,
     outgoing: impl FnMut(&Ray, &Hit) -> Spectrum,
     paths: u32,
     rng: &mut (impl Rng + ?Sized),
 ) -> Sums {
     let mut cones = Cones::default();
-    for_each_path(walk, point, outgoing, paths, rng, |incoming| {
-        cones.add(incoming.to_light, &incoming.scatter(to_eye, phase));
+    for_each_path(point, walk, outgoing, paths, rng, |incoming| {
+        cones.add(incoming.to_light, &incoming.scatter(towards.to_eye, towards.phase));
     });
     cones.sums()
 }
@@ -76,32 +75,33 @@ pub fn sample<M: Medium + ?Sized, S: Scene + ?Sized>(
 /// are of the mean over directions, `L₀₀ Y₀₀`.
 ///
 /// ```
-/// # use fogbow::{host::Empty, light::{Light, PointLight}, math::Vec3, medium::Homogeneous, phase::{Lobe, Phase}};
+/// # use fogbow::{host::Empty, light::{Light, Sun}, math::Vec3, medium::{Homogeneous, Placed, Region}, phase::Phase};
 /// # use fogbow::multiple_scatter::{Settings, Walk, sample_directional};
-/// # use fogbow::{sampling::Generator, sh::Coefficient, single_scatter::{Directional, moments}};
-/// # use fogbow::{spectrum::Spectrum, transmittance::thickness::Steps};
-/// let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::ONE, Lobe::Isotropic).unwrap();
-/// let lights = [Light::Point(PointLight::new(Vec3::Z, Spectrum::ONE).unwrap())];
-/// let settings = Settings::new(Steps::Length(0.1));
-/// let walk = Walk { medium: &fog, scene: &Empty, lights: &lights, settings };
-/// let f = moments(&Phase::ISOTROPIC, 1);
-/// let mut coefficients = [Coefficient::ZERO; 4];
-/// let mut into = Directional { moments: &f[..2], coefficients: &mut coefficients };
-/// let dark = |_: &_, _: &_| Spectrum::ZERO;
-/// let sums = sample_directional(&walk, Vec3::ZERO, dark, 8, &mut Generator::new(1), &mut into);
-/// assert!((coefficients[0].value[0] * 0.28209479 / sums.value[0] - 1.0).abs() < 1e-5);   // times Y₀₀: the mean
-/// assert_eq!(coefficients[2].value, Spectrum::ZERO);   // isotropic fog scatters alike in all directions
+/// # use fogbow::single_scatter::{Directional, moments};
+/// # use fogbow::{sampling::Generator, sh::Coefficient, spectrum::Spectrum, transmittance::thickness::Steps, world::World};
+/// let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::ONE, Phase::ISOTROPIC)?;
+/// let ball = Placed::new(fog, Region::sphere(Vec3::ZERO, 1.0)?);
+/// let lights = [Light::Sun(Sun::new(Vec3::Z, Spectrum::ONE)?)];
+/// let world = World { medium: &ball, scene: &Empty, lights: &lights };
+/// let walk = Walk { world, settings: Settings::new(Steps::Length(0.1)) };
+/// let f = moments(&Phase::ISOTROPIC, 0);
+/// let mut coefficients = [Coefficient::ZERO];
+/// let mut into = Directional { moments: &f[..1], coefficients: &mut coefficients };
+/// let sums = sample_directional(Vec3::ZERO, &mut into, &walk, |_, _| Spectrum::ZERO, 64, &mut Generator::new(1));
+/// // Y₀₀ is 1/√(4π).
+/// assert!((sums.value[0] / coefficients[0].value[0] - 0.28209).abs() < 1e-4);
+/// # Ok::<(), Box<dyn core::error::Error>>(())
 /// ```
 pub fn sample_directional<M: Medium + ?Sized, S: Scene + ?Sized>(
-    walk: &Walk<'_, M, S>,
     point: Vec3,
+    into: &mut Directional<'_>,
+    walk: &Walk<'_, M, S>,
     outgoing: impl FnMut(&Ray, &Hit) -> Spectrum,
     paths: u32,
     rng: &mut (impl Rng + ?Sized),
-    into: &mut Directional<'_>,
 ) -> Sums {
     let mut cones = Cones::default();
-    for_each_path(walk, point, outgoing, paths, rng, |incoming| {
+    for_each_path(point, walk, outgoing, paths, rng, |incoming| {
         cones.add(incoming.to_light, &incoming.scatter_directional(into.moments, 1.0, into.coefficients));
     });
     cones.sums()

@@ -53,19 +53,25 @@ pub struct Flown {
     pub whole: Option<Thickness>,
 }
 
-/// The next collision on `ray`, decided by `u`. `throughput` weighs the channels; `to_end` asks for the thickness of
-/// the whole ray.
+/// How a segment is flown along.
+pub(super) struct Flying {
+    pub(super) lengths: Lengths,
+    pub(super) marching: Marching,
+    /// Whether the thickness of the whole ray is wanted.
+    pub(super) to_end: bool,
+}
+
+/// The next collision on `ray`, decided by `u`. `throughput` weighs the channels.
 #[inline]
 pub(super) fn fly(
     ray: &Ray,
     medium: &(impl Medium + ?Sized),
-    lengths: Lengths,
+    flying: &Flying,
     throughput: Spectrum,
-    marching: Marching,
     u: f32,
-    to_end: bool,
     rng: &mut Generator,
 ) -> Flown {
+    let &Flying { lengths, marching, to_end } = flying;
     if lengths == Lengths::Marched && medium.is_grey() {
         let marched = march(ray, medium, marching, u, to_end);
         let collision = marched.collision.map(|drawn| {

@@ -40,5 +40,5 @@ mod weight;
 pub(crate) use estimate::Cones;
 pub use estimate::{sample, sample_directional};
 pub use flight::{Collision, Flown, Lengths};
-pub use walk::{Incoming, Settings, Walk};
+pub use walk::{Incoming, Settings, Start, Walk};
 pub use weight::{Shift, Weight};

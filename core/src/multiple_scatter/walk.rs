@@ -2,7 +2,7 @@
 
 use glam::{Vec2, Vec3};
 
-use super::flight::{Collision, Flown, Lengths, fly, own};
+use super::flight::{Collision, Flown, Flying, Lengths, fly, own};
 use super::weight::{Shift, Weight};
 use crate::host::{Hit, Medium, Properties, Rng, Scene};
 use crate::light::{Falloff, Light, sky};
@@ -15,7 +15,7 @@ use crate::spectrum::{Gradient, Spectrum};
 use crate::transmittance::thickness::{
     Marching, Steps, optical_thickness_with_gradients, transmittance_with_gradients, until_the_end,
 };
-use crate::world::{NearLight, nearest_surface, shadow_ray};
+use crate::world::{NearLight, World, nearest_surface, shadow_ray};
 
 /// Beyond this many distances to the light an endless segment is not sampled equiangularly: 10⁻⁴ of
 /// the angle lies there, and `tan` loses its digits.
@@ -56,17 +56,33 @@ impl Settings {
     }
 }
 
-/// What a walk needs of the world.
-#[derive(Debug, Clone, Copy)]
+/// A random walk through a world: the paths by which light comes to a point.
+#[derive(Debug)]
 pub struct Walk<'a, M: ?Sized, S: ?Sized> {
-    /// The medium.
-    pub medium: &'a M,
-    /// The surfaces.
-    pub scene: &'a S,
-    /// The lights; a sky ([`Light::is_sky`]) is met by walks that leave the world, all others are connected to.
-    pub lights: &'a [Light<'a>],
+    /// The world. A sky ([`Light::is_sky`](crate::light::Light::is_sky)) is met by walks that leave it, all other lights are connected to.
+    pub world: World<'a, M, S>,
     /// How to walk.
     pub settings: Settings,
+}
+
+impl<M: ?Sized, S: ?Sized> Clone for Walk<'_, M, S> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+impl<M: ?Sized, S: ?Sized> Copy for Walk<'_, M, S> {}
+
+/// Where a walk starts: see [`Walk::along`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Start {
+    /// From where, and in which direction.
+    pub ray: Ray,
+    /// The nearest surface along it: [`nearest_surface`].
+    pub end: Option<Hit>,
+    /// Density (sr⁻¹) of the ray's direction.
+    pub pdf: f32,
+    /// Where light collides before it comes to the end: [`Walk::first`]. `None` if it gets through.
+    pub collision: Option<Collision>,
 }
 
 /// `D`, the reach of [`Shift`], over the distance of the nearest light of finite size.
@@ -86,15 +102,20 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Walk<'_, M, S> {
     /// collision.
     ///
     /// ```
-    /// # use fogbow::{host::Empty, light::{Light, PointLight}, math::{Vec2, Vec3}, sampling::{Generator, warp}};
-    /// # use fogbow::{multiple_scatter::{Settings, Walk}, spectrum::Spectrum, transmittance::thickness::Steps};
-    /// let lights = [Light::Point(PointLight::new(Vec3::Z, Spectrum::ONE).unwrap())];
-    /// let settings = Settings::new(Steps::Length(0.1));
-    /// let walk = Walk { medium: &Empty, scene: &Empty, lights: &lights, settings };
-    /// let first = Vec2::new(0.3, 0.6);
-    /// let incoming = walk.path(Vec3::ZERO, first, |_, _| Spectrum::ONE, &mut Generator::new(1));
-    /// assert_eq!(incoming.to_light, warp::uniform_sphere(first));
-    /// assert_eq!(incoming.irradiance, Spectrum::ZERO);   // in vacuum nothing is scattered on the way
+    /// # use fogbow::{host::Empty, light::{Light, Sun}, math::{Vec2, Vec3}, medium::{Homogeneous, Placed, Region}};
+    /// # use fogbow::{multiple_scatter::{Settings, Walk}, phase::Phase, sampling::Generator, spectrum::Spectrum};
+    /// # use fogbow::{transmittance::thickness::Steps, world::World};
+    /// let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::ONE, Phase::ISOTROPIC)?;
+    /// let ball = Placed::new(fog, Region::sphere(Vec3::ZERO, 2.0)?);
+    /// let lights = [Light::Sun(Sun::new(Vec3::Z, Spectrum::ONE)?)];
+    /// let world = World { medium: &ball, scene: &Empty, lights: &lights };
+    /// let walk = Walk { world, settings: Settings::new(Steps::Length(0.1)) };
+    /// // The mean over many paths is the light that was scattered before it came to the middle of the ball.
+    /// let rng = &mut Generator::new(1);
+    /// let paths = (0..1000).map(|i| walk.path(Vec3::ZERO, Vec2::new(i as f32 / 1000.0, 0.5), |_, _| Spectrum::ZERO, rng));
+    /// let fluence = paths.map(|incoming| incoming.irradiance[0]).sum::<f32>() / 1000.0;
+    /// assert!(fluence > 0.2 && fluence < 1.0);
+    /// # Ok::<(), Box<dyn core::error::Error>>(())
     /// ```
     pub fn path(
         &self,
@@ -105,10 +126,11 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Walk<'_, M, S> {
     ) -> Incoming {
         let to_light = warp::uniform_sphere(first);
         let ray = Ray::new(point, to_light);
-        let end = nearest_surface(&ray, self.scene);
+        let end = nearest_surface(&ray, self.world.scene);
         let u = uniform(rng);
-        let flown = self.first(&ray, end.as_ref(), u, false, rng);
-        self.along(ray, end.as_ref(), warp::uniform_sphere_pdf(), flown.collision, outgoing, |_, _, _| None, rng)
+        let collision = self.first(&ray, end.as_ref(), u, false, rng).collision;
+        let start = Start { ray, end, pdf: warp::uniform_sphere_pdf(), collision };
+        self.along(&start, outgoing, |_, _, _| None, rng)
     }
 
     /// The flight on the first segment, on `ray` up to its `end`, decided by `u` in [0, 1); with the thickness of the
@@ -127,81 +149,46 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Walk<'_, M, S> {
     pub fn first(&self, ray: &Ray, end: Option<&Hit>, u: f32, to_end: bool, rng: &mut (impl Rng + ?Sized)) -> Flown {
         let rng = &mut own(rng);
         let ray = ray.with_length(end.map_or(f32::INFINITY, |hit| hit.distance));
-        let marching = self.marching(rng);
-        fly(&ray, self.medium, self.settings.lengths, Spectrum::ONE, marching, u, to_end, rng)
+        fly(&ray, self.world.medium, &self.flying(to_end, rng), Spectrum::ONE, u, rng)
     }
 
-    /// Light scattered on a path whose first segment lies on `ray`, up to its `end`, the nearest surface, over
-    /// the density `pdf` (sr⁻¹) of its direction: radiance at the ray's origin over `pdf`, and how it
-    /// changes as the origin moves and the vertices with it ([`Shift`]). `first` is where [`Walk::first`] ended.
+    /// Light scattered on a path whose first segment is that of `start`, over the density of its direction: radiance at
+    /// the ray's origin over `pdf`, and how it changes as the origin moves and the vertices with it ([`Shift`]).
     ///
     /// `known(point, to_eye, properties)` may answer for all light but that straight from the lights walks
     /// connect to (those that are no sky) that is scattered towards `to_eye` at a collision (W·m⁻²·sr⁻¹), with its gradients as the point moves
-    /// and as `to_eye` turns: then the path ends there. Other arguments as for [`Walk::path`].
-    ///
-    /// ```
-    /// # use fogbow::{host::Empty, math::{Ray, Vec3, float::PI}, medium::Homogeneous, phase::Lobe, sampling::Generator};
-    /// # use fogbow::{multiple_scatter::{Settings, Walk}, single_scatter::Contribution, spectrum::{Gradient, Spectrum}};
-    /// # use fogbow::{sampling::warp, transmittance::thickness::Steps};
-    /// // Fog that absorbs nothing, where all light is known: 1 from everywhere.
-    /// let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::splat(2.0), Lobe::Isotropic).unwrap();
-    /// let settings = Settings::new(Steps::Length(0.1));
-    /// let walk = Walk { medium: &fog, scene: &Empty, lights: &[], settings };
-    /// let (ray, mut rng) = (Ray::new(Vec3::ZERO, Vec3::X), Generator::new(1));
-    /// let first = walk.first(&ray, None, 0.3, false, &mut rng).collision;
-    /// let one = (Contribution { radiance: Spectrum::ONE, gradient: Gradient::ZERO }, Gradient::ZERO);
-    /// let dark = |_: &_, _: &_| Spectrum::ZERO;
-    /// let pdf = warp::uniform_sphere_pdf();
-    /// let incoming = walk.along(ray, None, pdf, first, dark, |_, _, _| Some(one), &mut rng);
-    /// assert!((incoming.irradiance[0] - 4.0 * PI).abs() < 1e-4);   // then it is 1 from here, too
-    /// ```
+    /// and as `to_eye` turns: then the path ends there. `outgoing` as for [`Walk::path`].
     pub fn along(
         &self,
-        mut ray: Ray,
-        end: Option<&Hit>,
-        pdf: f32,
-        first: Option<Collision>,
+        start: &Start,
         mut outgoing: impl FnMut(&Ray, &Hit) -> Spectrum,
         mut known: impl FnMut(Vec3, Vec3, &Properties) -> Option<(Contribution, Gradient)>,
         rng: &mut (impl Rng + ?Sized),
     ) -> Incoming {
         let rng = &mut own(rng);
-        let mut kappa = Spectrum::splat(1.0 / pdf);
-        let mut weight = Weight::ONE;
+        let World { medium, scene, lights } = self.world;
         let mut total = Incoming {
-            to_light: ray.direction,
+            to_light: start.ray.direction,
             irradiance: Spectrum::ZERO,
             gradient: Gradient::ZERO,
             turning: Spectrum::ZERO,
         };
-        let mut end = end.copied();
-        // The last vertex's direction to the eye and phase function, if that depends on directions.
-        let mut bend = None;
-        ray.length = end.map_or(f32::INFINITY, |hit| hit.distance);
-        let mut collision = first;
+        let mut carried = Carried { weight: Weight::ONE, bend: None, kappa: Spectrum::splat(1.0 / start.pdf) };
+        let (mut ray, mut end, mut collision) = (start.ray, start.end, start.collision);
         for vertex in 1..=self.settings.max_vertices {
-            let reach = self.reach(ray.origin);
-            self.near_lights(&ray, end.as_ref(), reach, &weight, bend.as_ref(), kappa, &mut total, rng);
+            let leg = self.leg(ray, end);
+            self.near_lights(&leg, &carried, &mut total, rng);
             if vertex > 1 {
-                let (lengths, marching, u) = (self.settings.lengths, self.marching(rng), uniform(rng));
-                collision = fly(&ray, self.medium, lengths, weight.value * kappa, marching, u, false, rng).collision;
+                let (flying, u) = (self.flying(false, rng), uniform(rng));
+                collision = fly(&leg.ray, medium, &flying, carried.weight.value * carried.kappa, u, rng).collision;
             }
-            let Some(Collision { distance, properties, factor, thickness }) = collision else { break };
-            let at = ray.at(distance);
-            let step = kappa * factor * properties.scattering;
+            let Some(here) = collision else { break };
+            let (at, properties) = (leg.ray.at(here.distance), here.properties);
+            let step = carried.kappa * here.factor * properties.scattering;
             if step.is_black() || !step.is_finite() {
                 break;
             }
-            let next = self.medium.gradients(at).scattering;
-            let shift = Shift::new(&ray, end.as_ref(), reach, distance);
-            weight = bent(&weight, bend.as_ref(), &ray, &shift).advance_by(
-                &shift,
-                kappa,
-                factor,
-                &thickness,
-                properties.scattering,
-                &next,
-            );
+            let mut weight = carried.at(&leg, &here, carried.kappa, &medium.gradients(at).scattering);
             if vertex >= self.settings.roulette_from {
                 let survival = step.max_element().clamp(MIN_SURVIVAL, 1.0);
                 if uniform(rng) >= survival {
@@ -209,27 +196,27 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Walk<'_, M, S> {
                 }
                 weight = weight.scaled(1.0 / survival);
             }
-            let to_eye = -ray.direction;
-            self.lights_at(at, to_eye, &properties, &weight, &mut total, rng);
+            let to_eye = -leg.ray.direction;
+            self.lights_at(at, &weight, (to_eye, &properties.phase), &mut total, rng);
             if let Some((light, turned)) = known(at, to_eye, &properties) {
                 add(&mut total, weight.turn, &weight.carry_turned(&light, &turned));
                 break;
             }
 
             let turn = properties.phase.sample(to_eye, uniform2(rng));
-            kappa = turn.weight;
-            bend = (!properties.phase.is_isotropic()).then_some((to_eye, properties.phase));
+            let bend = (!properties.phase.is_isotropic()).then_some((to_eye, properties.phase));
+            carried = Carried { weight, bend, kappa: turn.weight };
             ray = Ray { origin: at, direction: turn.to_light, length: f32::INFINITY };
-            end = nearest_surface(&ray, self.scene);
+            end = nearest_surface(&ray, scene);
             ray.length = end.map_or(f32::INFINITY, |hit| hit.distance);
-            let radiance = end.as_ref().map_or_else(|| sky(self.lights, ray.direction), |hit| outgoing(&ray, hit));
+            let radiance = end.as_ref().map_or_else(|| sky(lights, ray.direction), |hit| outgoing(&ray, hit));
             if end.is_none() && radiance.is_black() {
                 continue;
             }
             let marching = self.marching(rng);
-            let through = || transmittance_with_gradients(&ray, self.medium, marching);
+            let through = || transmittance_with_gradients(&ray, medium, marching);
             if let Some(arrival) = Arrival::from_end(&ray, end.as_ref(), radiance, turn.pdf, through) {
-                add_scattered(&mut total, &weight, &arrival, to_eye, &properties.phase);
+                add_scattered(&mut total, &weight, &arrival, (to_eye, &properties.phase));
             }
         }
         // A light or a hit within rounding of a vertex may leave the range of f32.
@@ -239,11 +226,11 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Walk<'_, M, S> {
         total
     }
 
-    /// The reach of [`Shift`] at a point.
-    fn reach(&self, point: Vec3) -> f32 {
-        let away = |light: &Light<'_>| light.near_field().map(|field| field.centre().distance_squared(point));
-        let nearest2 = self.lights.iter().filter_map(away).fold(f32::INFINITY, f32::min);
-        REACH * float::sqrt(nearest2)
+    fn leg(&self, ray: Ray, end: Option<Hit>) -> Leg {
+        let away = |light: &Light<'_>| light.near_field().map(|field| field.centre().distance_squared(ray.origin));
+        let nearest2 = self.world.lights.iter().filter_map(away).fold(f32::INFINITY, f32::min);
+        let ray = ray.with_length(end.map_or(f32::INFINITY, |hit| hit.distance));
+        Leg { ray, end, reach: REACH * float::sqrt(nearest2) }
     }
 
     #[inline]
@@ -251,47 +238,37 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Walk<'_, M, S> {
         Marching { steps: self.settings.steps, offset: uniform(rng) }
     }
 
+    #[inline]
+    fn flying(&self, to_end: bool, rng: &mut Generator) -> Flying {
+        Flying { lengths: self.settings.lengths, marching: self.marching(rng), to_end }
+    }
+
     /// Single scattering at a vertex of the lights in whose near field it does not lie.
-    fn lights_at(
-        &self,
-        at: Vec3,
-        to_eye: Vec3,
-        properties: &Properties,
-        weight: &Weight,
-        total: &mut Incoming,
-        rng: &mut Generator,
-    ) {
-        let lights = self.lights.iter().filter_map(|light| {
+    fn lights_at(&self, at: Vec3, weight: &Weight, towards: (Vec3, &Phase), total: &mut Incoming, rng: &mut Generator) {
+        let World { medium, scene, lights } = self.world;
+        let lights = lights.iter().filter_map(|light| {
             let near = light.steep_field().is_some_and(|field| field.contains(at));
             (!near && !light.is_sky()).then(|| (light.importance(at), light))
         });
         self.each(lights, rng, |light, share, rng| {
             let mut sample = light.sample(at, uniform2(rng))?;
             sample.source.weight = sample.source.weight / share;
-            let arrival = Arrival::from_source(at, self.medium, &sample.source, self.marching(rng), 0.0)?;
-            if !self.scene.is_blocked(&shadow_ray(at, &sample.source)) {
-                add_scattered(total, weight, &arrival, to_eye, &properties.phase);
+            let arrival = Arrival::from_source(at, medium, &sample.source, self.marching(rng), 0.0)?;
+            if !scene.is_blocked(&shadow_ray(at, &sample.source)) {
+                add_scattered(total, weight, &arrival, towards);
             }
             Some(())
         });
     }
 
     /// Light scattered somewhere along a segment within a light's near field, carried to the start.
-    fn near_lights(
-        &self,
-        ray: &Ray,
-        end: Option<&Hit>,
-        reach: f32,
-        weight: &Weight,
-        bend: Option<&(Vec3, Phase)>,
-        kappa: Spectrum,
-        total: &mut Incoming,
-        rng: &mut Generator,
-    ) {
-        let lit = until_the_end(ray, self.medium);
-        let lights = self.lights.iter().filter_map(|light| {
+    fn near_lights(&self, leg: &Leg, carried: &Carried, total: &mut Incoming, rng: &mut Generator) {
+        let World { medium, scene, lights } = self.world;
+        let ray = &leg.ray;
+        let lit = until_the_end(ray, medium);
+        let lights = lights.iter().filter_map(|light| {
             let centre = light.steep_field()?.centre();
-            let farthest = lit.length.min(ENDLESS * ray.origin.distance(centre).max(self.medium.resolution()));
+            let farthest = lit.length.min(ENDLESS * ray.origin.distance(centre).max(medium.resolution()));
             let light = NearLight::of(light, &lit, 0.0, farthest)?;
             Some((light.sent(&lit), light))
         });
@@ -299,30 +276,21 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Walk<'_, M, S> {
             let on_light = uniform2(rng);
             let joint = light.join(ray, uniform(rng), on_light)?;
             let (at, distance, marching) = (joint.point, joint.distance, self.marching(rng));
-            let properties = self.medium.properties(at);
+            let properties = medium.properties(at);
             if properties.scattering.is_black() {
                 return None;
             }
             let source = joint.light(|| uniform2(rng))?.source;
             let closest = if source.falloff == Falloff::Area { 0.0 } else { self.settings.closest };
-            let arrival = Arrival::from_source(at, self.medium, &source, marching, closest)?;
-            if self.scene.is_blocked(&shadow_ray(at, &source)) {
+            let arrival = Arrival::from_source(at, medium, &source, marching, closest)?;
+            if scene.is_blocked(&shadow_ray(at, &source)) {
                 return None;
             }
-            let segment = optical_thickness_with_gradients(&ray.with_length(distance), self.medium, marching);
-            let frozen = kappa / (joint.pdf * share);
-            let slope = self.medium.gradients(at).scattering;
-            let through = segment.value.transmitted();
-            let shift = Shift::new(ray, end, reach, distance);
-            let joined = bent(weight, bend, ray, &shift).advance_by(
-                &shift,
-                frozen,
-                through,
-                &segment,
-                properties.scattering,
-                &slope,
-            );
-            add_scattered(total, &joined, &arrival, -ray.direction, &properties.phase);
+            let thickness = optical_thickness_with_gradients(&ray.with_length(distance), medium, marching);
+            let frozen = carried.kappa / (joint.pdf * share);
+            let here = Collision { distance, properties, factor: thickness.value.transmitted(), thickness };
+            let joined = carried.at(leg, &here, frozen, &medium.gradients(at).scattering);
+            add_scattered(total, &joined, &arrival, (-ray.direction, &properties.phase));
             Some(())
         });
     }
@@ -348,19 +316,49 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Walk<'_, M, S> {
     }
 }
 
-/// A weight with the change of the phase function at its last vertex as the directions before and after turn.
-fn bent(weight: &Weight, bend: Option<&(Vec3, Phase)>, ray: &Ray, shift: &Shift) -> Weight {
-    let Some((to_eye, phase)) = bend else { return *weight };
-    let deflected = deflection(ray.direction, *to_eye);
-    let cosine = to_eye.dot(ray.direction);
-    let before = (*to_eye * cosine - ray.direction) * weight.last_turn;
-    let after = (*to_eye - ray.direction * cosine) * (weight.moved * shift.turn);
-    let slope = phase.derivative(deflected).ratio(phase.value(deflected));
-    Weight { gradient: weight.gradient + Gradient::outer(weight.value * slope, before + after), ..*weight }
+/// A segment of a walk.
+struct Leg {
+    /// It ends at the surface.
+    ray: Ray,
+    end: Option<Hit>,
+    /// The reach of [`Shift`] at its origin.
+    reach: f32,
+}
+
+/// A path up to the start of a segment.
+struct Carried {
+    weight: Weight,
+    /// The last vertex's direction to the eye and phase function, if that depends on directions.
+    bend: Option<(Vec3, Phase)>,
+    /// Phase function over the density of the segment's direction.
+    kappa: Spectrum,
+}
+
+impl Carried {
+    /// The weight at a point of `leg`, where the gradient of scattering is `slope`; `kappa` is frozen.
+    #[inline]
+    fn at(&self, leg: &Leg, point: &Collision, kappa: Spectrum, slope: &Gradient) -> Weight {
+        let shift = Shift::new(&leg.ray, leg.end.as_ref(), leg.reach, point.distance);
+        let Collision { factor, thickness, properties, .. } = point;
+        self.bent(&leg.ray, &shift).advance_by(&shift, kappa, *factor, thickness, properties.scattering, slope)
+    }
+
+    /// The weight with the change of the phase function at its last vertex as the directions before and after turn.
+    #[inline]
+    fn bent(&self, ray: &Ray, shift: &Shift) -> Weight {
+        let weight = self.weight;
+        let Some((to_eye, phase)) = &self.bend else { return weight };
+        let deflected = deflection(ray.direction, *to_eye);
+        let cosine = to_eye.dot(ray.direction);
+        let before = (*to_eye * cosine - ray.direction) * weight.last_turn;
+        let after = (*to_eye - ray.direction * cosine) * (weight.moved * shift.turn);
+        let slope = phase.derivative(deflected).ratio(phase.value(deflected));
+        Weight { gradient: weight.gradient + Gradient::outer(weight.value * slope, before + after), ..weight }
+    }
 }
 
 /// Adds what a path's last vertex scatters of an arrival.
-fn add_scattered(total: &mut Incoming, weight: &Weight, arrival: &Arrival, to_eye: Vec3, phase: &Phase) {
+fn add_scattered(total: &mut Incoming, weight: &Weight, arrival: &Arrival, (to_eye, phase): (Vec3, &Phase)) {
     let light = arrival.scatter(to_eye, phase);
     let carried = if phase.is_isotropic() {
         weight.carry(&light)

@@ -22,6 +22,7 @@ mod sums;
 pub use arrival::{Arrival, Contribution, connect, moments};
 pub(crate) use sample::lattice;
 pub use sample::{
-    Directional, sample, sample_directional, sample_surfaces, sample_surfaces_directional, visit_lights, visit_surfaces,
+    Directional, Settings, Towards, sample, sample_directional, sample_surfaces, sample_surfaces_directional,
+    visit_lights, visit_surfaces,
 };
 pub use sums::Sums;

@@ -12,9 +12,29 @@ use crate::sampling::{uniform, uniform2, warp};
 use crate::sh::Coefficient;
 use crate::spectrum::Spectrum;
 use crate::transmittance::thickness::{Marching, Steps};
-use crate::world::{nearest_surface, shadow_ray};
+use crate::world::{World, nearest_surface, shadow_ray};
 
-/// Where an expansion goes: Legendre moments of the phase function, and the caller's coefficients.
+/// How light is sampled at a point.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Settings {
+    /// Samples of every light with extent, or directions in which surfaces are looked for. More: less noise, in proportion
+    /// to the root.
+    pub samples: u32,
+    /// How transmittance and its gradients are marched.
+    pub steps: Steps,
+}
+
+/// Light that is scattered towards one direction.
+#[derive(Debug, Clone, Copy)]
+pub struct Towards<'a> {
+    /// Where it goes (unit).
+    pub to_eye: Vec3,
+    /// How it is scattered.
+    pub phase: &'a Phase,
+}
+
+/// Light that is scattered in all directions, as an expansion: Legendre moments of the phase function, and the
+/// caller's coefficients.
 #[derive(Debug)]
 pub struct Directional<'a> {
     /// `f_0 … f_L` per channel: [`super::moments`], cut after the degree wanted.
@@ -33,97 +53,124 @@ pub(crate) fn lattice(j: u32, count: u32, shift: Vec2) -> Vec2 {
     )
 }
 
-/// Calls `visit(arrival, visible)` for `samples` samples of every light with extent and one of every
+/// Calls `visit(arrival, visible)` for [`Settings::samples`] samples of every light with extent and one of every
 /// light without, each weighted so that the sum over the calls is the estimate.
 ///
-/// Per-light samples form a randomly shifted lattice. Visibility is asked of `scene` along
+/// Per-light samples form a randomly shifted lattice. Visibility is asked of the scene along
 /// [`shadow_ray`]; samples in shadow are visited, too, for the unshadowed sums.
-pub fn visit_lights(
+///
+/// ```
+/// # use fogbow::{host::Empty, light::{Light, Sun}, math::Vec3, sampling::Generator, spectrum::Spectrum};
+/// # use fogbow::{single_scatter::{Settings, visit_lights}, transmittance::thickness::Steps, world::World};
+/// let lights = [Light::Sun(Sun::new(Vec3::Z, Spectrum::ONE)?), Light::Constant(Spectrum::ONE)];
+/// let world = World { medium: &Empty, scene: &Empty, lights: &lights };
+/// let settings = Settings { samples: 8, steps: Steps::Length(0.1) };
+/// let mut irradiance = Spectrum::ZERO;
+/// visit_lights(Vec3::ZERO, &world, &settings, &mut Generator::new(1), |arrival, visible| {
+///     irradiance += if visible { arrival.irradiance } else { Spectrum::ZERO };
+/// });
+/// // The sun's, and 4π of the sky.
+/// assert!((irradiance[0] - 1.0 - 4.0 * core::f32::consts::PI).abs() < 1e-4);
+/// # Ok::<(), fogbow::light::LightError>(())
+/// ```
+pub fn visit_lights<M: Medium + ?Sized, S: Scene + ?Sized>(
     point: Vec3,
-    medium: &(impl Medium + ?Sized),
-    scene: &(impl Scene + ?Sized),
-    lights: &[Light<'_>],
-    samples: u32,
-    steps: Steps,
+    world: &World<'_, M, S>,
+    settings: &Settings,
     rng: &mut (impl Rng + ?Sized),
     mut visit: impl FnMut(&Arrival, bool),
 ) {
-    for light in lights {
+    for light in world.lights {
         let count = match light {
             Light::Point(_) | Light::Phong(_) | Light::Spot(_) | Light::Sun(_) => 1,
-            _ => samples.max(1),
+            _ => settings.samples.max(1),
         };
         let shift = uniform2(rng);
         for j in 0..count {
-            let marching = Marching { steps, offset: uniform(rng) };
+            let marching = Marching { steps: settings.steps, offset: uniform(rng) };
             let Some(sample) = light.sample(point, lattice(j, count, shift)) else { continue };
             let source = Source { weight: sample.source.weight / count as f32, ..sample.source };
-            let Some(arrival) = Arrival::from_source(point, medium, &source, marching, 0.0) else { continue };
-            let visible = !scene.is_blocked(&shadow_ray(point, &source));
+            let Some(arrival) = Arrival::from_source(point, world.medium, &source, marching, 0.0) else { continue };
+            let visible = !world.scene.is_blocked(&shadow_ray(point, &source));
             visit(&arrival, visible);
         }
     }
 }
 
-/// Calls `visit(arrival)` for every surface that `samples` uniformly sampled directions hit.
+/// Calls `visit(arrival)` for every surface that [`Settings::samples`] uniformly sampled directions hit.
 ///
 /// `outgoing(ray, hit)` is the *full* radiance (W·m⁻²·sr⁻¹) the surface sends back along the ray:
 /// reflected light of every order, through the medium; and emission, unless the surface belongs to
 /// one of the lights that [`visit_lights`] samples. Each arrival is weighted by `4π/N`.
-pub fn visit_surfaces(
+///
+/// ```
+/// # use fogbow::{host::{Empty, Hit, Scene}, math::{Ray, Vec3}, sampling::Generator, spectrum::Spectrum, surface::Surface};
+/// # use fogbow::{single_scatter::{Settings, visit_surfaces}, transmittance::thickness::Steps, world::World};
+/// /// The inside of a ball.
+/// struct Shell;
+/// impl Scene for Shell {
+///     fn closest_hit(&self, ray: &Ray) -> Option<Hit> {
+///         Some(Hit { distance: 2.0, normal: -ray.direction, surface: Surface::BLACK, light: None })
+///     }
+/// }
+/// let world = World { medium: &Empty, scene: &Shell, lights: &[] };
+/// let settings = Settings { samples: 8, steps: Steps::Length(0.1) };
+/// let mut irradiance = 0.0;
+/// let glow = |_: &Ray, _: &Hit| Spectrum::ONE;
+/// visit_surfaces(Vec3::ZERO, &world, glow, &settings, &mut Generator::new(1), |arrival| irradiance += arrival.irradiance[0]);
+/// assert!((irradiance - 4.0 * core::f32::consts::PI).abs() < 1e-4);
+/// ```
+pub fn visit_surfaces<M: Medium + ?Sized, S: Scene + ?Sized>(
     point: Vec3,
-    medium: &(impl Medium + ?Sized),
-    scene: &(impl Scene + ?Sized),
+    world: &World<'_, M, S>,
     mut outgoing: impl FnMut(&Ray, &Hit) -> Spectrum,
-    samples: u32,
-    steps: Steps,
+    settings: &Settings,
     rng: &mut (impl Rng + ?Sized),
     mut visit: impl FnMut(&Arrival),
 ) {
+    let count = settings.samples;
     let shift = uniform2(rng);
-    let pdf = warp::uniform_sphere_pdf() * samples as f32;
-    for j in 0..samples {
-        let marching = Marching { steps, offset: uniform(rng) };
-        let ray = Ray::new(point, warp::uniform_sphere(lattice(j, samples, shift)));
-        let Some(hit) = nearest_surface(&ray, scene) else { continue };
+    let pdf = warp::uniform_sphere_pdf() * count as f32;
+    for j in 0..count {
+        let marching = Marching { steps: settings.steps, offset: uniform(rng) };
+        let ray = Ray::new(point, warp::uniform_sphere(lattice(j, count, shift)));
+        let Some(hit) = nearest_surface(&ray, world.scene) else { continue };
         let radiance = outgoing(&ray, &hit);
-        if let Some(arrival) = Arrival::from_surface(&ray, &hit, radiance, pdf, medium, marching) {
+        if let Some(arrival) = Arrival::from_surface(&ray, &hit, radiance, pdf, world.medium, marching) {
             visit(&arrival);
         }
     }
 }
 
-/// Single scattering of all lights at `point` towards `to_eye` (unit), with its gradient and the
-/// sums of J's Eq. 34.
+/// Single scattering of all lights at `point`, with its gradient and the sums of J's Eq. 34.
 ///
-/// `samples` samples of every light with extent; noise comes from them and from marching only, so
+/// [`Settings::samples`] samples of every light with extent; noise comes from them and from marching only, so
 /// that in a constant medium with point lights the result is exact.
 ///
 /// ```
 /// # use fogbow::{host::Empty, light::{Light, PointLight}, math::Vec3, phase::Phase, spectrum::Spectrum};
-/// # use fogbow::{sampling::Generator, single_scatter::sample, transmittance::thickness::Steps};
-/// let lamp = PointLight::new(Vec3::new(0.0, 0.0, 2.0), Spectrum::ONE).unwrap();
-/// let (phase, mut rng) = (Phase::ISOTROPIC, Generator::new(1));
-/// let lights = [Light::Point(lamp)];
-/// let sums = sample(Vec3::ZERO, Vec3::X, &phase, &Empty, &Empty, &lights, 1, Steps::Length(0.1), &mut rng);
-/// assert!((sums.value[0] - 0.0198943).abs() < 1e-6);
+/// # use fogbow::{sampling::Generator, single_scatter::{Settings, Towards, sample}};
+/// # use fogbow::{transmittance::thickness::Steps, world::World};
+/// let lights = [Light::Point(PointLight::new(Vec3::new(0.0, 0.0, 2.0), Spectrum::ONE)?)];
+/// let world = World { medium: &Empty, scene: &Empty, lights: &lights };
+/// let towards = Towards { to_eye: Vec3::X, phase: &Phase::ISOTROPIC };
+/// let settings = Settings { samples: 1, steps: Steps::Length(0.1) };
+/// let sums = sample(Vec3::ZERO, &towards, &world, &settings, &mut Generator::new(1));
+/// assert!((sums.value[0] - 0.0198943).abs() < 1e-6);   // 1/4 m², over 4π sr
 /// assert_eq!(sums.value, sums.unshadowed);
+/// # Ok::<(), fogbow::light::LightError>(())
 /// ```
 #[must_use]
-pub fn sample(
+pub fn sample<M: Medium + ?Sized, S: Scene + ?Sized>(
     point: Vec3,
-    to_eye: Vec3,
-    phase: &Phase,
-    medium: &(impl Medium + ?Sized),
-    scene: &(impl Scene + ?Sized),
-    lights: &[Light<'_>],
-    samples: u32,
-    steps: Steps,
+    towards: &Towards<'_>,
+    world: &World<'_, M, S>,
+    settings: &Settings,
     rng: &mut (impl Rng + ?Sized),
 ) -> Sums {
     let mut sums = Sums::default();
-    visit_lights(point, medium, scene, lights, samples, steps, rng, |arrival, visible| {
-        sums.add(&arrival.scatter(to_eye, phase), visible);
+    visit_lights(point, world, settings, rng, |arrival, visible| {
+        sums.add(&arrival.scatter(towards.to_eye, towards.phase), visible);
     });
     sums
 }
@@ -133,77 +180,93 @@ pub fn sample(
 ///
 /// ```
 /// # use fogbow::{host::Empty, light::{Light, Sun}, math::Vec3, phase::{Lobe, Phase}, sampling::Generator};
-/// # use fogbow::single_scatter::{Directional, moments, sample_directional};
-/// # use fogbow::{sh::{Coefficient, expansion}, spectrum::Spectrum, transmittance::thickness::Steps};
-/// let lights = [Light::Sun(Sun::new(Vec3::Z, Spectrum::ONE).unwrap())];
+/// # use fogbow::single_scatter::{Directional, Settings, moments, sample_directional};
+/// # use fogbow::{sh::{Coefficient, expansion}, spectrum::Spectrum, transmittance::thickness::Steps, world::World};
+/// let lights = [Light::Sun(Sun::new(Vec3::Z, Spectrum::ONE)?)];
+/// let world = World { medium: &Empty, scene: &Empty, lights: &lights };
 /// let f = moments(&Phase::from(Lobe::HenyeyGreenstein { g: 0.4 }), 2);
 /// let mut coefficients = [Coefficient::ZERO; 9];
 /// let mut into = Directional { moments: &f[..3], coefficients: &mut coefficients };
-/// let steps = Steps::Length(0.1);
-/// sample_directional(Vec3::ZERO, &Empty, &Empty, &lights, 1, steps, &mut Generator::new(1), &mut into);
+/// let settings = Settings { samples: 1, steps: Steps::Length(0.1) };
+/// sample_directional(Vec3::ZERO, &mut into, &world, &settings, &mut Generator::new(1));
 /// let seen = |to_eye| expansion::value_with_gradient(&coefficients, to_eye).0[0];
 /// assert!(seen(Vec3::NEG_Z) > seen(Vec3::Z));   // brighter against the light
+/// # Ok::<(), fogbow::light::LightError>(())
 /// ```
-pub fn sample_directional(
+pub fn sample_directional<M: Medium + ?Sized, S: Scene + ?Sized>(
     point: Vec3,
-    medium: &(impl Medium + ?Sized),
-    scene: &(impl Scene + ?Sized),
-    lights: &[Light<'_>],
-    samples: u32,
-    steps: Steps,
-    rng: &mut (impl Rng + ?Sized),
     into: &mut Directional<'_>,
+    world: &World<'_, M, S>,
+    settings: &Settings,
+    rng: &mut (impl Rng + ?Sized),
 ) -> Sums {
     let mut sums = Sums::default();
-    visit_lights(point, medium, scene, lights, samples, steps, rng, |arrival, visible| {
+    visit_lights(point, world, settings, rng, |arrival, visible| {
         let weight = if visible { 1.0 } else { 0.0 };
         sums.add(&arrival.scatter_directional(into.moments, weight, into.coefficients), visible);
     });
     sums
 }
 
-/// Light from surfaces, scattered once at `point` towards `to_eye`: see [`visit_surfaces`].
+/// Light from surfaces, scattered once at `point`: see [`visit_surfaces`].
 ///
 /// ```
 /// # use fogbow::{host::Empty, math::Vec3, phase::Phase, sampling::Generator, spectrum::Spectrum};
-/// # use fogbow::{single_scatter::sample_surfaces, transmittance::thickness::Steps};
-/// let (phase, steps, mut rng) = (Phase::ISOTROPIC, Steps::Length(0.1), Generator::new(1));
-/// let glow = |_: &_, _: &_| Spectrum::ONE;
-/// let sums = sample_surfaces(Vec3::ZERO, Vec3::X, &phase, &Empty, &Empty, glow, 16, steps, &mut rng);
+/// # use fogbow::single_scatter::{Settings, Towards, sample_surfaces};
+/// # use fogbow::{transmittance::thickness::Steps, world::World};
+/// let world = World { medium: &Empty, scene: &Empty, lights: &[] };
+/// let towards = Towards { to_eye: Vec3::X, phase: &Phase::ISOTROPIC };
+/// let settings = Settings { samples: 16, steps: Steps::Length(0.1) };
+/// let sums = sample_surfaces(Vec3::ZERO, &towards, &world, |_, _| Spectrum::ONE, &settings, &mut Generator::new(1));
 /// assert_eq!(sums.value, Spectrum::ZERO);   // a world without surfaces
 /// ```
 #[must_use]
-pub fn sample_surfaces(
+pub fn sample_surfaces<M: Medium + ?Sized, S: Scene + ?Sized>(
     point: Vec3,
-    to_eye: Vec3,
-    phase: &Phase,
-    medium: &(impl Medium + ?Sized),
-    scene: &(impl Scene + ?Sized),
+    towards: &Towards<'_>,
+    world: &World<'_, M, S>,
     outgoing: impl FnMut(&Ray, &Hit) -> Spectrum,
-    samples: u32,
-    steps: Steps,
+    settings: &Settings,
     rng: &mut (impl Rng + ?Sized),
 ) -> Sums {
     let mut sums = Sums::default();
-    visit_surfaces(point, medium, scene, outgoing, samples, steps, rng, |arrival| {
-        sums.add(&arrival.scatter(to_eye, phase), true);
+    visit_surfaces(point, world, outgoing, settings, rng, |arrival| {
+        sums.add(&arrival.scatter(towards.to_eye, towards.phase), true);
     });
     sums
 }
 
 /// [`sample_surfaces`] for all directions at once, as [`sample_directional`].
-pub fn sample_surfaces_directional(
+///
+/// ```
+/// # use fogbow::{host::{Empty, Hit, Scene}, math::{Ray, Vec3}, phase::Phase, sampling::Generator, surface::Surface};
+/// # use fogbow::single_scatter::{Directional, Settings, moments, sample_surfaces_directional};
+/// # use fogbow::{sh::Coefficient, spectrum::Spectrum, transmittance::thickness::Steps, world::World};
+/// /// The inside of a ball.
+/// struct Shell;
+/// impl Scene for Shell {
+///     fn closest_hit(&self, ray: &Ray) -> Option<Hit> {
+///         Some(Hit { distance: 2.0, normal: -ray.direction, surface: Surface::BLACK, light: None })
+///     }
+/// }
+/// let world = World { medium: &Empty, scene: &Shell, lights: &[] };
+/// let f = moments(&Phase::ISOTROPIC, 0);
+/// let mut into = Directional { moments: &f[..1], coefficients: &mut [Coefficient::ZERO] };
+/// let settings = Settings { samples: 16, steps: Steps::Length(0.1) };
+/// let glow = |_: &Ray, _: &Hit| Spectrum::ONE;
+/// let sums = sample_surfaces_directional(Vec3::ZERO, &mut into, &world, glow, &settings, &mut Generator::new(1));
+/// assert!((sums.value[0] - 1.0).abs() < 1e-5);   // as bright as what surrounds it
+/// ```
+pub fn sample_surfaces_directional<M: Medium + ?Sized, S: Scene + ?Sized>(
     point: Vec3,
-    medium: &(impl Medium + ?Sized),
-    scene: &(impl Scene + ?Sized),
-    outgoing: impl FnMut(&Ray, &Hit) -> Spectrum,
-    samples: u32,
-    steps: Steps,
-    rng: &mut (impl Rng + ?Sized),
     into: &mut Directional<'_>,
+    world: &World<'_, M, S>,
+    outgoing: impl FnMut(&Ray, &Hit) -> Spectrum,
+    settings: &Settings,
+    rng: &mut (impl Rng + ?Sized),
 ) -> Sums {
     let mut sums = Sums::default();
-    visit_surfaces(point, medium, scene, outgoing, samples, steps, rng, |arrival| {
+    visit_surfaces(point, world, outgoing, settings, rng, |arrival| {
         sums.add(&arrival.scatter_directional(into.moments, 1.0, into.coefficients), true);
     });
     sums

@@ -7,9 +7,10 @@ use fogbow::multiple_scatter::{self, Walk};
 use fogbow::phase::{Deflection, Lobe, Phase};
 use fogbow::sampling::{Generator, uniform};
 use fogbow::sh::{self, Coefficient, MAX_COEFFICIENTS, MAX_DEGREE, coefficient_count};
-use fogbow::single_scatter::{self, Directional, Sums, moments};
+use fogbow::single_scatter::{self, Directional, Sums, Towards, moments};
 use fogbow::spectrum::{Gradient, Spectrum};
 use fogbow::transmittance::thickness::{Marching, Steps, optical_thickness_with_gradients};
+use fogbow::world::World;
 
 use crate::sections::{ROUNDS, direction, point};
 use crate::walks::{Balls, with_lights};
@@ -85,21 +86,22 @@ pub(crate) fn thickness(out: &mut Digest) {
 
 pub(crate) fn single_scatter(out: &mut Digest) {
     let mut rng = Generator::new(14);
+    let samples = |samples| single_scatter::Settings { samples, steps: STEPS };
     let done = with_lights(|lights| {
         media::each(|medium| {
+            let world = World { medium, scene: &Balls, lights };
             for _ in 0..ESTIMATES {
                 let (at, to_eye) = (point(&mut rng) * 0.4, direction(&mut rng));
                 let phase = medium.properties(at).phase;
-                let once = single_scatter::sample(at, to_eye, &phase, medium, &Balls, lights, 2, STEPS, &mut rng);
-                fold_sums(out, &once);
-                let surfaces =
-                    single_scatter::sample_surfaces(at, to_eye, &phase, medium, &Balls, outgoing, 4, STEPS, &mut rng);
+                let towards = Towards { to_eye, phase: &phase };
+                fold_sums(out, &single_scatter::sample(at, &towards, &world, &samples(2), &mut rng));
+                let surfaces = single_scatter::sample_surfaces(at, &towards, &world, outgoing, &samples(4), &mut rng);
                 fold_sums(out, &surfaces);
 
                 let mut coefficients = [Coefficient::ZERO; coefficient_count(DEGREE)];
                 let known = moments(&phase, DEGREE);
                 let mut into = Directional { moments: &known[..=DEGREE], coefficients: &mut coefficients };
-                let all = single_scatter::sample_directional(at, medium, &Balls, lights, 2, STEPS, &mut rng, &mut into);
+                let all = single_scatter::sample_directional(at, &mut into, &world, &samples(2), &mut rng);
                 fold_sums(out, &all);
                 fold_expansion(out, &coefficients);
             }
@@ -113,11 +115,14 @@ pub(crate) fn multiple_scatter(out: &mut Digest) {
     let done = with_lights(|lights| {
         media::each(|medium| {
             let settings = multiple_scatter::Settings::new(STEPS);
-            let walk = Walk { medium, scene: &Balls, lights, settings };
+            let walk = Walk { world: World { medium, scene: &Balls, lights }, settings };
             for _ in 0..ESTIMATES {
                 let (at, to_eye) = (point(&mut rng) * 0.4, direction(&mut rng));
                 let phase = medium.properties(at).phase;
-                fold_sums(out, &multiple_scatter::sample(&walk, at, to_eye, &phase, outgoing, 4, &mut rng));
+                fold_sums(
+                    out,
+                    &multiple_scatter::sample(at, &Towards { to_eye, phase: &phase }, &walk, outgoing, 4, &mut rng),
+                );
             }
         })
     });
