@@ -8,11 +8,14 @@
 //! | [`distance`] | exponential, truncated exponential, equiangular distances |
 //! | [`discrete`] | choices by weight, in one and two dimensions |
 //! | [`mis`] | multiple importance sampling weights |
+//! | [`source`] | [`Source`]: where the random numbers of a pixel or a path start |
 
 pub mod discrete;
 pub mod distance;
 pub mod mis;
+pub mod source;
 pub mod uniform;
 pub mod warp;
 
+pub use source::{Independent, Source, independent, pixel_key, pixel_seed};
 pub use uniform::{Generator, uniform, uniform2};
