@@ -7,7 +7,7 @@
 //! | [`tiles`] | parallel rendering, the same bits for any number of threads |
 //! | [`progress`] | progress, cancellation |
 //! | [`covariance`] | filling covariance grids in parallel; their files |
-//! | [`photon_beams`] | shooting and gathering photon beams in parallel, pass by pass |
+//! | [`progressive`] | pictures in passes: photon beams, virtual lights |
 //! | [`radiance_cache`] | filling radiance caches in parallel; their files |
 //! | [`image`] | PNG, PFM and (feature `exr`, on by default) OpenEXR files |
 //! | [`image_sampling`] | which pixels are computed, and filling in the others |
@@ -44,8 +44,8 @@ mod files;
 pub mod film;
 pub mod image;
 pub mod image_sampling;
-pub mod photon_beams;
 pub mod progress;
+pub mod progressive;
 pub mod radiance_cache;
 pub mod seed;
 pub mod stats;

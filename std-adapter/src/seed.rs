@@ -2,10 +2,10 @@
 
 use core::convert::Infallible;
 
-pub use fogbow::picture::pixel_key;
 use fogbow::rand_core::TryRng;
 use fogbow::sampling::uniform::mix;
-use fogbow::sampling::{Generator, Source};
+use fogbow::sampling::{Generator, Source, pixel_seed};
+pub use fogbow::sampling::{independent, pixel_key};
 use sobol_burley::parts::{Int4, hash, hash_int4, owen_scramble_int4_rev, owen_scramble_rev, sobol_int4_rev};
 
 /// Which random numbers a picture is made of.
@@ -44,28 +44,8 @@ impl Source for Sequence {
 
     #[inline]
     fn start(&self, seed: u64, key: u64, sample: u32) -> SampleRng {
-        (*self).start(seed, key, sample)
+        Self::start(*self, seed, key, sample)
     }
-}
-
-/// A generator whose numbers have nothing to do with those of any other pixel, sample or seed.
-///
-/// ```
-/// use fogbow::sampling::uniform;
-/// use fogbow_std::seed::independent;
-/// let (mut a, mut b) = (independent(1, 7, 0), independent(1, 7, 1));
-/// assert_ne!(uniform(&mut a), uniform(&mut b));
-/// ```
-#[inline]
-#[must_use]
-pub fn independent(seed: u64, pixel: u64, sample: u32) -> Generator {
-    Generator::new(mix(pixel_seed(seed, pixel)).wrapping_add(u64::from(sample)))
-}
-
-/// Seed of a pixel: two rounds of hashing, so that neither sums nor exclusive-ors of seed and pixel coincide.
-#[inline]
-fn pixel_seed(seed: u64, pixel: u64) -> u64 {
-    mix(mix(seed) ^ pixel)
 }
 
 /// The generator of one sample, as [`Sequence::start`] chose it.

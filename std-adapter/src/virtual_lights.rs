@@ -11,6 +11,7 @@ use core::num::NonZero;
 use fogbow::host::{Medium, Scene};
 use fogbow::math::{Bounds, Ray, Vec3};
 use fogbow::medium::{MediumError, Pyramid};
+use fogbow::path;
 use fogbow::sampling::uniform;
 use fogbow::sampling::uniform::mix;
 use fogbow::spectrum::Spectrum;
@@ -19,7 +20,6 @@ use fogbow::world::World;
 use rayon::iter::{IndexedParallelIterator, IntoParallelIterator, ParallelIterator};
 
 use crate::film::Film;
-use crate::photon_beams::View;
 use crate::progress::Control;
 use crate::seed::{SampleRng, Sequence, independent};
 use crate::stats::{CountingMedium, CountingScene, Tally};
@@ -59,6 +59,17 @@ impl Settings {
             has_mirrors: true,
         }
     }
+}
+
+/// What there is to see.
+#[derive(Debug)]
+pub struct View<'a, M: ?Sized, S: ?Sized> {
+    /// Medium, surfaces, lights.
+    pub world: World<'a, M, S>,
+    /// A box around surfaces and media: see [`fogbow::light::Light::emit`].
+    pub bounds: Bounds,
+    /// How long paths may grow, from the eye and from the lights.
+    pub paths: path::Settings,
 }
 
 /// Why rendering ended without a result.
@@ -162,7 +173,7 @@ where
 /// ```
 /// use fogbow::{host::Empty, light::{Light, PointLight}, math::*, medium::Homogeneous, phase::Phase, spectrum::Spectrum, world::World};
 /// use fogbow::vpl::Bound;
-/// use fogbow_std::{photon_beams::View, virtual_lights::{Settings, lights, paths_for}};
+/// use fogbow_std::virtual_lights::{Settings, View, lights, paths_for};
 /// let fog = Homogeneous::new(Spectrum::ONE, Spectrum::ONE, Phase::ISOTROPIC)?;
 /// let lamps = [Light::Point(PointLight::from_flux(Vec3::ZERO, Spectrum::ONE)?)];
 /// let bounds = Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE };

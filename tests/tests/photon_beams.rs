@@ -2,7 +2,7 @@
 
 use core::num::NonZero;
 
-use fogbow::beams::{Beams, Piece, kernel, pieces, shoot};
+use fogbow::beams::{Beams, Output, Pass, PassError, Piece, Settings, kernel, pieces, shoot};
 use fogbow::host::{Empty, Hit, Medium, Rng, Scene};
 use fogbow::light::{Light, PointLight, QuadLight};
 use fogbow::math::{Bounds, Ray, Vec3, float::PI};
@@ -13,10 +13,12 @@ use fogbow::sampling::warp::uniform_sphere;
 use fogbow::sampling::{Generator, uniform, uniform2};
 use fogbow::spectrum::Spectrum;
 use fogbow::surface::Surface;
-use fogbow::world::World;
+use fogbow::work;
+use fogbow::world::{Outline, World};
 use fogbow_std::film::Film;
-use fogbow_std::photon_beams::{self, BeamsError, Settings, View};
 use fogbow_std::progress::Control;
+use fogbow_std::progressive::{self, ProgressiveError};
+use fogbow_std::seed::SampleRng;
 use fogbow_std::tiles;
 use fogbow_tests::estimate::estimate;
 use fogbow_tests::hosts::{Analytic, Body, Field, Filled};
@@ -322,23 +324,36 @@ fn blocks(film: &Film) -> Vec<f64> {
     sums
 }
 
-fn by_beams<M: Medium + Sync>(medium: &M, paths: path::Settings, tiles: tiles::Settings) -> Film {
-    let lights = lamp();
-    let view = View { world: World { medium, scene: &Room, lights: &lights }, bounds: BOUNDS, paths };
-    let settings = Settings {
-        paths: 512,
-        samples: NonZero::new(4).unwrap(),
-        radius: 0.03,
-        longest: 0.4,
-        ..Settings::new(&BOUNDS)
+fn usual() -> Settings {
+    Settings::for_outline(&Outline::of(&World { medium: &Empty, scene: &Empty, lights: &[] }, BOUNDS))
+}
+
+fn render(
+    film: &mut Film,
+    tiles: &tiles::Settings,
+    settings: &Settings,
+    world: &World<'_, impl Medium + Sync, impl Scene + Sync>,
+) -> Result<tiles::Outcome, ProgressiveError<PassError>> {
+    let settings = &Settings { seed: tiles.seed, ..*settings };
+    let make = |pass: u32, runner: &progressive::Runner<'_>| {
+        let mut pass = Pass::new(settings, pass, |_, radius| radius);
+        runner.run(&mut pass, world);
+        pass.finish()
     };
-    let mut film = Film::new(SIDE, SIDE, &NAMES).unwrap();
-    let ray = |sample: &tiles::Sample<'_>, rng: &mut fogbow_std::seed::SampleRng| {
+    let sample = |beams: &Beams<'_>, sample: &tiles::Sample<'_>, rng: &mut SampleRng, layers: &mut [Spectrum]| {
         let jitter = uniform2(rng);
-        eye_ray(sample.x as f32 + jitter.x, sample.y as f32 + jitter.y)
+        let ray = eye_ray(sample.x as f32 + jitter.x, sample.y as f32 + jitter.y);
+        write(&beams.radiance(&ray, world, &settings.walk, settings.share(sample.index), rng), layers);
     };
-    let control = Control::default();
-    photon_beams::render(&mut film, &tiles, &settings, &control, &view, ray, |_| true, |_, pass| pass, write).unwrap();
+    let passes = tiles::Passes { length: NonZero::new(settings.samples).unwrap(), may_break: false };
+    progressive::render(film, tiles, &Control::default(), passes, make, sample)
+}
+
+fn by_beams<M: Medium + Sync>(medium: &M, walk: path::Settings, tiles: tiles::Settings) -> Film {
+    let lights = lamp();
+    let settings = Settings { walk, paths: 512, samples: 4, radius: 0.03, longest: 0.4, ..usual() };
+    let mut film = Film::new(SIDE, SIDE, &NAMES).unwrap();
+    render(&mut film, &tiles, &settings, &World { medium, scene: &Room, lights: &lights }).unwrap();
     film
 }
 
@@ -411,15 +426,16 @@ fn pictures_by_beams_are_those_of_the_path_tracer() {
 fn wide_beams_are_fewer_and_keep_their_light() {
     let (room, lights) = (foggy_room(), lamp());
     let world = World { medium: &room, scene: &Room, lights: &lights };
-    let view = View { world, bounds: BOUNDS, paths: path::Settings::default() };
     let (narrow, wide) = (0.05_f32, 0.2_f32);
     let (mut all, mut kept) = (0, 0);
     // Of the same paths, so that only what thinning does is left.
     let difference = estimate(200, |rng| {
         let seed = rng.next_u64();
         let [every, some] = [wide, narrow].map(|radius| {
-            let settings = Settings { paths: 64, radius, longest: 0.4, ..Settings::new(&BOUNDS) };
-            photon_beams::shoot(&view, &settings, |_, _| wide, 0, seed).unwrap()
+            let settings = Settings { paths: 64, radius, longest: 0.4, seed, ..usual() };
+            let mut pass = Pass::new(&settings, 0, |_, _| wide);
+            work::finish(&mut pass, &world, &mut Output::default());
+            pass.finish().unwrap()
         });
         all += every.pieces().len();
         kept += some.pieces().len();
@@ -449,21 +465,15 @@ fn beams_give_the_same_bits_for_any_number_of_threads() {
 #[test]
 fn what_beams_cannot_do_is_an_error() {
     let render = |medium: &Homogeneous, settings: Settings| {
-        let view = View {
-            world: World { medium, scene: &Empty, lights: &[] },
-            bounds: BOUNDS,
-            paths: path::Settings::default(),
-        };
         let mut film = Film::new(2, 2, &NAMES).unwrap();
-        let tiles = tiles::Settings::default();
-        let ray = |_: &tiles::Sample<'_>, _: &mut fogbow_std::seed::SampleRng| eye_ray(1.0, 1.0);
-        photon_beams::render(&mut film, &tiles, &settings, &Control::default(), &view, ray, |_| true, |_, r| r, write)
+        let world = World { medium, scene: &Empty, lights: &[] };
+        render(&mut film, &tiles::Settings::default(), &settings, &world)
     };
-    let good = Settings::new(&BOUNDS);
+    let good = usual();
     // Without lights there is nothing to send: black, and no error.
     assert!(render(&fog(0.1, 1.0, 0.0), good).is_ok());
     let glowing = fog(0.1, 1.0, 0.0).with_emission(Spectrum::ONE).unwrap();
-    assert_eq!(render(&glowing, good).unwrap_err(), BeamsError::Glowing);
+    assert_eq!(render(&glowing, good).unwrap_err(), ProgressiveError::Method(PassError::Glowing));
     for bad in [
         Settings { paths: 0, ..good },
         Settings { radius: 0.0, ..good },
@@ -471,8 +481,52 @@ fn what_beams_cannot_do_is_an_error() {
         Settings { longest: f32::INFINITY, ..good },
         Settings { alpha: 1.5, ..good },
     ] {
-        assert_eq!(render(&fog(0.1, 1.0, 0.0), bad).unwrap_err(), BeamsError::Settings);
+        assert_eq!(render(&fog(0.1, 1.0, 0.0), bad).unwrap_err(), ProgressiveError::Method(PassError::Settings));
     }
+}
+
+#[test]
+fn what_lent_memory_cannot_hold_is_an_error_and_no_part_of_the_light() {
+    let (room, lights) = (foggy_room(), lamp());
+    let world = World { medium: &room, scene: &Room, lights: &lights };
+    let settings = Settings { paths: 200, ..usual() };
+    let grown = || {
+        let mut pass = Pass::new(&settings, 3, |_, radius| radius);
+        work::finish(&mut pass, &world, &mut Output::default());
+        pass.finish().unwrap()
+    };
+    let expected = grown();
+    let count = expected.pieces().len();
+    let lent = |pieces: usize, nodes: usize, of_job: usize| {
+        let (mut pieces, mut nodes) = (vec![Piece::default(); pieces], vec![fogbow::beams::Node::default(); nodes]);
+        let mut slots = vec![Piece::default(); of_job];
+        let beams = Beams::new(&mut pieces[..], &mut nodes[..]);
+        let mut pass = Pass::new_in(beams, &settings, 3, |_, radius| radius);
+        work::finish(&mut pass, &world, &mut Output::new(&mut slots[..]));
+        pass.finish().map(|beams| beams.pieces().to_vec())
+    };
+    assert_eq!(lent(count, count + 1, count).as_deref(), Ok(expected.pieces()));
+    assert_eq!(lent(count - 1, count + 1, count), Err(PassError::TooMany));
+    assert_eq!(lent(count, 1, count), Err(PassError::TooMany));
+    assert_eq!(lent(count, count + 1, 8), Err(PassError::TooMany));
+}
+
+#[test]
+fn a_pass_that_is_stopped_keeps_all_light() {
+    let (room, lights) = (foggy_room(), lamp());
+    let world = World { medium: &room, scene: &Room, lights: &lights };
+    let settings = Settings { paths: 200, ..usual() };
+    let mut pass = Pass::new(&settings, 0, |_, radius| radius);
+    work::step(&mut pass, &world, &mut Output::default());
+    let part = pass.finish().unwrap();
+    // The first 64 paths, as many as a job has.
+    let mut pass = Pass::new(&Settings { paths: 64, ..settings }, 0, |_, radius| radius);
+    work::finish(&mut pass, &world, &mut Output::default());
+    let whole = pass.finish().unwrap();
+    assert_eq!(part.pieces(), whole.pieces());
+    let [part, whole] =
+        [part, whole].map(|beams| beams.gather(&eye_ray(4.0, 7.0), &room, u32::MAX, &mut Generator::new(1)));
+    assert!(part == whole && !part.light.single.is_black());
 }
 
 #[test]

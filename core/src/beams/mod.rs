@@ -16,6 +16,8 @@
 //! | `tree` | [`Node`]: boxes around pieces |
 //! | `thickness` | optical thickness along an eye ray |
 //! | [`gather`] | [`Beams`], what they scatter to an eye |
+//! | `settings` | [`Settings`]: every tuned number, from an [`Outline`](crate::world::Outline) |
+//! | `pass` | [`Pass`]: shooting as work in rounds; a sample of a pixel |
 //!
 //! Departures from the paper: the blur is a disc across the *beam*, and its integral along the eye ray is
 //! taken in closed form. So no `1/sin θ` is left: the chord through a beam's cylinder grows as beams become
@@ -30,10 +32,14 @@
 
 pub mod gather;
 pub mod kernel;
+mod pass;
 pub mod piece;
+mod settings;
 mod thickness;
 mod tree;
 
 pub use gather::{Beams, Gathered};
+pub use pass::{Output, Pass, PassError};
 pub use piece::{Piece, pieces, shoot};
+pub use settings::Settings;
 pub use tree::Node;

@@ -18,10 +18,10 @@
 use core::fmt;
 
 use super::bytes::{self, BytesError};
-use super::record::Attachment;
 use super::caches::RadianceCaches;
 use super::kind::Kind;
 use super::radius::Limits;
+use super::record::Attachment;
 use super::settings::Effort;
 use super::slot::Slot;
 use super::store::Cache;

@@ -12,4 +12,4 @@ mod noise;
 mod tiles;
 
 pub use noise::Goal;
-pub use tiles::{Counts, Integrand, Output, Sample, Settings, Tally, Tiles, accumulate, pixel_key};
+pub use tiles::{Counts, Integrand, Output, Sample, Settings, Tally, Tiles, accumulate};

@@ -3,7 +3,7 @@
 use core::ops::Range;
 
 use super::noise::{Goal, Noise, Part};
-use crate::sampling::Source;
+use crate::sampling::{Source, pixel_key};
 use crate::spectrum::Spectrum;
 use crate::storage::List;
 use crate::work::Rounds;
@@ -411,18 +411,6 @@ where
     fn stage(&self) -> &'static str {
         "render"
     }
-}
-
-/// One number for a pixel, whatever the size of the picture.
-///
-/// ```
-/// use fogbow::picture::pixel_key;
-/// assert_ne!(pixel_key(3, 4), pixel_key(4, 3));
-/// ```
-#[inline]
-#[must_use]
-pub fn pixel_key(x: u32, y: u32) -> u64 {
-    u64::from(y) << 32 | u64::from(x)
 }
 
 /// Adds a sample to the sums of one pixel, layer by layer.

@@ -7,15 +7,15 @@
 //! | [`warp`] | spheres, hemispheres, cones, discs, triangles, rectangles seen from a point |
 //! | [`distance`] | exponential, truncated exponential, equiangular distances |
 //! | [`discrete`] | choices by weight, in one and two dimensions |
-//! | `source` | [`Source`]: a generator for every sample of every pixel |
 //! | [`mis`] | multiple importance sampling weights |
+//! | [`source`] | [`Source`]: where the random numbers of a pixel or a path start |
 
 pub mod discrete;
 pub mod distance;
 pub mod mis;
-mod source;
+pub mod source;
 pub mod uniform;
 pub mod warp;
 
-pub use source::{Independent, Source};
+pub use source::{Independent, Source, independent, pixel_key, pixel_seed};
 pub use uniform::{Generator, uniform, uniform2};

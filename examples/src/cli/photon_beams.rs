@@ -3,17 +3,20 @@
 use core::num::NonZero;
 
 use clap::{Args, ValueEnum};
-use fogbow::beams::kernel;
+use fogbow::beams::{self, Settings, kernel};
 use fogbow::covariance::Radii;
 use fogbow::host::Medium;
 use fogbow::math::Vec3;
+use fogbow::world::{Outline, World as LitWorld};
 use fogbow_std::film::Film;
-use fogbow_std::photon_beams::{self, Settings, View};
-use fogbow_std::tiles::Outcome;
+use fogbow_std::progressive;
+use fogbow_std::stats::{CountingMedium, CountingScene};
+use fogbow_std::threads::{self, Threads};
+use fogbow_std::tiles::{Outcome, Passes};
 
 use super::render::{Shot, write_layers};
 use super::{Failure, output};
-use crate::world::{WithMedium, World};
+use crate::world::WithMedium;
 
 /// Options of `--method photon-beams`.
 #[derive(Debug, Clone, Args)]
@@ -32,15 +35,16 @@ pub struct BeamArguments {
     /// Radius of the blur in the first pass, in the scene's unit of length [default: 0.005 of the scene's diagonal].
     #[arg(long, value_name = "R", value_parser = output::positive)]
     pub radius: Option<f64>,
-    /// Bias that `--kernel covariance` allows, as a part of the light itself.
-    #[arg(long, value_name = "BETA", value_parser = output::positive, default_value_t = 0.02)]
-    pub bias: f64,
+    /// Bias that `--kernel covariance` allows, as a part of the light itself [default: 0.02].
+    #[arg(long, value_name = "BETA", value_parser = output::positive)]
+    pub bias: Option<f64>,
     /// Greatest radius of `--kernel covariance` [default: 0.05 of the scene's diagonal].
     #[arg(long, value_name = "R", value_parser = output::positive)]
     pub radius_most: Option<f64>,
-    /// How fast the blur narrows, in (0, 1]: after i passes its square has shrunk by about i^(alpha-1).
-    #[arg(long, value_name = "ALPHA", value_parser = alpha, default_value_t = 0.6)]
-    pub alpha: f32,
+    /// How fast the blur narrows, in (0, 1]: after i passes its square has shrunk by about i^(alpha-1)
+    /// [default: 0.6].
+    #[arg(long, value_name = "ALPHA", value_parser = alpha)]
+    pub alpha: Option<f32>,
 }
 
 /// How wide beams are blurred.
@@ -60,13 +64,17 @@ fn alpha(text: &str) -> Result<f32, String> {
 }
 
 impl BeamArguments {
-    fn settings(&self, world: &World<'_>) -> Settings {
-        let usual = Settings::new(&world.bounds());
+    fn settings(&self, outline: &Outline, pixels: u64, shot: &Shot<'_>) -> Settings {
+        let usual = Settings::for_outline(outline).for_pixels(pixels);
         Settings {
+            walk: shot.paths,
             paths: self.beams.unwrap_or(usual.paths),
-            samples: self.pass_samples.unwrap_or(usual.samples),
+            samples: self.pass_samples.map_or(usual.samples, NonZero::get),
             radius: self.radius.map_or(usual.radius, |r| r as f32),
-            alpha: self.alpha,
+            alpha: self.alpha.unwrap_or(usual.alpha),
+            bias: self.bias.map_or(usual.bias, |bias| bias as f32),
+            widest: self.radius_most.map_or(usual.widest, |r| r as f32),
+            seed: shot.settings.seed,
             ..usual
         }
     }
@@ -85,35 +93,45 @@ impl WithMedium for BeamJob<'_> {
     fn with<M: Medium + Sync>(self, medium: &M) -> Self::Output {
         let shot = self.shot;
         let (width, height) = (self.film.width(), self.film.height());
-        let view = View {
-            world: fogbow::world::World { medium, scene: shot.world, lights: shot.lights },
-            bounds: shot.world.bounds(),
-            paths: shot.paths,
-        };
-        let mut settings = self.arguments.settings(shot.world);
+        let world = LitWorld { medium, scene: shot.world, lights: shot.lights };
+        let pixels = u64::from(width) * u64::from(height);
+        let mut settings = self.arguments.settings(&shot.world.outline(&world), pixels, &shot);
         if self.arguments.beams.is_none() {
-            let pieces = (u64::from(width) * u64::from(height) * 4).clamp(1 << 14, 1 << 22) as u32;
-            settings.paths = photon_beams::paths_for(&view, &settings, pieces, shot.settings.seed)?;
+            let mut pilot = beams::Pass::pilot(&settings);
+            let threads = Threads::new(shot.settings.threads)?;
+            threads::run(&mut pilot, &world, &threads, shot.control, None, |_| {});
+            settings = pilot.settings_for_pieces();
         }
         let grid = shot.grid.filter(|_| self.arguments.kernel == Kernel::Covariance);
         let mut storage = vec![0.0; grid.map_or(0, |grid| grid.lattice().cell_count())];
-        let most = self.arguments.radius_most.map_or(0.05 * shot.world.bounds().size().length(), |r| r as f32);
-        let bias = self.arguments.bias as f32;
         let radii = match grid {
-            Some(grid) => Some(Radii::new(grid, bias, kernel::SECOND_MOMENT, most, &mut storage)?),
+            Some(grid) => Some(Radii::new(grid, settings.bias, kernel::SECOND_MOMENT, settings.widest, &mut storage)?),
             None => None,
         };
         let radius = |point: Vec3, pass: f32| radii.map_or(pass, |radii| radii.at(point).max(pass));
-        let outcome = photon_beams::render(
+        let length = NonZero::new(settings.samples).unwrap_or(NonZero::<u32>::MIN);
+        let outcome = progressive::render(
             self.film,
             shot.settings,
-            &settings,
             shot.control,
-            &view,
-            |sample, rng| shot.eye_ray(sample, (width, height), rng),
-            |sample| shot.is_computed(sample, width),
-            radius,
-            write_layers,
+            Passes { length, may_break: false },
+            |pass, runner| {
+                let mut pass = beams::Pass::new(&settings, pass, radius);
+                runner.run(&mut pass, &world);
+                pass.finish()
+            },
+            |beams, sample, rng, layers| {
+                let world = LitWorld {
+                    medium: &CountingMedium { medium, tally: sample.tally },
+                    scene: &CountingScene { scene: shot.world, tally: sample.tally },
+                    lights: shot.lights,
+                };
+                let ray = shot.eye_ray(sample, (width, height), rng);
+                let share = if shot.is_computed(sample, width) { settings.share(sample.index) } else { 0.0 };
+                let seen = beams.radiance(&ray, &world, &settings.walk, share, rng);
+                sample.tally.collide(seen.collisions);
+                write_layers(&seen, layers);
+            },
         )?;
         Ok(outcome)
     }

@@ -9,9 +9,8 @@ use fogbow::math::Bounds;
 use fogbow::spectrum::Spectrum;
 use fogbow::vpl::{self, Bound, Compensation, LEVELS, Seen};
 use fogbow_std::film::Film;
-use fogbow_std::photon_beams::View;
 use fogbow_std::tiles::Outcome;
-use fogbow_std::virtual_lights::{self, Settings};
+use fogbow_std::virtual_lights::{self, Settings, View};
 
 use super::Failure;
 use super::render::{LAYERS, Shot, write_layers};

@@ -12,10 +12,9 @@ use fogbow::spectrum::Spectrum;
 use fogbow::vpl::{self, Bound, Compensation, EyeSettings, Flights, Gatherer};
 use fogbow::world::World as LitWorld;
 use fogbow_std::film::{Film, Image};
-use fogbow_std::photon_beams::View;
 use fogbow_std::progress::Control;
 use fogbow_std::tiles;
-use fogbow_std::virtual_lights::{self, Settings};
+use fogbow_std::virtual_lights::{self, Settings, View};
 
 use super::engelhardt::{mean, strip};
 use super::judged::Judges;

@@ -1,0 +1,290 @@
+//! Shooting the beams of a pass, as work in rounds.
+
+use core::ops::Range;
+
+use glam::Vec3;
+
+use super::piece::shoot;
+use super::{Beams, Piece, Settings};
+use crate::host::{Medium, Rng, Scene};
+use crate::math::Ray;
+use crate::path::{self, InScattered, Radiance};
+use crate::sampling::uniform::mix;
+use crate::sampling::{Generator, independent, uniform};
+use crate::storage::List;
+use crate::work::Rounds;
+use crate::world::World;
+
+/// Paths of one job: part of the result, because each job has a key of random numbers. More: jobs take longer than some
+/// milliseconds in dense worlds.
+const JOB: u32 = 64;
+
+/// Why there are no beams.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum PassError {
+    /// No paths or samples, or a radius, length or `alpha` out of range.
+    Settings,
+    /// The medium glows; photons leave lights only, so light of the medium that it scatters itself would be missing.
+    Glowing,
+    /// More pieces of beams than lent memory holds or 32 bits count.
+    TooMany,
+}
+
+impl core::fmt::Display for PassError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.write_str(match self {
+            Self::Settings => "photon beams need paths, positive lengths, and alpha in (0, 1]",
+            Self::Glowing => "photon beams do not know light of glowing media: take another method",
+            Self::TooMany => "too many photon beams",
+        })
+    }
+}
+
+impl core::error::Error for PassError {}
+
+/// What a job of a [`Pass`] leaves.
+#[derive(Debug)]
+#[cfg_attr(feature = "alloc", derive(Default))]
+pub struct Output<'o> {
+    pieces: List<'o, Piece>,
+    error: Option<PassError>,
+}
+
+impl<'o> Output<'o> {
+    /// In lent memory: for the pieces that 64 paths leave. Where that is too small, the pass ends with
+    /// [`PassError::TooMany`].
+    ///
+    /// ```
+    /// # use fogbow::beams::{Output, Piece};
+    /// let mut slots = [Piece::default(); 4096];
+    /// let output = Output::new(&mut slots[..]);
+    /// # let _ = output;
+    /// ```
+    pub fn new(pieces: impl Into<List<'o, Piece>>) -> Self {
+        Self { pieces: pieces.into(), error: None }
+    }
+}
+
+/// The beams of one pass, blurred as a function `radius` of a point (m) and of the pass's radius (m) says: `|_, pass| pass` for progressive photon
+/// beams, `|point, pass| pass.max(…)` where something is known of how fast light changes. [`Rounds`] of jobs of 64 paths
+/// in a [`World`].
+///
+/// ```
+/// use fogbow::beams::{Output, Pass, Settings};
+/// use fogbow::{host::Empty, light::{Light, PointLight}, math::*, medium::Homogeneous, phase::Phase};
+/// use fogbow::{sampling::Generator, spectrum::Spectrum, work, world::{Outline, World}};
+/// let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::ONE, Phase::ISOTROPIC)?;
+/// let lamps = [Light::Point(PointLight::from_flux(Vec3::ZERO, Spectrum::ONE)?)];
+/// let world = World { medium: &fog, scene: &Empty, lights: &lamps };
+/// let outline = Outline::of(&world, Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE });
+/// // A pilot tells how many paths leave 20 000 pieces.
+/// let settings = Settings { pieces: 20_000, ..Settings::for_outline(&outline) };
+/// let mut pilot = Pass::pilot(&settings);
+/// work::finish(&mut pilot, &world, &mut Output::default());
+/// let settings = pilot.settings_for_pieces();
+/// let mut pass = Pass::new(&settings, 0, |_, pass| pass);
+/// work::finish(&mut pass, &world, &mut Output::default());
+/// let beams = pass.finish()?;
+/// assert!((18_000..22_000).contains(&beams.pieces().len()));
+/// // A sample of a pixel.
+/// let eye = Ray::new(Vec3::NEG_Z, Vec3::new(0.6, 0.0, 0.8));
+/// let seen = beams.radiance(&eye, &world, &settings.walk, settings.share(0), &mut Generator::new(1));
+/// assert!(seen.medium_single[0] > 0.0);
+/// # Ok::<(), Box<dyn core::error::Error>>(())
+/// ```
+#[derive(Debug)]
+pub struct Pass<'s, R> {
+    settings: Settings,
+    /// Seed of this pass, and its number.
+    seed: u64,
+    number: u32,
+    radius: R,
+    /// Radius (m) of this pass.
+    of_pass: f32,
+    beams: Beams<'s>,
+    /// Jobs whose beams are in.
+    taken: u32,
+    error: Option<PassError>,
+}
+
+/// The number of a pass that is never rendered.
+const PILOT: u32 = u32::MAX;
+
+impl<'s> Pass<'s, fn(Vec3, f32) -> f32> {
+    /// A pass that is never rendered, of 2048 paths: see [`Pass::settings_for_pieces`].
+    #[cfg(feature = "alloc")]
+    #[must_use]
+    pub fn pilot(settings: &Settings) -> Self {
+        Self::pilot_in(Beams::new(alloc::vec::Vec::new(), alloc::vec::Vec::new()), settings)
+    }
+
+    /// As [`Pass::pilot`], in the memory of `beams`.
+    #[must_use]
+    pub fn pilot_in(beams: Beams<'s>, settings: &Settings) -> Self {
+        Self::new_in(beams, &settings.of_pilot(), PILOT, |_, pass| pass)
+    }
+}
+
+#[cfg(feature = "alloc")]
+impl<R: Fn(Vec3, f32) -> f32> Pass<'static, R> {
+    /// Pass number `number`; see [`Pass`].
+    #[must_use]
+    pub fn new(settings: &Settings, number: u32, radius: R) -> Self {
+        Self::new_in(Beams::new(alloc::vec::Vec::new(), alloc::vec::Vec::new()), settings, number, radius)
+    }
+}
+
+impl<'s, R: Fn(Vec3, f32) -> f32> Pass<'s, R> {
+    /// As [`Pass::new`], in the memory of `beams`, which are forgotten. Where that is lent and too small, [`Pass::finish`] says so.
+    ///
+    /// ```
+    /// use fogbow::beams::{Beams, Node, Output, Pass, Piece, Settings};
+    /// # use fogbow::{host::Empty, light::{Light, PointLight}, math::*, medium::Homogeneous, phase::Phase};
+    /// # use fogbow::{spectrum::Spectrum, work, world::{Outline, World}};
+    /// # let fog = Homogeneous::new(Spectrum::ONE, Spectrum::ONE, Phase::ISOTROPIC)?;
+    /// # let lamps = [Light::Point(PointLight::from_flux(Vec3::ZERO, Spectrum::ONE)?)];
+    /// # let world = World { medium: &fog, scene: &Empty, lights: &lamps };
+    /// # let outline = Outline::of(&world, Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE });
+    /// let settings = Settings { paths: 16, ..Settings::for_outline(&outline) };
+    /// let (mut pieces, mut nodes) = ([Piece::default(); 2048], [Node::default(); 2049]);
+    /// let mut slots = [Piece::default(); 2048];
+    /// let beams = Beams::new(&mut pieces[..], &mut nodes[..]);
+    /// let mut pass = Pass::new_in(beams, &settings, 0, |_, pass| pass);
+    /// work::finish(&mut pass, &world, &mut Output::new(&mut slots[..]));
+    /// assert!(!pass.finish()?.pieces().is_empty());
+    /// # Ok::<(), Box<dyn core::error::Error>>(())
+    /// ```
+    #[must_use]
+    pub fn new_in(mut beams: Beams<'s>, settings: &Settings, number: u32, radius: R) -> Self {
+        beams.clear();
+        Self {
+            settings: *settings,
+            // Photons must have nothing to do with the pixels' numbers.
+            seed: mix(settings.seed ^ 0x9e3d_11b6_0f7c_52a4) ^ u64::from(number),
+            number,
+            radius,
+            of_pass: settings.radius_of(number),
+            beams,
+            taken: 0,
+            error: (!settings.is_valid()).then_some(PassError::Settings),
+        }
+    }
+}
+
+impl<'s, R> Pass<'s, R> {
+    /// The beams, with a tree over them. Of a pass that was stopped they are those of the paths so far, and stand for all light all the
+    /// same.
+    ///
+    /// # Errors
+    /// See [`PassError`].
+    pub fn finish(mut self) -> Result<Beams<'s>, PassError> {
+        if let Some(error) = self.error {
+            return Err(error);
+        }
+        self.beams.build(self.paths()).map_err(|_| PassError::TooMany)?;
+        Ok(self.beams)
+    }
+
+    /// What went wrong so far, if anything: then no jobs are left.
+    #[must_use]
+    pub fn error(&self) -> Option<PassError> {
+        self.error
+    }
+
+    /// The settings with as many paths as leave about [`Settings::pieces`], by the count that this pass left so far.
+    #[must_use]
+    pub fn settings_for_pieces(&self) -> Settings {
+        self.settings.for_pieces(self.beams.pieces().len(), self.paths())
+    }
+
+    /// Paths whose beams are in.
+    fn paths(&self) -> u32 {
+        self.taken.saturating_mul(JOB).min(self.settings.paths)
+    }
+}
+
+impl<M, S, R> Rounds<World<'_, M, S>> for Pass<'_, R>
+where
+    M: Medium + ?Sized,
+    S: Scene + ?Sized,
+    R: Fn(Vec3, f32) -> f32,
+{
+    type Output<'o> = Output<'o>;
+
+    fn jobs(&self) -> Range<u32> {
+        if self.error.is_some() { 0..0 } else { self.taken..self.settings.paths.div_ceil(JOB) }
+    }
+
+    fn run(&self, job: u32, world: &World<'_, M, S>, output: &mut Output<'_>) {
+        output.pieces.clear();
+        output.error = world.medium.is_emissive().then_some(PassError::Glowing);
+        if output.error.is_some() {
+            return;
+        }
+        let Output { pieces, error } = output;
+        let (settings, key) = (&self.settings, u64::from(self.number) << 32 | u64::from(job));
+        let width = |point: Vec3| (self.radius)(point, self.of_pass);
+        for path in job * JOB..(job * JOB).saturating_add(JOB).min(settings.paths) {
+            let mut rng = independent(self.seed, key, path);
+            let mut thin = independent(mix(self.seed), key, path);
+            shoot(world, &settings.bounds, &settings.walk, settings.longest, &mut rng, &mut |piece| {
+                piece.widened(&width, &mut |part| {
+                    if let Some(part) = part.thinned(settings.radius, uniform(&mut thin))
+                        && pieces.push(part).is_err()
+                    {
+                        *error = Some(PassError::TooMany);
+                    }
+                });
+            });
+        }
+    }
+
+    fn accept(&mut self, output: &Output<'_>) {
+        self.error = self.error.or(output.error);
+        for piece in output.pieces.as_slice() {
+            if self.beams.push(*piece).is_err() {
+                self.error = self.error.or(Some(PassError::TooMany));
+            }
+        }
+        self.taken += 1;
+    }
+
+    fn stage(&self) -> &'static str {
+        "shoot"
+    }
+}
+
+impl Beams<'_> {
+    /// A sample of a pixel: the medium's light from the beams, `share` times, that of surfaces by path tracing
+    /// ([`path::radiance_beyond`]).
+    ///
+    /// Gathers cost more than the rest of a sample and are less noisy: so of some samples one gathers for all, and the others have a
+    /// share of 0, which gathers nothing ([`Settings::share`]).
+    ///
+    /// ```
+    /// # use fogbow::{beams::Beams, host::Empty, light::Light, math::*, path, sampling::Generator, spectrum::Spectrum, world::World};
+    /// # let (mut pieces, mut nodes) = ([], []);
+    /// # let beams = Beams::new(&mut pieces[..], &mut nodes[..]);
+    /// // Without beams there is no light of the medium; surfaces and lights are seen all the same.
+    /// let world = World { medium: &Empty, scene: &Empty, lights: &[Light::Constant(Spectrum::ONE)] };
+    /// let eye = Ray::new(Vec3::ZERO, Vec3::Z);
+    /// let seen = beams.radiance(&eye, &world, &path::Settings::default(), 1.0, &mut Generator::new(1));
+    /// assert_eq!(seen.emitted, Spectrum::ONE);
+    /// ```
+    pub fn radiance<M: Medium + ?Sized, S: Scene + ?Sized>(
+        &self,
+        ray: &Ray,
+        world: &World<'_, M, S>,
+        walk: &path::Settings,
+        share: f32,
+        rng: &mut (impl Rng + ?Sized),
+    ) -> Radiance {
+        path::radiance_beyond(ray, world, walk, rng, |segment: &Ray, most, rng: &mut Generator| {
+            if share == 0.0 {
+                return InScattered::default();
+            }
+            let light = self.gather(segment, world.medium, most, rng).light;
+            InScattered { single: light.single * share, multiple: light.multiple * share }
+        })
+    }
+}
