@@ -4,6 +4,7 @@ use core::convert::Infallible;
 
 use fogbow::rand_core::TryRng;
 use fogbow::sampling::Generator;
+pub use fogbow::sampling::independent;
 use fogbow::sampling::uniform::mix;
 use sobol_burley::parts::{Int4, hash, hash_int4, owen_scramble_int4_rev, owen_scramble_rev, sobol_int4_rev};
 
@@ -43,20 +44,6 @@ impl Sequence {
 #[must_use]
 pub fn pixel_key(x: u32, y: u32) -> u64 {
     u64::from(y) << 32 | u64::from(x)
-}
-
-/// A generator whose numbers have nothing to do with those of any other pixel, sample or seed.
-///
-/// ```
-/// use fogbow::sampling::uniform;
-/// use fogbow_std::seed::independent;
-/// let (mut a, mut b) = (independent(1, 7, 0), independent(1, 7, 1));
-/// assert_ne!(uniform(&mut a), uniform(&mut b));
-/// ```
-#[inline]
-#[must_use]
-pub fn independent(seed: u64, pixel: u64, sample: u32) -> Generator {
-    Generator::new(mix(pixel_seed(seed, pixel)).wrapping_add(u64::from(sample)))
 }
 
 /// Seed of a pixel: two rounds of hashing, so that neither sums nor exclusive-ors of seed and pixel coincide.

@@ -15,4 +15,4 @@ pub mod mis;
 pub mod uniform;
 pub mod warp;
 
-pub use uniform::{Generator, uniform, uniform2};
+pub use uniform::{Generator, independent, uniform, uniform2};

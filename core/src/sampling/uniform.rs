@@ -64,6 +64,25 @@ pub fn mix(value: u64) -> u64 {
     z ^ (z >> 31)
 }
 
+/// A generator whose numbers have nothing to do with those of any other sample, key (a pixel, a path) or seed.
+///
+/// ```
+/// # use fogbow::sampling::{independent, uniform};
+/// let (mut a, mut b) = (independent(1, 7, 0), independent(1, 7, 1));
+/// assert_ne!(uniform(&mut a), uniform(&mut b));
+/// ```
+#[inline]
+#[must_use]
+pub fn independent(seed: u64, key: u64, sample: u32) -> Generator {
+    Generator::new(mix(key_seed(seed, key)).wrapping_add(u64::from(sample)))
+}
+
+/// Seed of a key: two rounds of hashing, so that neither sums nor exclusive-ors of seed and key coincide.
+#[inline]
+fn key_seed(seed: u64, key: u64) -> u64 {
+    mix(mix(seed) ^ key)
+}
+
 impl TryRng for Generator {
     type Error = Infallible;
 
