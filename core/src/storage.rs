@@ -164,6 +164,35 @@ impl<T: Copy> List<'_, T> {
         }
     }
 
+    /// Exactly `count` elements, all of them `value`.
+    ///
+    /// ```
+    /// # use fogbow::storage::{Full, List};
+    /// let mut slots = [0u32; 2];
+    /// let mut list = List::from(&mut slots[..]);
+    /// assert_eq!(list.reset(3, 7), Err(Full));
+    /// assert_eq!(list.reset(2, 7), Ok(()));
+    /// assert_eq!(list.as_slice(), [7, 7]);
+    /// ```
+    ///
+    /// # Errors
+    /// [`Full`] when a lent slice has no room for all, or the system no memory; the list is empty then.
+    pub fn reset(&mut self, count: usize, value: T) -> Result<(), Full> {
+        self.clear();
+        match &mut self.0 {
+            Storage::Lent { slots, used } => {
+                slots.get_mut(..count).ok_or(Full)?.fill(value);
+                *used = count;
+            }
+            #[cfg(feature = "alloc")]
+            Storage::Grown(vec) => {
+                vec.try_reserve_exact(count).map_err(|_| Full)?;
+                vec.resize(count, value);
+            }
+        }
+        Ok(())
+    }
+
     /// Forgets all elements and keeps the memory.
     ///
     /// ```

@@ -50,7 +50,7 @@ impl WithMedium for Job<'_> {
             });
             let mut cells = vec![OccluderCell::default(); lattice.cell_count()];
             let clock = Stopwatch::start();
-            let Ok(mut occluders) = Occluders::new(lattice, &mut cells) else { return };
+            let Ok(mut occluders) = Occluders::new(lattice, &mut cells[..]) else { return };
             occluders.add_scene(self.0, 2);
             let looking = clock.elapsed().cpu.unwrap_or(0.0);
             let mut voxels = vec![Voxel::EMPTY; lattice.cell_count()];

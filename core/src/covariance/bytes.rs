@@ -17,11 +17,12 @@ use core::fmt;
 
 use glam::Vec3;
 
-use super::grid::Grid;
+use super::grid::{CovarianceGrid, Grid};
 use super::lattice::Lattice;
 use super::metrics::Voxel;
 use crate::bytes::{Crc, element, elements};
 use crate::math::Bounds;
+use crate::storage::{Full, List};
 
 /// The first bytes: not text, and damaged by whatever changes ends of lines.
 pub const MAGIC: [u8; 8] = *b"\x89FOGCOV\n";
@@ -65,7 +66,7 @@ pub enum BytesError {
     },
     /// A voxel that no photons leave: negative or not finite.
     Voxel(usize),
-    /// The lent storage does not have one element per cell.
+    /// The storage does not have one element per cell.
     Storage,
 }
 
@@ -82,7 +83,7 @@ impl fmt::Display for BytesError {
             Self::Checksum => f.write_str("the bytes are damaged"),
             Self::Tag { found, due } => write!(f, "made for something else (tag {found:016x}, not {due:016x})"),
             Self::Voxel(index) => write!(f, "voxel {index} is impossible"),
-            Self::Storage => f.write_str("the lent storage does not have one element per cell"),
+            Self::Storage => f.write_str("there is no memory for one element per cell"),
         }
     }
 }
@@ -247,4 +248,32 @@ pub fn read_into(bytes: &[u8], tag: u64, voxels: &mut [Voxel]) -> Result<(), Byt
         *voxel = read;
     }
     Ok(())
+}
+
+/// Reads a grid into memory that grows (`List::default()`) or is lent.
+///
+/// # Errors
+/// The first check that fails.
+///
+/// ```
+/// # use fogbow::covariance::{Grid, Lattice, Voxel, bytes};
+/// # use fogbow::math::{Bounds, Vec3};
+/// # let lattice = Lattice::new(Bounds { min: Vec3::ZERO, max: Vec3::ONE }, [2, 1, 1])?;
+/// # let voxels = [Voxel { weight: 1.0, ..Voxel::EMPTY }; 2];
+/// # let mut file = Vec::new();
+/// # let Ok(()) = bytes::write(&Grid::new(lattice, &voxels, 100)?, 7, |part| {
+/// #     file.extend_from_slice(part);
+/// #     Ok::<_, core::convert::Infallible>(())
+/// # });
+/// let mut storage = [Voxel::EMPTY; 2];
+/// let grid = bytes::read(&file, 7, &mut storage[..])?;
+/// assert_eq!((grid.view().voxels(), grid.view().paths()), (&voxels[..], 100));
+/// # Ok::<(), Box<dyn core::error::Error>>(())
+/// ```
+pub fn read<'s>(bytes: &[u8], tag: u64, storage: impl Into<List<'s, Voxel>>) -> Result<CovarianceGrid<'s>, BytesError> {
+    let Header { lattice, paths } = header(bytes, tag)?;
+    let mut voxels = storage.into();
+    voxels.reset(lattice.cell_count(), Voxel::EMPTY).map_err(|Full| BytesError::Storage)?;
+    read_into(bytes, tag, voxels.as_mut_slice())?;
+    Ok(CovarianceGrid::new(lattice, voxels, paths))
 }

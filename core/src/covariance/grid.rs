@@ -5,6 +5,7 @@ use glam::Vec3;
 use super::lattice::{Lattice, LatticeError};
 use super::metrics::Voxel;
 use crate::math::Symmetric3;
+use crate::storage::List;
 
 /// A filled grid, ready to be asked.
 ///
@@ -84,6 +85,33 @@ impl<'a> Grid<'a> {
         let voxel = self.voxel(point)?;
         let volume = self.lattice.cell();
         Some(voxel.weight / (volume.x * volume.y * volume.z * self.paths.max(1) as f32))
+    }
+}
+
+/// A filled grid with its voxels, in lent memory or in memory of its own.
+#[derive(Debug)]
+pub struct CovarianceGrid<'s> {
+    lattice: Lattice,
+    voxels: List<'s, Voxel>,
+    paths: u64,
+}
+
+impl<'s> CovarianceGrid<'s> {
+    /// `voxels` holds one element per cell.
+    pub(super) fn new(lattice: Lattice, voxels: List<'s, Voxel>, paths: u64) -> Self {
+        Self { lattice, voxels, paths }
+    }
+
+    /// The grid, to be asked.
+    #[must_use]
+    pub fn view(&self) -> Grid<'_> {
+        Grid { lattice: self.lattice, voxels: self.voxels.as_slice(), paths: self.paths }
+    }
+
+    /// Bytes of memory held by voxels.
+    #[must_use]
+    pub fn bytes(&self) -> usize {
+        size_of_val(self.voxels.as_slice())
     }
 }
 

@@ -18,7 +18,8 @@
 //! | `lattice` | [`Lattice`]: a box of cells and the walk of a ray through them |
 //! | `occluders` | [`Occluders`]: where surfaces lie, and what passing them does |
 //! | `photon` | [`FrequencyPhotons`]: light fields carried along photon walks (Alg. 2) |
-//! | `grid` | [`Grid`]: Γ anywhere in the volume |
+//! | `grid` | [`Grid`]: Γ anywhere in the volume; [`CovarianceGrid`] with its memory |
+//! | `fill` | [`Fill`]: grids filled, as work in rounds; [`Settings`] |
 //! | `steps` | [`Steps`] along an eye ray (Alg. 1) |
 //! | `radii` | [`Radii`] of kernels anywhere in the volume (Eq. 19) |
 //! | `image` | [`image_covariance`] along an eye ray |
@@ -29,6 +30,7 @@
 
 pub mod bytes;
 mod emission;
+mod fill;
 mod grid;
 mod image;
 mod lattice;
@@ -43,7 +45,8 @@ mod radii;
 mod steps;
 
 pub use emission::emitted;
-pub use grid::{Grid, merge};
+pub use fill::{Deposit, Fill, FillError, Memory, Output, Settings, SurfacePoint};
+pub use grid::{CovarianceGrid, Grid, merge};
 pub use image::image_covariance;
 pub use lattice::{Cells, Crossing, Lattice, LatticeError, MAX_EDGE};
 pub use light_field::{LightField, Patch};

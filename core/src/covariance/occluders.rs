@@ -22,6 +22,7 @@ use super::lattice::{Lattice, LatticeError};
 use super::operators::PER_HESSIAN;
 use crate::host::Scene;
 use crate::math::{Ray, Symmetric3, float};
+use crate::storage::{Full, List};
 use crate::surface::Surface;
 
 /// Least distance to an occluder, in cells. Smaller: rays that graze a surface decide everything. Larger:
@@ -45,7 +46,7 @@ pub struct OccluderCell {
     count: f32,
 }
 
-/// Nearby surfaces, in cells the host lends.
+/// Nearby surfaces, in cells that the host lends or that grow.
 ///
 /// ```
 /// # use fogbow::{covariance::{Lattice, OccluderCell, Occluders}, math::{Bounds, Vec3, float::PI}};
@@ -63,19 +64,17 @@ pub struct OccluderCell {
 #[derive(Debug)]
 pub struct Occluders<'a> {
     lattice: Lattice,
-    cells: &'a mut [OccluderCell],
+    cells: List<'a, OccluderCell>,
 }
 
 impl<'a> Occluders<'a> {
-    /// Without surfaces; `cells` holds one element per cell of the lattice.
+    /// Without surfaces; `cells` has room for one element per cell of the lattice.
     ///
     /// # Errors
-    /// Storage of another length.
-    pub fn new(lattice: Lattice, cells: &'a mut [OccluderCell]) -> Result<Self, LatticeError> {
-        if cells.len() != lattice.cell_count() {
-            return Err(LatticeError::Storage);
-        }
-        cells.fill(OccluderCell::default());
+    /// Storage with less room.
+    pub fn new(lattice: Lattice, cells: impl Into<List<'a, OccluderCell>>) -> Result<Self, LatticeError> {
+        let mut cells = cells.into();
+        cells.reset(lattice.cell_count(), OccluderCell::default()).map_err(|Full| LatticeError::Storage)?;
         Ok(Self { lattice, cells })
     }
 
@@ -85,7 +84,7 @@ impl<'a> Occluders<'a> {
         let offset = point - self.lattice.centre(index);
         let square =
             |v: Vec3| Symmetric3::from_upper([v.x * v.x, v.x * v.y, v.x * v.z, v.y * v.y, v.y * v.z, v.z * v.z]);
-        let cell = &mut self.cells[index];
+        let cell = &mut self.cells.as_mut_slice()[index];
         cell.position += offset;
         cell.spread = cell.spread.plus(&square(offset));
         cell.normals = cell.normals.plus(&square(normal));
@@ -115,36 +114,9 @@ impl<'a> Occluders<'a> {
     /// # Ok::<(), fogbow::covariance::LatticeError>(())
     /// ```
     pub fn add_scene(&mut self, scene: &(impl Scene + ?Sized), rays: u32) {
-        let bounds = self.lattice.bounds();
-        let extent = bounds.size();
-        let size = self.lattice.size();
-        for axis in 0..3 {
-            let (a, b) = ((axis + 1) % 3, (axis + 2) % 3);
-            let (count_a, count_b) = (size[a] * rays, size[b] * rays);
-            let margin = 1e-3 * extent.max_element();
-            let mut direction = Vec3::ZERO;
-            direction[axis] = 1.0;
-            for i in 0..count_a {
-                for j in 0..count_b {
-                    let mut origin = bounds.min;
-                    origin[axis] -= margin;
-                    origin[a] += (i as f32 + 0.5) / count_a as f32 * extent[a];
-                    origin[b] += (j as f32 + 0.5) / count_b as f32 * extent[b];
-                    let mut rest = Ray { origin, direction, length: extent[axis] + 2.0 * margin };
-                    for _ in 0..MAX_HITS {
-                        let Some(hit) = scene.closest_hit(&rest) else { break };
-                        let stops_light = !matches!(hit.surface, Surface::Null | Surface::Dielectric { .. });
-                        if stops_light && hit.light.is_none() {
-                            self.add(rest.at(hit.distance), hit.normal);
-                        }
-                        let passed = hit.distance + 1e-5 * extent.max_element();
-                        rest = Ray { origin: rest.at(passed), direction, length: rest.length - passed };
-                        if !(rest.length > 0.0) {
-                            break;
-                        }
-                    }
-                }
-            }
+        let lattice = self.lattice;
+        for row in 0..row_count(&lattice, rays) {
+            scan(&lattice, scene, rays, row, |point, normal| self.add(point, normal));
         }
     }
 
@@ -157,7 +129,7 @@ impl<'a> Occluders<'a> {
     /// Number of cells that hold a surface.
     #[must_use]
     pub fn occupied(&self) -> usize {
-        self.cells.iter().filter(|cell| cell.count > 0.0).count()
+        self.cells.as_slice().iter().filter(|cell| cell.count > 0.0).count()
     }
 
     /// Covariance `O` (cycles²/m², in space) of what occludes a ray that passes `point` (m) along `direction`
@@ -166,7 +138,7 @@ impl<'a> Occluders<'a> {
     #[must_use]
     pub fn covariance(&self, point: Vec3, direction: Vec3) -> Option<Symmetric3> {
         let index = self.lattice.index(point)?;
-        let cell = &self.cells[index];
+        let cell = &self.cells.as_slice()[index];
         if !(cell.count > 0.0) {
             return None;
         }
@@ -210,5 +182,55 @@ impl<'a> Occluders<'a> {
             );
         }
         Some(out)
+    }
+}
+
+/// Number of rows of rays that look for the surfaces in a lattice: along every axis, `rays` for each cell across it.
+pub(super) fn row_count(lattice: &Lattice, rays: u32) -> u32 {
+    lattice.size().iter().map(|count| count * rays).sum()
+}
+
+/// Calls `visit(point, normal)` for the surfaces that stop light and that the rays of a row meet, in order.
+pub(super) fn scan(
+    lattice: &Lattice,
+    scene: &(impl Scene + ?Sized),
+    rays: u32,
+    row: u32,
+    mut visit: impl FnMut(Vec3, Vec3),
+) {
+    let (bounds, size) = (lattice.bounds(), lattice.size());
+    let extent = bounds.size();
+    // Rays along x are dealt out in rows along z, one for each step along y; and so on in turn.
+    let (mut axis, mut i) = (0, row);
+    while axis < 3 && i >= size[(axis + 1) % 3] * rays {
+        i -= size[(axis + 1) % 3] * rays;
+        axis += 1;
+    }
+    if axis == 3 {
+        return;
+    }
+    let (a, b) = ((axis + 1) % 3, (axis + 2) % 3);
+    let (count_a, count_b) = (size[a] * rays, size[b] * rays);
+    let margin = 1e-3 * extent.max_element();
+    let mut direction = Vec3::ZERO;
+    direction[axis] = 1.0;
+    for j in 0..count_b {
+        let mut origin = bounds.min;
+        origin[axis] -= margin;
+        origin[a] += (i as f32 + 0.5) / count_a as f32 * extent[a];
+        origin[b] += (j as f32 + 0.5) / count_b as f32 * extent[b];
+        let mut rest = Ray { origin, direction, length: extent[axis] + 2.0 * margin };
+        for _ in 0..MAX_HITS {
+            let Some(hit) = scene.closest_hit(&rest) else { break };
+            let stops_light = !matches!(hit.surface, Surface::Null | Surface::Dielectric { .. });
+            if stops_light && hit.light.is_none() {
+                visit(rest.at(hit.distance), hit.normal);
+            }
+            let passed = hit.distance + 1e-5 * extent.max_element();
+            rest = Ray { origin: rest.at(passed), direction, length: rest.length - passed };
+            if !(rest.length > 0.0) {
+                break;
+            }
+        }
     }
 }

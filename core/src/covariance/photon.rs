@@ -75,6 +75,17 @@ impl<'a, M: Medium + ?Sized, S: Scene + ?Sized> FrequencyPhotons<'a, M, S> {
     /// The weight of a crossing is flux times length. Cells beyond the end of `voxels` take nothing.
     #[inline]
     pub fn visit(&mut self, event: &Event<'_>, voxels: &mut [Voxel]) {
+        self.visit_each(event, &mut |cell, covariance, energy| {
+            if let Some(voxel) = voxels.get_mut(cell) {
+                voxel.add_covariance(covariance, energy);
+            }
+        });
+    }
+
+    /// As [`FrequencyPhotons::visit`], but calls `deposit(cell, covariance, energy)` for what is to be added
+    /// ([`Voxel::add_covariance`]) to the cells crossed, in order.
+    #[inline]
+    pub(super) fn visit_each(&mut self, event: &Event<'_>, deposit: &mut impl FnMut(usize, &Symmetric3, f32)) {
         match *event {
             Event::Emitted { light, ray, normal, .. } => {
                 self.light = self.world.lights.get(light).map(|light| emitted(light, ray, normal, self.point_radius));
@@ -82,7 +93,7 @@ impl<'a, M: Medium + ?Sized, S: Scene + ?Sized> FrequencyPhotons<'a, M, S> {
                 let variation = self.light.map_or(0.0, |light| 0.5 * light.covariance.spatial.trace());
                 self.straight = (variation > 0.0).then(|| 1.0 / (float::PI * float::sqrt(variation)));
             }
-            Event::Flew { reach, distance, power } => self.fly(reach, distance, power.mean(), voxels),
+            Event::Flew { reach, distance, power } => self.fly(reach, distance, power.mean(), deposit),
             Event::Collided { properties, outgoing, .. } => {
                 self.straight = None;
                 self.light = match (self.light, outgoing) {
@@ -100,7 +111,7 @@ impl<'a, M: Medium + ?Sized, S: Scene + ?Sized> FrequencyPhotons<'a, M, S> {
         }
     }
 
-    fn fly(&mut self, reach: &Ray, distance: f32, power: f32, voxels: &mut [Voxel]) {
+    fn fly(&mut self, reach: &Ray, distance: f32, power: f32, deposit: &mut impl FnMut(usize, &Symmetric3, f32)) {
         let Some(mut light) = self.light else { return };
         let ray = reach.with_length(distance);
         let (medium, occluders) = (self.world.medium, self.occluders);
@@ -131,13 +142,11 @@ impl<'a, M: Medium + ?Sized, S: Scene + ?Sized> FrequencyPhotons<'a, M, S> {
             if !even {
                 light = light.attenuated(&medium.extinction_hessian(point).mean(), length);
             }
-            if let Some(voxel) = voxels.get_mut(cell) {
-                let mut covariance = light.volumetric();
-                if let Some(size) = self.straight {
-                    covariance = covariance.plus(&divergence(ray.direction, middle, size));
-                }
-                voxel.add_covariance(&covariance, power * length);
+            let mut covariance = light.volumetric();
+            if let Some(size) = self.straight {
+                covariance = covariance.plus(&divergence(ray.direction, middle, size));
             }
+            deposit(cell, &covariance, power * length);
         }
         self.light = Some(light.travelled((distance - at).max(0.0)));
     }

@@ -5,24 +5,19 @@ use std::path::{Path, PathBuf};
 use clap::{Args, ValueEnum};
 use fogbow::bytes::Crc;
 use fogbow::covariance::bytes::BytesError;
-use fogbow::covariance::{Grid, Rule, Steps};
+use fogbow::covariance::{CovarianceGrid, Fill, Grid, Rule, Settings, Steps};
 use fogbow::host::Medium;
 use fogbow::light::Light;
 use fogbow::math::Ray;
 use fogbow::path;
-use fogbow_std::covariance::{CovarianceGrid, Problem, Settings, fill, load, save};
+use fogbow_std::covariance::{Problem, load, save};
 use fogbow_std::progress::Control;
 use fogbow_std::stats::Statistics;
+use fogbow_std::threads::{self, Ending, Threads};
 
 use super::{Failure, output};
 use crate::scene_file::fingerprint;
 use crate::world::{WithMedium, World};
-
-/// Photons that fill a grid.
-pub(crate) const PATHS: u64 = 100_000;
-
-/// Photons that fill a grid for kernels of photon beams: about a tenth of the paths of a picture (Belcour et al. 2014, § 6.5).
-pub(crate) const KERNEL_PATHS: u64 = 10_000;
 
 /// Options of covariance grids.
 #[derive(Debug, Clone, Args)]
@@ -31,9 +26,9 @@ pub struct CovarianceArguments {
     /// Photons that fill the covariance grid [default: 100000, for kernels of photon beams 10000].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=1 << 32))]
     pub grid_paths: Option<u64>,
-    /// Cells of the covariance grid along its longest side.
-    #[arg(long, value_name = "N", default_value_t = 64, value_parser = clap::value_parser!(u32).range(1..=512))]
-    pub grid_cells: u32,
+    /// Cells of the covariance grid along its longest side [default: 64].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=512))]
+    pub grid_cells: Option<u32>,
     /// Takes the covariance grid from a file instead of filling it.
     #[arg(long, value_name = "FILE")]
     pub grid_in: Option<PathBuf>,
@@ -79,12 +74,24 @@ pub enum Step {
     Frequency,
 }
 
+/// The host stopped the fill of a grid.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Stopped;
+
+impl core::fmt::Display for Stopped {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.write_str("stopped while the covariance grid was filled")
+    }
+}
+
+impl core::error::Error for Stopped {}
+
 /// Fills or reads a grid, with a medium of any type.
 pub(crate) struct GridJob<'a> {
     pub(crate) arguments: &'a CovarianceArguments,
     pub(crate) scene: &'a Path,
-    /// Photons, if the arguments do not say how many.
-    pub(crate) usual_paths: u64,
+    /// Whether nothing but kernels of photon beams come from it.
+    pub(crate) is_for_kernels: bool,
     pub(crate) world: &'a World<'a>,
     pub(crate) lights: &'a [Light<'a>],
     pub(crate) paths: path::Settings,
@@ -95,7 +102,7 @@ pub(crate) struct GridJob<'a> {
 }
 
 impl WithMedium for GridJob<'_> {
-    type Output = Result<CovarianceGrid, Failure>;
+    type Output = Result<CovarianceGrid<'static>, Failure>;
 
     fn with<M: Medium + Sync>(self, medium: &M) -> Self::Output {
         let (arguments, statistics) = (self.arguments, self.statistics);
@@ -109,14 +116,22 @@ impl WithMedium for GridJob<'_> {
             })?
         } else {
             let world = fogbow::world::World { medium, scene: self.world, lights: self.lights };
+            let preset = Settings::for_outline(&self.world.outline(&world));
+            let preset = if self.is_for_kernels { preset.for_kernels() } else { preset };
             let settings = Settings {
-                paths: arguments.grid_paths.unwrap_or(self.usual_paths),
-                edge: arguments.grid_cells,
-                threads: self.threads,
+                photons: arguments.grid_paths.unwrap_or(preset.photons),
+                edge: arguments.grid_cells.unwrap_or(preset.edge),
+                paths: self.paths,
                 seed: self.seed,
-                ..Settings::default()
+                ..preset
             };
-            statistics.time("fill grid", || fill(&world, &self.world.bounds(), &self.paths, &settings, self.control))?
+            let mut fill = Fill::new(settings)?;
+            let ran = threads::run(&mut fill, &world, &Threads::new(self.threads)?, self.control, None, |_| {});
+            ran.stages.iter().for_each(|(stage, seconds)| statistics.add(stage, *seconds));
+            if ran.ending != Ending::Done {
+                return Err(Stopped.into());
+            }
+            fill.finish()
         };
         if let Some(file) = &arguments.grid_out {
             statistics.time("write grid", || save(file, &grid, tag))?;

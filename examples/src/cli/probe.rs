@@ -10,7 +10,7 @@ use fogbow::math::{Bounds, Symmetric3, Vec3};
 use fogbow_std::progress::Control;
 use fogbow_std::stats::Statistics;
 
-use super::covariance::{CovarianceArguments, GridJob, PATHS};
+use super::covariance::{CovarianceArguments, GridJob};
 use super::render::path_settings;
 use super::{Ending, Failure, output};
 use crate::derivatives::{Upper, difference, filtered};
@@ -131,7 +131,7 @@ fn hessian(arguments: &HessianArguments) -> Result<Ending, Failure> {
     let filled = world.media().with(GridJob {
         arguments: &arguments.covariance,
         scene: &arguments.scene,
-        usual_paths: PATHS,
+        is_for_kernels: false,
         world: &world,
         lights: &lights,
         paths: path_settings(&scene, arguments.max_depth),

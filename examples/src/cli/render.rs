@@ -6,7 +6,7 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 use fogbow::cache::{Kind, RadianceCaches};
-use fogbow::covariance::Grid;
+use fogbow::covariance::{CovarianceGrid, Grid};
 use fogbow::host::Medium;
 use fogbow::light::Light;
 use fogbow::math::{Ray, Vec2};
@@ -15,7 +15,6 @@ use fogbow::sampling::{Generator, uniform2};
 use fogbow::spectrum::Spectrum;
 use fogbow::vpl::VirtualLight;
 use fogbow::world::World as LitWorld;
-use fogbow_std::covariance::{CovarianceGrid, FillError};
 use fogbow_std::film::Film;
 use fogbow_std::image::write_film;
 use fogbow_std::image_sampling::Plan;
@@ -24,7 +23,7 @@ use fogbow_std::seed::SampleRng;
 use fogbow_std::stats::{CountingMedium, CountingScene, Statistics};
 use fogbow_std::tiles::{self, Outcome, Reason, RenderError, Sample};
 
-use super::covariance::{CovarianceArguments, GridJob, KERNEL_PATHS, MarchArguments, PATHS, Step};
+use super::covariance::{CovarianceArguments, GridJob, MarchArguments, Step, Stopped};
 use super::image_sampling::{self, SamplingArguments};
 use super::march::MarchJob;
 use super::photon_beams::{BeamArguments, BeamJob, Kernel};
@@ -181,7 +180,7 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<Ending, Failure> {
     let outputs = outputs(arguments)?;
     let rendered = match render(arguments) {
         // Nothing has been rendered yet, and nothing is wrong.
-        Err(error) if matches!(error.downcast_ref(), Some(FillError::Cancelled)) => {
+        Err(error) if error.is::<Stopped>() => {
             eprintln!("fogbow: {error}");
             return Ok(Ending::Stopped);
         }
@@ -260,7 +259,7 @@ pub(crate) fn render(arguments: &RenderArguments) -> Result<Rendered, Failure> {
         Some(world.media().with(GridJob {
             arguments: &arguments.covariance,
             scene: &arguments.scene,
-            usual_paths: arguments.grid_paths(),
+            is_for_kernels: arguments.method == Method::PhotonBeams && arguments.sampling.is_uniform(),
             world: &world,
             lights: &lights,
             paths,
@@ -358,12 +357,6 @@ impl RenderArguments {
             (None, None, _) => named,
         };
         (samples, self.noise.or(usual))
-    }
-
-    /// Photons that usually fill the grid.
-    fn grid_paths(&self) -> u64 {
-        let is_for_kernels = self.method == Method::PhotonBeams && self.sampling.is_uniform();
-        if is_for_kernels { KERNEL_PATHS } else { PATHS }
     }
 
     /// Whether anything asked for takes a covariance grid.

@@ -2,9 +2,9 @@
 
 use std::fmt::Write;
 
+use fogbow::covariance::CovarianceGrid;
 use fogbow::math::Vec3;
 use fogbow::spectrum::Spectrum;
-use fogbow_std::covariance::CovarianceGrid;
 use fogbow_std::film::Image;
 use fogbow_std::progress::Control;
 use fogbow_std::stats::Statistics;
@@ -39,7 +39,7 @@ pub(super) fn colour(share: f32) -> Spectrum {
 }
 
 struct Filled {
-    grid: CovarianceGrid,
+    grid: CovarianceGrid<'static>,
     /// Processor time (s).
     cpu: f64,
 }
@@ -49,12 +49,13 @@ fn fill(plan: &Plan, edge: u32, paths: u64, seed: u64) -> Result<Filled, Failure
     let scene = SceneFile::read(&file)?;
     let mut storage = Storage::new(&scene);
     let world = World::new(&scene, &mut storage)?;
-    let arguments = CovarianceArguments { grid_paths: Some(paths), grid_cells: edge, grid_in: None, grid_out: None };
+    let arguments =
+        CovarianceArguments { grid_paths: Some(paths), grid_cells: Some(edge), grid_in: None, grid_out: None };
     let mut statistics = Statistics::default();
     let grid = world.media().with(GridJob {
         arguments: &arguments,
         scene: &file,
-        usual_paths: paths,
+        is_for_kernels: false,
         world: &world,
         lights: &world.lights(),
         paths: path_settings(&scene, Some(2)),
