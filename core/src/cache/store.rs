@@ -4,9 +4,10 @@ use core::fmt;
 
 use glam::Vec3;
 
-use super::index::Index;
+use super::index::{Index, squared_share};
 use super::radius::neighbour_clamped;
 use super::record::{Attachment, Facing, MAX_STRIDE, Record};
+use crate::math::float;
 use crate::sh::Coefficient;
 use crate::spectrum::{Gradient, Spectrum};
 use crate::storage::{Full, List};
@@ -187,11 +188,16 @@ impl<'s, E: Attachment> Cache<'s, E> {
         if self.len() >= MAX_RECORDS || self.records.room() == 0 || self.attached.room() < attached.len() {
             return Err(InsertError::Full);
         }
-        for other in self.records.as_mut_slice() {
+        for (number, other) in (0..).zip(self.records.as_mut_slice()) {
             let apart = record.position.distance(other.position);
             if apart < record.radius.max(other.radius) {
                 record.radius = neighbour_clamped(record.radius, record.position, (other.position, other.radius));
-                other.radius = other.radius.min(record.radius + apart);
+                let (before, most) = (other.radius, record.radius + apart);
+                if most < before {
+                    other.radius = most;
+                    self.index.shrink(number, (other.position, before), most);
+                    self.wide.shrink(number, (other.position, WIDE * before), WIDE * most);
+                }
             }
         }
         self.restore(record, attached.iter().copied())?;
@@ -300,9 +306,9 @@ impl<'s, E: Attachment> Cache<'s, E> {
         self.index.visit(point, |i, share| visit(i, &records[i as usize], share));
         let indexed = self.index.len() as usize;
         for (i, record) in records.iter().enumerate().skip(indexed) {
-            let share = record.position.distance(point) / record.radius;
-            if share < 1.0 {
-                visit(i as u32, record, share);
+            let squared = squared_share(record.position, record.radius, point);
+            if squared < 1.0 {
+                visit(i as u32, record, float::sqrt(squared));
             }
         }
     }
