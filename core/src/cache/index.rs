@@ -57,6 +57,9 @@ const SMALLEST: f32 = f32::MIN_POSITIVE;
 /// Spheres that reach farther from the origin are left out: sums and differences stay finite.
 const FARTHEST: f32 = 1e38;
 
+/// Coordinates of points that cells are told apart by, in edges of the root: their squares are numbers.
+const SQUARES: f32 = 1e18;
+
 /// By how much more than asked for cells are looked at, relative: above the rounding of distances.
 const NEARLY: f32 = 1e-5;
 
@@ -115,6 +118,13 @@ impl Block {
         let x = (Vec4::splat(point.x) - self.x) * self.inverse;
         let y = (Vec4::splat(point.y) - self.y) * self.inverse;
         let z = (Vec4::splat(point.z) - self.z) * self.inverse;
+        x * x + y * y + z * z
+    }
+
+    /// Squared distances from the centres (m²); infinite in empty lanes, and where that is what they are in `f32`.
+    #[inline]
+    fn distances_squared(&self, point: Vec3) -> Vec4 {
+        let (x, y, z) = (Vec4::splat(point.x) - self.x, Vec4::splat(point.y) - self.y, Vec4::splat(point.z) - self.z);
         x * x + y * y + z * z
     }
 }
@@ -312,7 +322,7 @@ impl<'s> Index<'s> {
     /// that for points far from the one before.
     #[inline]
     pub fn visit(&self, point: Vec3, mut visit: impl FnMut(u32, f32)) {
-        for run in self.leaf(point).chunks(RUN) {
+        for run in self.blocks.as_slice()[self.leaf(point)].chunks(RUN) {
             // All distances before the first decision: the loads of a run then wait for memory together
             // and not each for the branch before it.
             let mut squared = [[0.0; LANES]; RUN];
@@ -331,15 +341,15 @@ impl<'s> Index<'s> {
         }
     }
 
-    /// The blocks of the leaf around `point`.
+    /// The blocks of the leaf around `point`: all spheres that contain it are in there, and others.
     #[inline]
-    fn leaf(&self, point: Vec3) -> &[Block] {
+    pub(super) fn leaf(&self, point: Vec3) -> Range<usize> {
         const CELLS: f32 = (1 << DEPTH) as f32;
         let position = (point - self.low) * self.scale * CELLS;
         // Also false for NaN.
         let inside = position.min_element() >= 0.0 && position.max_element() < CELLS;
         if !inside || point.is_nan() {
-            return &[];
+            return 0..0;
         }
         let [x, y, z] = position.to_array().map(|p| p as u32);
         let nodes = self.nodes.as_slice();
@@ -350,7 +360,38 @@ impl<'s> Index<'s> {
             let side = (x >> shift & 1) | (y >> shift & 1) << 1 | (z >> shift & 1) << 2;
             octant = nodes[octant.first as usize].octants[side as usize];
         }
-        &self.blocks.as_slice()[octant.first as usize..][..octant.blocks as usize]
+        octant.run()
+    }
+
+    /// Numbers of the spheres of a block of [`Index::leaf`]; 0 in empty lanes.
+    #[inline]
+    pub(super) fn numbers(&self, block: usize) -> [u32; LANES] {
+        self.blocks.as_slice()[block].index
+    }
+
+    /// Calls `visit(number, reach)` for all spheres whose centres are within `reach` (m) of `point`, and for some more;
+    /// for some more than once. Near ones come early, and `visit` may lower the reach.
+    pub(super) fn visit_centres(&self, point: Vec3, reach: &mut f32, mut visit: impl FnMut(u32, &mut f32)) {
+        if self.len == 0 {
+            return;
+        }
+        let at = (point - self.low) * self.scale;
+        // Also true for NaN.
+        if !(at.abs().max_element() < SQUARES) {
+            (0..self.len).for_each(|number| visit(number, reach));
+            return;
+        }
+        let blocks = self.blocks.as_slice();
+        walk(self.nodes.as_slice(), self.root, Cell::ROOT, (at, self.scale), reach, &mut |run, reach| {
+            for block in &blocks[run] {
+                let most = *reach * (1.0 + NEARLY);
+                let mut near = !block.distances_squared(point).cmpgt(Vec4::splat(most * most)).bitmask() & 0xf;
+                while near != 0 {
+                    visit(block.index[near.trailing_zeros() as usize], reach);
+                    near &= near - 1;
+                }
+            }
+        });
     }
 
     /// Makes a sphere smaller, whose centre and radius (m) were `(centre, before)`.
