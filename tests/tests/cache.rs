@@ -258,6 +258,39 @@ fn a_full_cache_is_as_before() {
     }
 }
 
+/// What [`Cache::visit`] has to find, to the last bit.
+fn containing(records: &[Record], point: Vec3, wide: f32) -> Vec<(u32, u32)> {
+    let share = |record: &Record| {
+        let offset = (point - record.position) * (1.0 / (wide * record.radius));
+        (offset.x * offset.x + offset.y * offset.y + offset.z * offset.z).sqrt()
+    };
+    (0..).zip(records).map(|(i, r)| (i, share(r))).filter(|f| f.1 < 1.0).map(|(i, s)| (i, s.to_bits())).collect()
+}
+
+/// Whether a record is in the index yet, and with which radius it came there, decides nothing.
+#[test]
+fn a_cache_knows_the_radii_of_now() {
+    let rng = &mut Generator::new(5);
+    let mut point = move || Vec3::new(uniform(rng), uniform(rng), uniform(rng));
+    let mut cache: VolumeCache<'_> = Cache::growing(0);
+    for round in 0..600 {
+        // Ever smaller ones, which clamp what is there.
+        cache.insert(record(point(), 2.0 / (round + 3) as f32), &[]).unwrap();
+        if round == 300 {
+            cache.finish().unwrap();
+        }
+        for _ in 0..8 {
+            let at = point() * 1.2;
+            let (mut found, mut wide) = (Vec::new(), Vec::new());
+            cache.visit(at, |i, _, share| found.push((i, share.to_bits())));
+            cache.visit_wide(at, |i, _, share| wide.push((i, share.to_bits())));
+            assert_eq!(found, containing(cache.records(), at, 1.0), "{round}");
+            let finished = if round < 300 { 0 } else { 301 };
+            assert_eq!(wide, containing(&cache.records()[..finished], at, 2.0), "{round}");
+        }
+    }
+}
+
 fn record(position: Vec3, radius: f32) -> Record {
     Record { position, radius, value: Spectrum::ONE, gradient: Gradient::ZERO }
 }

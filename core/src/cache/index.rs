@@ -13,6 +13,8 @@
 //!
 //! A leaf keeps the spheres in the order of their numbers.
 
+use core::ops::Range;
+
 use bytemuck::{Pod, Zeroable};
 use glam::Vec4;
 
@@ -55,6 +57,12 @@ const SMALLEST: f32 = f32::MIN_POSITIVE;
 /// Spheres that reach farther from the origin are left out: sums and differences stay finite.
 const FARTHEST: f32 = 1e38;
 
+/// Coordinates of points that cells are told apart by, in edges of the root: their squares are numbers.
+const SQUARES: f32 = 1e18;
+
+/// By how much more than asked for cells are looked at, relative: above the rounding of distances.
+const NEARLY: f32 = 1e-5;
+
 /// An inner node of the octree: what lies in its eight octants, x fastest.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Pod, Zeroable)]
 #[repr(C, align(64))]
@@ -74,6 +82,15 @@ struct Octant {
 
 /// In place of a number of blocks: a node.
 const INNER: u32 = u32::MAX;
+
+impl Octant {
+    /// The blocks of a leaf.
+    #[inline]
+    fn run(self) -> Range<usize> {
+        let first = self.first as usize;
+        first..first + self.blocks as usize
+    }
+}
 
 /// Four spheres of a leaf, side by side.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Pod, Zeroable)]
@@ -101,6 +118,13 @@ impl Block {
         let x = (Vec4::splat(point.x) - self.x) * self.inverse;
         let y = (Vec4::splat(point.y) - self.y) * self.inverse;
         let z = (Vec4::splat(point.z) - self.z) * self.inverse;
+        x * x + y * y + z * z
+    }
+
+    /// Squared distances from the centres (m²); infinite in empty lanes, and where that is what they are in `f32`.
+    #[inline]
+    fn distances_squared(&self, point: Vec3) -> Vec4 {
+        let (x, y, z) = (Vec4::splat(point.x) - self.x, Vec4::splat(point.y) - self.y, Vec4::splat(point.z) - self.z);
         x * x + y * y + z * z
     }
 }
@@ -174,6 +198,49 @@ impl Cell {
         let farthest = offset.abs() + Vec3::splat(self.half);
         (mask, farthest.length_squared() < radius * radius)
     }
+}
+
+/// Calls `visit(blocks, reach)` for the leaves that come within `reach` (m) of a point, near ones first; `visit` may
+/// lower the reach. The point is given in edges of the root, with the reciprocal of these (m⁻¹).
+fn walk(
+    nodes: &[Node],
+    octant: Octant,
+    cell: Cell,
+    (at, scale): (Vec3, f32),
+    reach: &mut f32,
+    visit: &mut impl FnMut(Range<usize>, &mut f32),
+) {
+    let outside = ((at - cell.middle).abs() - cell.half).max(Vec3::ZERO);
+    let scaled = *reach * scale * (1.0 + NEARLY) + 2.0 * ROOM;
+    if outside.length_squared() > scaled * scaled {
+        return;
+    }
+    if octant.blocks != INNER {
+        return visit(octant.run(), reach);
+    }
+    let sides = at.cmpgt(cell.middle).bitmask() as usize;
+    // Neighbours across one face first, then across an edge, then across the corner.
+    for turn in [0, 1, 2, 4, 3, 5, 6, 7] {
+        let side = sides ^ turn;
+        let next = nodes[octant.first as usize].octants[side];
+        walk(nodes, next, cell.octant(side), (at, scale), reach, visit);
+    }
+}
+
+/// Squared distance of a point from a centre in units of the radius, as a [`Block`] has it: to the last bit, so that
+/// no answer depends on whether a sphere is in an index already.
+#[inline]
+pub(super) fn squared_share(centre: Vec3, radius: f32, point: Vec3) -> f32 {
+    let offset = (point - centre) * (1.0 / radius);
+    offset.x * offset.x + offset.y * offset.y + offset.z * offset.z
+}
+
+/// Whether an index holds such a sphere: it reaches no farther than 10³⁸ m from the origin, and its reciprocal radius is
+/// finite.
+#[inline]
+pub(super) fn holds(centre: Vec3, radius: f32) -> bool {
+    // Also false for NaN.
+    radius >= SMALLEST && centre.abs().cmple(Vec3::splat(FARTHEST - radius)).all()
 }
 
 impl<'s> Index<'s> {
@@ -287,7 +354,7 @@ impl<'s> Index<'s> {
     /// that for points far from the one before.
     #[inline]
     pub fn visit(&self, point: Vec3, mut visit: impl FnMut(u32, f32)) {
-        for run in self.leaf(point).chunks(RUN) {
+        for run in self.blocks.as_slice()[self.leaf(point)].chunks(RUN) {
             // All distances before the first decision: the loads of a run then wait for memory together
             // and not each for the branch before it.
             let mut squared = [[0.0; LANES]; RUN];
@@ -306,15 +373,15 @@ impl<'s> Index<'s> {
         }
     }
 
-    /// The blocks of the leaf around `point`.
+    /// The blocks of the leaf around `point`: all spheres that contain it are in there, and others.
     #[inline]
-    fn leaf(&self, point: Vec3) -> &[Block] {
+    pub(super) fn leaf(&self, point: Vec3) -> Range<usize> {
         const CELLS: f32 = (1 << DEPTH) as f32;
         let position = (point - self.low) * self.scale * CELLS;
         // Also false for NaN.
         let inside = position.min_element() >= 0.0 && position.max_element() < CELLS;
         if !inside || point.is_nan() {
-            return &[];
+            return 0..0;
         }
         let [x, y, z] = position.to_array().map(|p| p as u32);
         let nodes = self.nodes.as_slice();
@@ -325,7 +392,57 @@ impl<'s> Index<'s> {
             let side = (x >> shift & 1) | (y >> shift & 1) << 1 | (z >> shift & 1) << 2;
             octant = nodes[octant.first as usize].octants[side as usize];
         }
-        &self.blocks.as_slice()[octant.first as usize..][..octant.blocks as usize]
+        octant.run()
+    }
+
+    /// Numbers of the spheres of a block of [`Index::leaf`]; 0 in empty lanes.
+    #[inline]
+    pub(super) fn numbers(&self, block: usize) -> [u32; LANES] {
+        self.blocks.as_slice()[block].index
+    }
+
+    /// Calls `visit(number, reach)` for all spheres whose centres are within `reach` (m) of `point`, and for some more;
+    /// for some more than once. Near ones come early, and `visit` may lower the reach.
+    pub(super) fn visit_centres(&self, point: Vec3, reach: &mut f32, mut visit: impl FnMut(u32, &mut f32)) {
+        if self.len == 0 {
+            return;
+        }
+        let at = (point - self.low) * self.scale;
+        // Also true for NaN.
+        if !(at.abs().max_element() < SQUARES) {
+            (0..self.len).for_each(|number| visit(number, reach));
+            return;
+        }
+        let blocks = self.blocks.as_slice();
+        walk(self.nodes.as_slice(), self.root, Cell::ROOT, (at, self.scale), reach, &mut |run, reach| {
+            for block in &blocks[run] {
+                let most = *reach * (1.0 + NEARLY);
+                let mut near = !block.distances_squared(point).cmpgt(Vec4::splat(most * most)).bitmask() & 0xf;
+                while near != 0 {
+                    visit(block.index[near.trailing_zeros() as usize], reach);
+                    near &= near - 1;
+                }
+            }
+        });
+    }
+
+    /// Makes a sphere smaller, whose centre and radius (m) were `(centre, before)`.
+    pub(super) fn shrink(&mut self, number: u32, (centre, before): (Vec3, f32), radius: f32) {
+        if number >= self.len {
+            return;
+        }
+        let Self { nodes, blocks, root, low, scale, .. } = self;
+        let (at, blocks) = ((centre - *low) * *scale, blocks.as_mut_slice());
+        // Cells farther away may hold it, too, with a radius it once had: none of their points lies in it either way.
+        walk(nodes.as_slice(), *root, Cell::ROOT, (at, *scale), &mut { before }, &mut |run, _| {
+            for block in &mut blocks[run] {
+                for (lane, inverse) in block.index.iter().zip(block.inverse.as_mut()) {
+                    if *lane == number {
+                        *inverse = 1.0 / radius;
+                    }
+                }
+            }
+        });
     }
 
     /// Builds it anew over `count` spheres: `sphere(i)` is centre and radius (m) of number `i`, and is
@@ -352,8 +469,7 @@ impl<'s> Index<'s> {
         for i in 0..count {
             let (centre, radius) = sphere(i);
             self.spheres.push([centre.x, centre.y, centre.z, radius])?;
-            // Also false for NaN.
-            if radius >= SMALLEST && centre.abs().cmple(Vec3::splat(FARTHEST - radius)).all() {
+            if holds(centre, radius) {
                 self.entries.push(i)?;
                 low = low.min(centre - radius);
                 high = high.max(centre + radius);

@@ -219,18 +219,6 @@ impl VolumeCache<'_> {
         self.visit(point, |_, _, share| covered |= share < 1.0 - reading.margin);
         covered
     }
-
-    /// About how large the radius of a record at `point` would be, going by those around: `None` if
-    /// there are none.
-    #[must_use]
-    pub fn radius_near(&self, point: Vec3) -> Option<f32> {
-        nearest(self.records(), point)
-    }
-}
-
-fn nearest(records: &[Record], point: Vec3) -> Option<f32> {
-    let apart = records.iter().map(|r| (r.position.distance_squared(point), r.radius));
-    apart.reduce(|a, b| if b.0 < a.0 { b } else { a }).map(|(_, radius)| radius)
 }
 
 impl SurfaceCache<'_> {
@@ -275,12 +263,6 @@ impl SurfaceCache<'_> {
             self.facing(i, record, share, (point, normal), reading.margin, |_, _| covered = true);
         });
         covered
-    }
-
-    /// As [`VolumeCache::radius_near`].
-    #[must_use]
-    pub fn radius_near(&self, point: Vec3) -> Option<f32> {
-        nearest(self.records(), point)
     }
 
     /// Calls `visit(facing, d)` if a record reaches a point with a normal, `d` being 1 at its middle and 0 at its edge.

@@ -4,6 +4,7 @@ use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
 use super::bytes::Kind;
+use super::index;
 use super::radius::{self, Limits};
 use crate::sh::{self, Coefficient};
 use crate::single_scatter::Sums;
@@ -51,14 +52,18 @@ impl Record {
         record.is_valid().then_some(record)
     }
 
-    /// Whether all numbers are finite, the radius positive, the value not negative.
+    /// Whether all numbers are finite, the radius positive (10⁻³⁸ m or more), the value not negative, and nothing farther
+    /// than 10³⁸ m from the origin: beyond, distances are no numbers.
+    ///
+    /// ```
+    /// # use fogbow::{cache::Record, math::Vec3, spectrum::{Gradient, Spectrum}};
+    /// let record = Record { position: Vec3::ZERO, radius: 1.0, value: Spectrum::ONE, gradient: Gradient::ZERO };
+    /// assert!(record.is_valid());
+    /// assert!(!Record { radius: 0.0, ..record }.is_valid());
+    /// ```
     #[must_use]
     pub fn is_valid(&self) -> bool {
-        self.position.is_finite()
-            && self.radius > 0.0
-            && self.radius.is_finite()
-            && self.value.is_valid()
-            && self.gradient.is_finite()
+        index::holds(self.position, self.radius) && self.value.is_valid() && self.gradient.is_finite()
     }
 
     /// `∇L · (point − position)`.

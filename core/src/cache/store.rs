@@ -4,9 +4,10 @@ use core::fmt;
 
 use glam::Vec3;
 
-use super::index::Index;
+use super::index::{Index, squared_share};
 use super::radius::neighbour_clamped;
 use super::record::{Attachment, Facing, MAX_STRIDE, Record};
+use crate::math::float;
 use crate::sh::Coefficient;
 use crate::spectrum::{Gradient, Spectrum};
 use crate::storage::{Full, List};
@@ -255,20 +256,50 @@ impl<'s, E: Attachment> Cache<'s, E> {
         if self.len() >= MAX_RECORDS || self.records.room() == 0 || self.attached.room() < attached.len() {
             return Err(InsertError::Full);
         }
-        for other in self.records.as_mut_slice() {
-            let apart = record.position.distance(other.position);
-            if apart < record.radius.max(other.radius) {
-                record.radius = neighbour_clamped(record.radius, record.position, (other.position, other.radius));
-                other.radius = other.radius.min(record.radius + apart);
-            }
-        }
+        record.radius = self.clamped(&record);
+        self.clamp_around(&record);
         self.restore(record, attached.iter().copied())?;
-        let loose = self.len() as u32 - self.index.len();
-        if loose > LOOSE.max(self.index.len() / 16) {
+        let indexed = self.index.len();
+        // Every rebuild takes as long as there are records, every loose one is looked at by every question: with the
+        // root of the number of records loose, either costs little.
+        if self.len() as u32 - indexed > LOOSE.max((indexed / 16).min(4 * indexed.isqrt())) {
             // Without room for the index records are looked at one by one.
             let _ = self.rebuild();
         }
         Ok(())
+    }
+
+    /// The radius that the neighbours allow a new record.
+    fn clamped(&self, record: &Record) -> f32 {
+        let (records, mut radius) = (self.records(), record.radius);
+        let clamped =
+            |other: &Record, radius| neighbour_clamped(radius, record.position, (other.position, other.radius));
+        self.index.visit_centres(record.position, &mut radius, |number, radius| {
+            *radius = clamped(&records[number as usize], *radius);
+        });
+        records.iter().skip(self.index.len() as usize).fold(radius, |radius, other| clamped(other, radius))
+    }
+
+    /// Lets all records around a new one reach no farther than that allows.
+    fn clamp_around(&mut self, record: &Record) {
+        let Self { records, index, wide, .. } = self;
+        let (count, records) = (records.as_slice().len() as u32, records.as_mut_slice());
+        let mut clamp = |index: &mut Index<'_>, number: u32| {
+            let other = &mut records[number as usize];
+            let (before, most) = (other.radius, record.radius + record.position.distance(other.position));
+            if most < before {
+                other.radius = most;
+                index.shrink(number, (other.position, before), most);
+                wide.shrink(number, (other.position, WIDE * before), WIDE * most);
+            }
+        };
+        // Too large is at most what contains its place.
+        for block in index.leaf(record.position) {
+            index.numbers(block).into_iter().for_each(|number| clamp(index, number));
+        }
+        for number in index.len()..count {
+            clamp(index, number);
+        }
     }
 
     /// Whether a record can be kept, and written and read again.
@@ -280,6 +311,37 @@ impl<'s, E: Attachment> Cache<'s, E> {
             return Err(InsertError::Record);
         }
         attached.iter().position(|e| !e.is_valid()).map_or(Ok(()), |number| Err(InsertError::Attachment(number)))
+    }
+
+    /// How far about a record at `point` would reach, going by the nearest there is (m); `None` if there are none.
+    ///
+    /// ```
+    /// # use fogbow::cache::{Cache, Record, VolumeCache};
+    /// # use fogbow::{math::Vec3, spectrum::{Gradient, Spectrum}};
+    /// # #[cfg(feature = "alloc")] {
+    /// let mut cache: VolumeCache = Cache::growing(0);
+    /// assert_eq!(cache.radius_near(Vec3::ZERO), None);
+    /// cache.insert(Record { position: Vec3::X, radius: 0.5, value: Spectrum::ONE, gradient: Gradient::ZERO }, &[])?;
+    /// assert_eq!(cache.radius_near(Vec3::ZERO), Some(0.5));
+    /// # }
+    /// # Ok::<(), fogbow::cache::InsertError>(())
+    /// ```
+    #[must_use]
+    pub fn radius_near(&self, point: Vec3) -> Option<f32> {
+        let (records, mut nearest) = (self.records(), None);
+        let mut closer = |number: u32| {
+            let apart = records[number as usize].position.distance_squared(point);
+            // Of several at the same distance the first.
+            if nearest.is_none_or(|(least, first)| apart < least || (apart == least && number < first)) {
+                nearest = Some((apart, number));
+            }
+            nearest.map_or(f32::INFINITY, |(least, _)| float::sqrt(least))
+        };
+        self.index.visit_centres(point, &mut { f32::INFINITY }, |number, reach| *reach = closer(number));
+        for number in self.index.len()..records.len() as u32 {
+            closer(number);
+        }
+        nearest.map(|(_, number)| records[number as usize].radius)
     }
 
     /// Replaces what a record says of the light, by an estimate that knows more than the first could. Its
@@ -368,9 +430,9 @@ impl<'s, E: Attachment> Cache<'s, E> {
         self.index.visit(point, |i, share| visit(i, &records[i as usize], share));
         let indexed = self.index.len() as usize;
         for (i, record) in records.iter().enumerate().skip(indexed) {
-            let share = record.position.distance(point) / record.radius;
-            if share < 1.0 {
-                visit(i as u32, record, share);
+            let squared = squared_share(record.position, record.radius, point);
+            if squared < 1.0 {
+                visit(i as u32, record, float::sqrt(squared));
             }
         }
     }
@@ -395,5 +457,102 @@ impl<E: Attachment> Cache<'_, E> {
         use alloc::vec::Vec;
         let index = || Index::new(Vec::new(), Vec::new(), Vec::new(), Vec::new());
         Self::new(Vec::new(), Vec::new(), index(), index(), stride)
+    }
+}
+
+#[cfg(all(test, feature = "alloc"))]
+mod tests {
+    use alloc::vec::Vec;
+
+    use super::*;
+    use crate::sampling::{Generator, uniform};
+
+    fn record(position: Vec3, radius: f32) -> Record {
+        Record { position, radius, value: Spectrum::ONE, gradient: Gradient::ZERO }
+    }
+
+    fn point(rng: &mut Generator) -> Vec3 {
+        Vec3::new(uniform(rng), uniform(rng), uniform(rng))
+    }
+
+    /// Evenly spread, and in a crowd whose members shrink towards its middle.
+    fn places(count: u32, rng: &mut Generator) -> Vec<Record> {
+        let size = 3.0 * float::powf(count as f32, -1.0 / 3.0);
+        let place = |i| {
+            let at = point(rng);
+            if i % 3 == 0 {
+                let away = float::powf(10.0, -4.0 * uniform(rng));
+                record(Vec3::splat(0.3) + (at - 0.5) * away, away * size)
+            } else {
+                record(at, size * float::powf(30.0, -uniform(rng)))
+            }
+        };
+        (0..count).map(place).collect()
+    }
+
+    /// Every one against all there are.
+    fn one_by_one(records: &mut Vec<Record>, mut record: Record) {
+        for other in &*records {
+            record.radius = neighbour_clamped(record.radius, record.position, (other.position, other.radius));
+        }
+        for other in &mut *records {
+            other.radius = other.radius.min(record.radius + record.position.distance(other.position));
+        }
+        records.push(record);
+    }
+
+    #[test]
+    fn neighbours_are_clamped_as_if_all_were_asked() {
+        let rng = &mut Generator::new(3);
+        let (mut all, mut cache) = (Vec::new(), VolumeCache::growing(0));
+        for (i, new) in places(4000, rng).into_iter().enumerate() {
+            one_by_one(&mut all, new);
+            cache.insert(new, &[]).unwrap();
+            if i % 64 == 0 {
+                assert_eq!(cache.records(), all);
+                let at = point(rng) * 1.5;
+                let apart = |r: &&Record| r.position.distance_squared(at).to_bits();
+                assert_eq!(cache.radius_near(at), all.iter().min_by_key(apart).map(|r| r.radius));
+            }
+        }
+        assert_eq!(cache.records(), all);
+    }
+
+    #[test]
+    fn points_that_are_none_are_nearest_to_the_first() {
+        let mut cache = VolumeCache::growing(0);
+        for new in places(200, &mut Generator::new(5)) {
+            cache.insert(new, &[]).unwrap();
+        }
+        let first = Some(cache.records()[0].radius);
+        for at in [Vec3::NAN, Vec3::INFINITY, Vec3::new(f32::MAX, 0.0, 0.0)] {
+            assert_eq!(cache.radius_near(at), first, "{at}");
+        }
+    }
+
+    /// How many are asked for a new one: of those in the index and of those that are not there yet.
+    fn asked(count: u32) -> (f32, f32) {
+        let rng = &mut Generator::new(9);
+        let mut cache = VolumeCache::growing(0);
+        let (mut near, mut loose) = (0, 0);
+        for new in places(count, rng) {
+            let (indexed, mut reach) = (cache.index.len(), new.radius);
+            cache.index.visit_centres(new.position, &mut reach, |number, reach| {
+                let other = cache.records()[number as usize];
+                *reach = neighbour_clamped(*reach, new.position, (other.position, other.radius));
+                near += 1;
+            });
+            loose += cache.len() as u32 - indexed;
+            cache.insert(new, &[]).unwrap();
+        }
+        (near as f32 / count as f32, loose as f32 / count as f32)
+    }
+
+    #[test]
+    fn inserting_into_a_large_cache_asks_few() {
+        let (some, many) = (asked(8000), asked(32000));
+        assert!(many.0 < 1.2 * some.0 && many.0 < 100.0, "in the index: {some:?}, {many:?}");
+        // Nearly as the root of their number.
+        assert!(many.1 < 2.5 * some.1, "not in the index: {some:?}, {many:?}");
     }
 }
