@@ -5,7 +5,7 @@ use core::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use fogbow::cache::{
     Estimator, Extrapolation, EyeSettings, Limits, Place, Reading, Record, VolumeCache, clearance, places, radiance,
 };
-use fogbow::host::{Gradients, Medium, Properties, Stretch};
+use fogbow::host::{Gradients, MajorantSegment, Medium, Properties};
 use fogbow::light::{Light, PointLight};
 use fogbow::math::{Ray, Vec2, Vec3};
 use fogbow::medium::Homogeneous;
@@ -250,8 +250,8 @@ impl Medium for Impatient<'_> {
         }
         self.medium.properties(point)
     }
-    fn stretch(&self, ray: &Ray, from: f32) -> Stretch {
-        self.medium.stretch(ray, from)
+    fn majorant_segment(&self, ray: &Ray, from: f32) -> MajorantSegment {
+        self.medium.majorant_segment(ray, from)
     }
     fn gradients(&self, point: Vec3) -> Gradients {
         self.medium.gradients(point)
