@@ -57,12 +57,13 @@ impl Properties {
     }
 }
 
-/// Bounds on extinction along a part of a ray.
+/// A majorant segment: bounds on extinction along a part of a ray.
 ///
 /// Equal bounds mean that the medium is constant there (all of its properties, not only the sum),
 /// so closed forms apply; a majorant of 0 means vacuum without emission.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Stretch {
+#[doc(alias("RayMajorantSegment", "Stretch", "bounds"))]
+pub struct MajorantSegment {
     /// Distance along the ray (m) up to which the bounds hold; greater than where they were asked.
     pub until: f32,
     /// Lower bound of extinction (m⁻¹).
@@ -71,7 +72,7 @@ pub struct Stretch {
     pub majorant: Spectrum,
 }
 
-impl Stretch {
+impl MajorantSegment {
     /// Vacuum up to `until`.
     #[inline]
     #[must_use]
@@ -79,7 +80,7 @@ impl Stretch {
         Self { until, minorant: Spectrum::ZERO, majorant: Spectrum::ZERO }
     }
 
-    /// Whether the medium is constant along the stretch.
+    /// Whether the medium is constant along the segment.
     #[inline]
     #[must_use]
     pub fn is_constant(&self) -> bool {
@@ -133,12 +134,14 @@ pub trait Medium {
     ///
     /// A pure question: no state between calls. `until` may lie beyond the ray's length; where
     /// nothing follows it is infinite.
-    fn stretch(&self, ray: &Ray, from: f32) -> Stretch;
+    #[doc(alias("stretch", "majorant", "bounds"))]
+    fn majorant_segment(&self, ray: &Ray, from: f32) -> MajorantSegment;
 
-    /// As [`Medium::stretch`], for marching: bounds that differ may be loose, so where extinction changes the answer
-    /// should reach as far as it does.
-    fn run(&self, ray: &Ray, from: f32) -> Stretch {
-        self.stretch(ray, from)
+    /// As [`Medium::majorant_segment`], for marching: bounds that differ may be loose, so where extinction changes the
+    /// answer should reach as far as it does.
+    #[doc(alias = "run")]
+    fn marching_segment(&self, ray: &Ray, from: f32) -> MajorantSegment {
+        self.majorant_segment(ray, from)
     }
 
     /// Extinction alone (m⁻¹), where a cheaper answer exists.
@@ -237,11 +240,11 @@ impl<M: Medium + ?Sized> Medium for &M {
     fn properties(&self, point: Vec3) -> Properties {
         (**self).properties(point)
     }
-    fn stretch(&self, ray: &Ray, from: f32) -> Stretch {
-        (**self).stretch(ray, from)
+    fn majorant_segment(&self, ray: &Ray, from: f32) -> MajorantSegment {
+        (**self).majorant_segment(ray, from)
     }
-    fn run(&self, ray: &Ray, from: f32) -> Stretch {
-        (**self).run(ray, from)
+    fn marching_segment(&self, ray: &Ray, from: f32) -> MajorantSegment {
+        (**self).marching_segment(ray, from)
     }
     fn extinction(&self, point: Vec3) -> Spectrum {
         (**self).extinction(point)
@@ -348,8 +351,8 @@ impl Medium for Empty {
     fn properties(&self, _: Vec3) -> Properties {
         Properties::VACUUM
     }
-    fn stretch(&self, _: &Ray, _: f32) -> Stretch {
-        Stretch::vacuum(f32::INFINITY)
+    fn majorant_segment(&self, _: &Ray, _: f32) -> MajorantSegment {
+        MajorantSegment::vacuum(f32::INFINITY)
     }
     fn is_grey(&self) -> bool {
         true

@@ -5,7 +5,7 @@ use core::ops::{Add, AddAssign};
 use std::time::Instant;
 
 use fogbow::glam::Vec3;
-use fogbow::host::{Face, Gradients, Hit, Medium, Properties, Scene, Stretch};
+use fogbow::host::{Face, Gradients, Hit, MajorantSegment, Medium, Properties, Scene};
 use fogbow::math::{Ray, Symmetric3};
 use fogbow::spectrum::{Gradient, Hessian, Spectrum};
 
@@ -23,7 +23,7 @@ pub struct Counters {
     /// Queries of a medium at a point: properties, extinction, derivatives.
     pub lookups: u64,
     /// Queries of a medium's bounds along a ray.
-    pub stretches: u64,
+    pub segments: u64,
     /// Questions asked of caches: see [`Tally::look_up`].
     pub cache_lookups: u64,
     /// Of these, questions no record answered.
@@ -41,7 +41,7 @@ impl Add for Counters {
             shadow_rays: self.shadow_rays + o.shadow_rays,
             collisions: self.collisions + o.collisions,
             lookups: self.lookups + o.lookups,
-            stretches: self.stretches + o.stretches,
+            segments: self.segments + o.segments,
             cache_lookups: self.cache_lookups + o.cache_lookups,
             cache_misses: self.cache_misses + o.cache_misses,
             non_finite: self.non_finite + o.non_finite,
@@ -62,7 +62,7 @@ pub struct Tally {
     shadow_rays: Cell<u64>,
     collisions: Cell<u64>,
     lookups: Cell<u64>,
-    stretches: Cell<u64>,
+    segments: Cell<u64>,
     cache_lookups: Cell<u64>,
     cache_misses: Cell<u64>,
 }
@@ -89,7 +89,7 @@ impl Tally {
             shadow_rays: self.shadow_rays.get(),
             collisions: self.collisions.get(),
             lookups: self.lookups.get(),
-            stretches: self.stretches.get(),
+            segments: self.segments.get(),
             cache_lookups: self.cache_lookups.get(),
             cache_misses: self.cache_misses.get(),
             ..Counters::default()
@@ -161,14 +161,14 @@ impl<M: Medium> Medium for CountingMedium<'_, M> {
         self.medium.properties(point)
     }
     #[inline]
-    fn stretch(&self, ray: &Ray, from: f32) -> Stretch {
-        raise(&self.tally.stretches);
-        self.medium.stretch(ray, from)
+    fn majorant_segment(&self, ray: &Ray, from: f32) -> MajorantSegment {
+        raise(&self.tally.segments);
+        self.medium.majorant_segment(ray, from)
     }
     #[inline]
-    fn run(&self, ray: &Ray, from: f32) -> Stretch {
-        raise(&self.tally.stretches);
-        self.medium.run(ray, from)
+    fn marching_segment(&self, ray: &Ray, from: f32) -> MajorantSegment {
+        raise(&self.tally.segments);
+        self.medium.marching_segment(ray, from)
     }
     #[inline]
     fn extinction(&self, point: Vec3) -> Spectrum {

@@ -2,7 +2,7 @@
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use fogbow::host::{Face, Gradients, Hit, Medium, Properties, Scene, Stretch};
+use fogbow::host::{Face, Gradients, Hit, MajorantSegment, Medium, Properties, Scene};
 use fogbow::math::{Bounds, Ray, Vec3};
 use fogbow::phase::Phase;
 use fogbow::spectrum::{Gradient, Hessian, Spectrum};
@@ -87,8 +87,8 @@ impl Analytic {
     }
 }
 
-/// Length of the stretches that a changing field reports (m).
-const STRETCH: f32 = 0.75;
+/// Length of the segments that a changing field reports (m).
+const SEGMENT: f32 = 0.75;
 
 impl Medium for Analytic {
     fn properties(&self, point: Vec3) -> Properties {
@@ -101,12 +101,12 @@ impl Medium for Analytic {
         self.tint * self.field.at(point).0.max(0.0)
     }
 
-    fn stretch(&self, ray: &Ray, from: f32) -> Stretch {
+    fn majorant_segment(&self, ray: &Ray, from: f32) -> MajorantSegment {
         if let Field::Homogeneous { a } = self.field {
             let extinction = self.tint * a;
-            return Stretch { until: f32::INFINITY, minorant: extinction, majorant: extinction };
+            return MajorantSegment { until: f32::INFINITY, minorant: extinction, majorant: extinction };
         }
-        let until = from + STRETCH.max(from * 1e-3);
+        let until = from + SEGMENT.max(from * 1e-3);
         let ends = [from, until].map(|t| self.field.at(ray.at(t)).0.max(0.0));
         let mut top = ends[0].max(ends[1]);
         if let Field::Gaussian { c, .. } = self.field {
@@ -115,7 +115,7 @@ impl Medium for Analytic {
         }
         // A little room for rounding; monotonic or with one maximum, so the ends hold the minimum.
         let (low, high) = (ends[0].min(ends[1]) * 0.999 - 1e-6, top * 1.001 + 1e-6);
-        Stretch { until, minorant: self.tint * low.max(0.0), majorant: self.tint * high }
+        MajorantSegment { until, minorant: self.tint * low.max(0.0), majorant: self.tint * high }
     }
 
     fn gradients(&self, point: Vec3) -> Gradients {
@@ -202,16 +202,16 @@ impl<M: Medium> Medium for Filled<M> {
         if self.body.contains(point) { self.medium.properties(point) } else { Properties::VACUUM }
     }
 
-    fn stretch(&self, ray: &Ray, from: f32) -> Stretch {
-        let Some((near, far)) = self.body.crossing(ray) else { return Stretch::vacuum(f32::INFINITY) };
+    fn majorant_segment(&self, ray: &Ray, from: f32) -> MajorantSegment {
+        let Some((near, far)) = self.body.crossing(ray) else { return MajorantSegment::vacuum(f32::INFINITY) };
         if from < near {
-            return Stretch::vacuum(near);
+            return MajorantSegment::vacuum(near);
         }
         if from >= far {
-            return Stretch::vacuum(f32::INFINITY);
+            return MajorantSegment::vacuum(f32::INFINITY);
         }
-        let inside = self.medium.stretch(ray, from);
-        Stretch { until: inside.until.min(far), ..inside }
+        let inside = self.medium.majorant_segment(ray, from);
+        MajorantSegment { until: inside.until.min(far), ..inside }
     }
 
     fn gradients(&self, point: Vec3) -> Gradients {
@@ -280,8 +280,8 @@ pub struct Complaining<T> {
     pub inner: T,
     /// Properties and extinction asked for.
     pub points: AtomicU64,
-    /// Stretches asked for.
-    pub stretches: AtomicU64,
+    /// Segments asked for.
+    pub segments: AtomicU64,
     /// Rays traced.
     pub rays: AtomicU64,
 }
@@ -289,12 +289,12 @@ pub struct Complaining<T> {
 impl<T> Complaining<T> {
     /// Around `inner`.
     pub fn new(inner: T) -> Self {
-        Self { inner, points: AtomicU64::new(0), stretches: AtomicU64::new(0), rays: AtomicU64::new(0) }
+        Self { inner, points: AtomicU64::new(0), segments: AtomicU64::new(0), rays: AtomicU64::new(0) }
     }
 
-    /// Points, stretches and rays asked for.
+    /// Points, segments and rays asked for.
     pub fn counts(&self) -> [u64; 3] {
-        [&self.points, &self.stretches, &self.rays].map(|c| c.load(Ordering::Relaxed))
+        [&self.points, &self.segments, &self.rays].map(|c| c.load(Ordering::Relaxed))
     }
 }
 
@@ -316,22 +316,22 @@ impl<M: Medium> Medium for Complaining<M> {
         assert!(p.absorption.is_valid() && p.scattering.is_valid() && p.emission.is_valid(), "{p:?} at {point}");
         p
     }
-    fn stretch(&self, ray: &Ray, from: f32) -> Stretch {
-        self.stretches.fetch_add(1, Ordering::Relaxed);
+    fn majorant_segment(&self, ray: &Ray, from: f32) -> MajorantSegment {
+        self.segments.fetch_add(1, Ordering::Relaxed);
         check_ray(ray);
         assert!(from >= 0.0 && from.is_finite(), "from {from}");
-        let stretch = self.inner.stretch(ray, from);
-        assert!(stretch.until > from, "{stretch:?} does not advance from {from}");
-        // The bounds must hold: asked at a few points of the stretch.
-        let end = stretch.until.min(ray.length).min(from + 1e3);
+        let segment = self.inner.majorant_segment(ray, from);
+        assert!(segment.until > from, "{segment:?} does not advance from {from}");
+        // The bounds must hold: asked at a few points of the segment.
+        let end = segment.until.min(ray.length).min(from + 1e3);
         for k in 1..4 {
             let value = self.inner.extinction(ray.at(from + (end - from) * (k as f32 * 0.2502)));
             for c in 0..3 {
-                assert!(value[c] <= stretch.majorant[c] * (1.0 + 1e-5), "{value:?} above {stretch:?}");
-                assert!(value[c] >= stretch.minorant[c] * (1.0 - 1e-5), "{value:?} below {stretch:?}");
+                assert!(value[c] <= segment.majorant[c] * (1.0 + 1e-5), "{value:?} above {segment:?}");
+                assert!(value[c] >= segment.minorant[c] * (1.0 - 1e-5), "{value:?} below {segment:?}");
             }
         }
-        stretch
+        segment
     }
     fn extinction(&self, point: Vec3) -> Spectrum {
         self.points.fetch_add(1, Ordering::Relaxed);

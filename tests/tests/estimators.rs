@@ -221,7 +221,7 @@ fn march_agrees_with_closed_forms_and_asks_nothing_of_vacuum() {
     let ray = Ray::new(Vec3::new(0.0, 0.0, -10.0), Vec3::Z);
     let through = (-0.7_f64 * 4.0).exp();
     for (step, offset) in [(0.01, 0.0), (0.3, 0.5), (100.0, 0.99), (0.0, 0.5), (f32::NAN, 0.5), (f32::INFINITY, 0.1)] {
-        // A step of nothing is replaced by a millionth of the stretch: too slow for this test.
+        // A step of nothing is replaced by a millionth of the segment: too slow for this test.
         let step = if step > 0.0 {
             step
         } else if step == 0.0 {

@@ -1,6 +1,6 @@
 //! Scenes whose answer is known, times the path tracer.
 
-use fogbow::host::{Empty, Hit, Medium, Properties, Scene, Stretch};
+use fogbow::host::{Empty, Hit, MajorantSegment, Medium, Properties, Scene};
 use fogbow::light::{Light, PointLight, QuadLight, SphereLight, SpotLight, Sun};
 use fogbow::math::{Ray, Vec2, Vec3, float::PI};
 use fogbow::medium::Homogeneous;
@@ -44,19 +44,19 @@ impl Medium for Ball {
             phase: self.phase,
         }
     }
-    fn stretch(&self, ray: &Ray, from: f32) -> Stretch {
+    fn majorant_segment(&self, ray: &Ray, from: f32) -> MajorantSegment {
         let closest = -ray.origin.dot(ray.direction);
         let height2 = ray.at(closest).length_squared();
         let half = (self.radius * self.radius - height2).max(0.0).sqrt();
         let (enter, leave) = (closest - half, closest + half);
         if half <= 0.0 || from >= leave * (1.0 - 1e-6) - 1e-6 {
-            return Stretch::vacuum(f32::INFINITY);
+            return MajorantSegment::vacuum(f32::INFINITY);
         }
         if from < enter {
-            return Stretch::vacuum(enter);
+            return MajorantSegment::vacuum(enter);
         }
         let majorant = self.absorption + self.scattering;
-        Stretch { until: leave, minorant: if self.is_constant { majorant } else { Spectrum::ZERO }, majorant }
+        MajorantSegment { until: leave, minorant: if self.is_constant { majorant } else { Spectrum::ZERO }, majorant }
     }
     fn is_grey(&self) -> bool {
         (self.absorption + self.scattering).is_grey()

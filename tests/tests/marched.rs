@@ -1,6 +1,6 @@
 //! Collisions drawn from marched rays against the law they follow and against marching itself.
 
-use fogbow::host::{Hit, Medium, Properties, Stretch};
+use fogbow::host::{Hit, MajorantSegment, Medium, Properties};
 use fogbow::math::{Ray, Vec3};
 use fogbow::multiple_scatter::{Lengths, Settings, Walk};
 use fogbow::phase::Phase;
@@ -97,8 +97,8 @@ impl Medium for Sheet {
         let scattering = Spectrum::splat(if point.x < 1e-4 { 40.0 } else { 1e-5 });
         Properties { absorption: Spectrum::ZERO, scattering, emission: Spectrum::ZERO, phase: Phase::ISOTROPIC }
     }
-    fn stretch(&self, _: &Ray, _: f32) -> Stretch {
-        Stretch { until: f32::INFINITY, minorant: Spectrum::ZERO, majorant: Spectrum::splat(40.0) }
+    fn majorant_segment(&self, _: &Ray, _: f32) -> MajorantSegment {
+        MajorantSegment { until: f32::INFINITY, minorant: Spectrum::ZERO, majorant: Spectrum::splat(40.0) }
     }
     fn is_grey(&self) -> bool {
         true

@@ -6,7 +6,7 @@ use fogbow::cache::{
     Asked, Effort, EyeSettings, Filling, Kind, Limits, Output, Place, RadianceCaches, Reading, Record, Settings,
     clearance, places,
 };
-use fogbow::host::{Gradients, Medium, Properties, Stretch};
+use fogbow::host::{Gradients, MajorantSegment, Medium, Properties};
 use fogbow::light::{Light, PointLight};
 use fogbow::math::{Bounds, Ray, Vec2, Vec3};
 use fogbow::medium::Homogeneous;
@@ -323,8 +323,8 @@ impl Medium for Impatient<'_> {
         }
         self.medium.properties(point)
     }
-    fn stretch(&self, ray: &Ray, from: f32) -> Stretch {
-        self.medium.stretch(ray, from)
+    fn majorant_segment(&self, ray: &Ray, from: f32) -> MajorantSegment {
+        self.medium.majorant_segment(ray, from)
     }
     fn gradients(&self, point: Vec3) -> Gradients {
         self.medium.gradients(point)

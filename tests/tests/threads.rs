@@ -33,7 +33,10 @@ fn walk(sample: &Sample<'_>, rng: &mut SampleRng, layers: &mut [Spectrum]) {
         layers[1] += Spectrum::ONE;
         weight *= 0.3 + uniform(rng);
         assert!(scene.closest_hit(&ray).is_none() && !scene.is_blocked(&ray));
-        assert!(medium.properties(ray.origin).albedo() == Spectrum::ZERO && medium.stretch(&ray, 0.0).is_constant());
+        assert!(
+            medium.properties(ray.origin).albedo() == Spectrum::ZERO
+                && medium.majorant_segment(&ray, 0.0).is_constant()
+        );
     }
 }
 
@@ -145,7 +148,7 @@ fn queries_are_counted() {
     let mut film = film();
     let counters = run(&mut film, Settings { samples: 4, ..Settings::default() }).counters;
     let steps: f32 = film.mean(1).unwrap().pixels.iter().map(|pixel| 4.0 * pixel[0]).sum();
-    for count in [counters.rays, counters.shadow_rays, counters.lookups, counters.stretches] {
+    for count in [counters.rays, counters.shadow_rays, counters.lookups, counters.segments] {
         assert_eq!(count, steps.round() as u64);
     }
 }

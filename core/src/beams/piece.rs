@@ -145,10 +145,10 @@ pub fn pieces(
     let mut left = MAX_PIECES;
     // NaN ends the walk, too.
     while t < reach.length && left > 0 {
-        let stretch = medium.stretch(reach, t);
-        let end = stretch.until.min(reach.length);
-        let (low, range) = (stretch.minorant, (stretch.majorant - stretch.minorant).max_element());
-        if stretch.majorant.max_element() <= 0.0 {
+        let segment = medium.majorant_segment(reach, t);
+        let end = segment.until.min(reach.length);
+        let (low, range) = (segment.minorant, (segment.majorant - segment.minorant).max_element());
+        if segment.majorant.max_element() <= 0.0 {
             t = end;
             left -= 1;
             continue;

@@ -9,10 +9,10 @@ use crate::spectrum::Spectrum;
 /// through grids of more cells.
 const PARTS: usize = 256;
 
-/// Stretches above which their borders are not followed.
-const MAX_STRETCHES: usize = 96;
+/// Segments above which their borders are not followed.
+const MAX_SEGMENTS: usize = 96;
 
-/// Stretches looked at: a ray without end through a medium without end stops there.
+/// Segments looked at: a ray without end through a medium without end stops there.
 const MOST: usize = 1 << 14;
 
 #[derive(Debug, Clone, Copy)]
@@ -23,7 +23,7 @@ struct Part {
     slope: Spectrum,
 }
 
-/// `τ(t)` of a ray, linear in parts: exact along constant stretches, marched through others in steps of the
+/// `τ(t)` of a ray, linear in parts: exact along constant segments, marched through others in steps of the
 /// medium's resolution from a jittered point each, which makes `τ` unbiased and `e^−τ` nearly so.
 #[derive(Debug)]
 pub(super) struct Thickness {
@@ -37,7 +37,7 @@ impl Thickness {
         let mut found = Self { parts: heapless::Vec::new(), last: Spectrum::ZERO };
         let (mut varying, mut count) = (0.0_f32, 0);
         let (mut first, mut end_of_medium) = (f32::INFINITY, 0.0_f32);
-        for_stretches(medium, ray, |from, to, low, high| {
+        for_segments(medium, ray, |from, to, low, high| {
             count += 1;
             if low != high {
                 varying += to - from;
@@ -47,7 +47,7 @@ impl Thickness {
                 end_of_medium = to;
             }
         });
-        if count > MAX_STRETCHES || !varying.is_finite() {
+        if count > MAX_SEGMENTS || !varying.is_finite() {
             // Too many to follow: even steps from the first to the last, as far as that is finite.
             let last =
                 if end_of_medium.is_finite() { end_of_medium } else { first + PARTS as f32 * medium.resolution() };
@@ -58,9 +58,9 @@ impl Thickness {
             return found;
         }
         let room = (PARTS - count) as f32;
-        // Every stretch may round its number of steps up by one, for which `count` more are kept.
+        // Every segment may round its number of steps up by one, for which `count` more are kept.
         let step = medium.resolution().max(varying / (room - count as f32).max(1.0));
-        for_stretches(medium, ray, |from, to, low, high| {
+        for_segments(medium, ray, |from, to, low, high| {
             if low == high {
                 found.push(from, low);
                 if to.is_finite() {
@@ -104,15 +104,15 @@ impl Thickness {
     }
 }
 
-fn for_stretches(medium: &(impl Medium + ?Sized), ray: &Ray, mut visit: impl FnMut(f32, f32, Spectrum, Spectrum)) {
+fn for_segments(medium: &(impl Medium + ?Sized), ray: &Ray, mut visit: impl FnMut(f32, f32, Spectrum, Spectrum)) {
     let mut t = 0.0;
     for _ in 0..MOST {
         if !(t < ray.length) {
             return;
         }
-        let stretch = medium.stretch(ray, t);
-        let end = stretch.until.min(ray.length);
-        visit(t, end, stretch.minorant, stretch.majorant);
+        let segment = medium.majorant_segment(ray, t);
+        let end = segment.until.min(ray.length);
+        visit(t, end, segment.minorant, segment.majorant);
         t = end;
     }
 }

@@ -36,8 +36,8 @@ pub fn image_covariance(
         let (middle, length) = (0.5 * (crossing.enter + crossing.leave), crossing.leave - crossing.enter);
         let point = ray.at(middle);
         if !(middle < even_until) {
-            let stretch = medium.stretch(ray, middle);
-            (even_until, even) = (stretch.until, stretch.is_constant());
+            let segment = medium.majorant_segment(ray, middle);
+            (even_until, even) = (segment.until, segment.is_constant());
         }
         let properties = medium.properties(point);
         let passed = properties.extinction().mean() * length;

@@ -118,7 +118,7 @@ impl<'a, M: Medium + ?Sized, S: Scene + ?Sized> FrequencyPhotons<'a, M, S> {
         // Where a flight leaves a surface or ends at one, that surface is what is lit, and no occluder.
         let spared = self.lattice.cell().max_element();
         let (occluded_from, occluded_to) = (spared, reach.length - spared);
-        // Bounds hold along stretches; only where they are not equal is there a Hessian to ask for.
+        // Bounds hold along segments; only where they are not equal is there a Hessian to ask for.
         let (mut even_until, mut even) = (0.0, true);
         let mut at = 0.0;
         for Crossing { cell, enter, leave } in self.lattice.cells(&ray) {
@@ -135,9 +135,9 @@ impl<'a, M: Medium + ?Sized, S: Scene + ?Sized> FrequencyPhotons<'a, M, S> {
                 light = light.occluded(&occlusion);
             }
             if !(middle < even_until) {
-                let stretch = medium.stretch(&ray, middle);
-                even_until = stretch.until;
-                even = stretch.is_constant();
+                let segment = medium.majorant_segment(&ray, middle);
+                even_until = segment.until;
+                even = segment.is_constant();
             }
             if !even {
                 light = light.attenuated(&medium.extinction_hessian(point).mean(), length);

@@ -33,9 +33,9 @@ pub struct EyeRay {
 /// L = Σ T(t_i) (σₛ L_i + ε) (1 − e^{−σₜ Δ_i})/σₜ,   T ← T e^{−σₜ Δ_i}
 /// ```
 ///
-/// On constant stretches the transmittance is exact and the sample is placed by the truncated
+/// On constant segments the transmittance is exact and the sample is placed by the truncated
 /// exponential law, so that `L_i` alone decides the error; elsewhere the medium is taken as constant
-/// within a step. Steps end at the stretches' ends and at the end of the ray. Vacuum costs nothing.
+/// within a step. Steps end at the segments' ends and at the end of the ray. Vacuum costs nothing.
 /// An endless ray stops where the medium ends or hides the rest.
 ///
 /// ```
@@ -89,15 +89,15 @@ pub fn steps(
     let mut at = 0.0_f32;
     let mut left = MAX_STEPS;
     while at < ray.length && left > 0 {
-        let stretch = medium.stretch(ray, at);
-        let until = if stretch.until > at { stretch.until } else { at + medium.resolution().max(at * 1e-6) };
+        let segment = medium.majorant_segment(ray, at);
+        let until = if segment.until > at { segment.until } else { at + medium.resolution().max(at * 1e-6) };
         let until = until.min(ray.length);
         left -= 1;
-        if stretch.majorant.is_black() {
+        if segment.majorant.is_black() {
             at = until;
             continue;
         }
-        let constant = stretch.is_constant();
+        let constant = segment.is_constant();
         let (entry, before) = (at, thickness);
         // A host's step of 0 or NaN must still lead on.
         let least = if until.is_finite() { (until - at) * 1e-6 } else { 1e-6 };
@@ -111,7 +111,7 @@ pub fn steps(
             let wanted = if wanted > least { wanted } else { least };
             // What is left over by rounding is no step of its own.
             let end = if at + wanted >= until * (1.0 - 1e-6) { until } else { at + wanted };
-            let end = if end.is_finite() { end } else { at + 1.0 / stretch.majorant.max_element() };
+            let end = if end.is_finite() { end } else { at + 1.0 / segment.majorant.max_element() };
             let length = end - at;
             if !(length > 0.0) {
                 at = until;
@@ -119,10 +119,10 @@ pub fn steps(
             }
             let (distance, extinction, weight, properties);
             if constant {
-                let sample = truncated_exponential(offset, stretch.majorant.mean(), length);
+                let sample = truncated_exponential(offset, segment.majorant.mean(), length);
                 distance = sample.distance;
                 properties = medium.properties(ray.at(at + distance));
-                extinction = stretch.majorant;
+                extinction = segment.majorant;
                 weight = (extinction * distance).transmitted() / sample.pdf;
             } else {
                 distance = offset * length;
@@ -134,7 +134,7 @@ pub fn steps(
             if !properties.scattering.is_black() {
                 visit(at + distance, &properties, transmittance * weight);
             }
-            // From the stretch's beginning where it can be: the rounding of many steps adds up.
+            // From the segment's beginning where it can be: the rounding of many steps adds up.
             thickness = if constant { before + extinction * (end - entry) } else { thickness + extinction * length };
             at = end;
         }

@@ -21,7 +21,7 @@ const NEGLIGIBLE: f32 = 1e-6;
 /// `n = density` is the number of points that an opaque ray gets; thin fog gets as many fewer as it
 /// shows less, which spends look-ups where they are seen. `τ̄` and `σ̄` are means over the channels.
 /// `u`, in [0, 1), shifts the points: uniform, the estimate is unbiased where the medium is constant
-/// along stretches. Elsewhere it is taken as constant over steps of [`Medium::resolution`], each
+/// along segments. Elsewhere it is taken as constant over steps of [`Medium::resolution`], each
 /// looked at where `jitter`, in [0, 1), says. Returned are light emitted on the way and the
 /// transmittance of the whole ray.
 ///
@@ -56,16 +56,16 @@ pub fn scattering_points(
     let mut at = 0.0_f32;
     let mut left = MAX_PIECES;
     while at < ray.length && left > 0 {
-        let stretch = medium.stretch(ray, at);
-        let until = if stretch.until > at { stretch.until } else { at + medium.resolution().max(at * 1e-6) };
+        let segment = medium.majorant_segment(ray, at);
+        let until = if segment.until > at { segment.until } else { at + medium.resolution().max(at * 1e-6) };
         let until = until.min(ray.length);
-        if stretch.majorant.is_black() {
+        if segment.majorant.is_black() {
             left -= 1;
             at = until;
             continue;
         }
         let (start, before) = (at, thickness);
-        let count = if stretch.is_constant() || until.is_infinite() {
+        let count = if segment.is_constant() || until.is_infinite() {
             1
         } else {
             (libm::ceilf((until - at) / medium.resolution().max(1e-30)) as u32).clamp(1, left)
@@ -73,9 +73,9 @@ pub fn scattering_points(
         for i in 0..count {
             left -= 1;
             let end = if i + 1 == count { until } else { start + (until - start) * ((i + 1) as f32 / count as f32) };
-            // An endless stretch that changes: pieces of one free path each.
-            let end = if end.is_infinite() && !stretch.is_constant() {
-                at + 1.0 / stretch.majorant.max_element().max(1e-30)
+            // An endless segment that changes: pieces of one free path each.
+            let end = if end.is_infinite() && !segment.is_constant() {
+                at + 1.0 / segment.majorant.max_element().max(1e-30)
             } else {
                 end
             };

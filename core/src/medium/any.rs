@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 use super::{Grid, Homogeneous, Noise};
-use crate::host::{Face, Gradients, Medium, Properties, Stretch};
+use crate::host::{Face, Gradients, MajorantSegment, Medium, Properties};
 use crate::math::Ray;
 use crate::phase::Phase;
 use crate::spectrum::{Gradient, Hessian, Spectrum};
@@ -53,12 +53,12 @@ impl Medium for AnyMedium<'_> {
         each!(self, medium => medium.properties(point))
     }
     #[inline]
-    fn stretch(&self, ray: &Ray, from: f32) -> Stretch {
-        each!(self, medium => medium.stretch(ray, from))
+    fn majorant_segment(&self, ray: &Ray, from: f32) -> MajorantSegment {
+        each!(self, medium => medium.majorant_segment(ray, from))
     }
     #[inline]
-    fn run(&self, ray: &Ray, from: f32) -> Stretch {
-        each!(self, medium => medium.run(ray, from))
+    fn marching_segment(&self, ray: &Ray, from: f32) -> MajorantSegment {
+        each!(self, medium => medium.marching_segment(ray, from))
     }
     #[inline]
     fn extinction(&self, point: Vec3) -> Spectrum {

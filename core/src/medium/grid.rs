@@ -3,11 +3,11 @@
 use glam::{Affine3, Mat3, Vec3};
 
 use super::density::{Cell, Density, cell_count};
-use super::grid_stretch::Joining;
+use super::grid_bounds::Joining;
 use super::majorant::{Field, MinMax, Reach, blocks_along};
 use super::region::BoxRegion;
 use super::{MediumError, ball};
-use crate::host::{Face, Gradients, Medium, Properties, Stretch};
+use crate::host::{Face, Gradients, MajorantSegment, Medium, Properties};
 use crate::math::Ray;
 use crate::phase::Phase;
 use crate::spectrum::{Gradient, Hessian, Spectrum};
@@ -210,7 +210,7 @@ impl<'a> Grid<'a> {
         if !(self.emission.is_valid() && (self.emission * self.emission_field().whole.max).is_finite()) {
             return Err(MediumError::Emission);
         }
-        let bounds = self.stretch_of(&self.bounds(None), f32::INFINITY);
+        let bounds = self.segment_of(&self.bounds(None), f32::INFINITY);
         if bounds.majorant.is_finite() { Ok(self) } else { Err(MediumError::Coefficients) }
     }
 
@@ -308,13 +308,13 @@ impl Medium for Grid<'_> {
     /// The empty blocks ahead; or the first that is not, and those behind it as long as one bound
     /// for all costs less than asking again.
     #[inline]
-    fn stretch(&self, ray: &Ray, from: f32) -> Stretch {
-        self.joined_stretch(ray, from, Joining::Tight)
+    fn majorant_segment(&self, ray: &Ray, from: f32) -> MajorantSegment {
+        self.joined_segment(ray, from, Joining::Tight)
     }
 
     #[inline]
-    fn run(&self, ray: &Ray, from: f32) -> Stretch {
-        self.joined_stretch(ray, from, Joining::Loose)
+    fn marching_segment(&self, ray: &Ray, from: f32) -> MajorantSegment {
+        self.joined_segment(ray, from, Joining::Loose)
     }
 
     #[inline]

@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 use super::MediumError;
-use crate::host::{Gradients, Medium, Properties, Stretch};
+use crate::host::{Gradients, MajorantSegment, Medium, Properties};
 use crate::math::Ray;
 use crate::phase::Phase;
 use crate::spectrum::{Hessian, Spectrum};
@@ -75,13 +75,13 @@ impl Medium for Homogeneous {
         self.properties
     }
     #[inline]
-    fn stretch(&self, _: &Ray, _: f32) -> Stretch {
+    fn majorant_segment(&self, _: &Ray, _: f32) -> MajorantSegment {
         let mut extinction = self.properties.extinction();
         if extinction.is_black() && self.is_emissive() {
             // A bound of 0 would promise that nothing glows.
             extinction = Spectrum::splat(f32::MIN_POSITIVE);
         }
-        Stretch { until: f32::INFINITY, minorant: extinction, majorant: extinction }
+        MajorantSegment { until: f32::INFINITY, minorant: extinction, majorant: extinction }
     }
     #[inline]
     fn extinction(&self, _: Vec3) -> Spectrum {

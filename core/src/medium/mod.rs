@@ -1,7 +1,7 @@
 //! Layer 4: media that need no host.
 //!
-//! A medium answers for its coefficients at a point and for bounds on extinction along a stretch
-//! of ray:
+//! A medium answers for its coefficients at a point and for bounds on extinction along a segment
+//! of a ray:
 //!
 //! ```text
 //! minorant ≤ σₜ(x + t ω) ≤ majorant   for t in [from, until],   until > from
@@ -16,7 +16,7 @@
 //! | [`homogeneous`] | the same everywhere |
 //! | [`grid`] | voxels, trilinear between cell centres |
 //! | [`density`] | its storage and interpolation |
-//! | [`majorant`], `grid_stretch` | its blocks of bounds and the walk through them; how they are joined |
+//! | [`majorant`], `grid_bounds` | its blocks of bounds and the walk through them; how they are joined |
 //! | [`noise`], `perlin` | fractal noise |
 //! | [`region`] | parts of space: boxes, balls |
 //! | [`placed`] | a medium in a region, with holes |
@@ -31,7 +31,7 @@ mod ball;
 pub mod density;
 pub mod error;
 pub mod grid;
-mod grid_stretch;
+mod grid_bounds;
 pub mod homogeneous;
 pub mod majorant;
 pub mod noise;

@@ -4,7 +4,7 @@ use glam::Vec3;
 
 use super::MediumError;
 use super::perlin::{self, MAX_CURVATURE, MAX_SLOPE, MAX_VALUE};
-use crate::host::{Gradients, Medium, Properties, Stretch};
+use crate::host::{Gradients, MajorantSegment, Medium, Properties};
 use crate::math::Ray;
 use crate::phase::Phase;
 use crate::spectrum::{Gradient, Spectrum};
@@ -170,9 +170,9 @@ impl FractalNoise {
 /// let shape = FractalNoise { frequency: 2.0, offset: -0.1, ..FractalNoise::default() };
 /// let cloud = Noise::new(shape, Spectrum::ZERO, Spectrum::splat(5.0), Phase::ISOTROPIC).unwrap();
 /// let ray = Ray::new(Vec3::ZERO, Vec3::X);
-/// let stretch = cloud.stretch(&ray, 0.0);
-/// let middle = cloud.extinction(ray.at(0.5 * stretch.until));
-/// assert!(stretch.minorant[0] <= middle[0] && middle[0] <= stretch.majorant[0]);
+/// let segment = cloud.majorant_segment(&ray, 0.0);
+/// let middle = cloud.extinction(ray.at(0.5 * segment.until));
+/// assert!(segment.minorant[0] <= middle[0] && middle[0] <= segment.majorant[0]);
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Noise {
@@ -181,7 +181,7 @@ pub struct Noise {
     absorption: Spectrum,
     emission: Spectrum,
     phase: Phase,
-    /// Length of a stretch (m).
+    /// Length of a segment (m).
     step: f32,
     /// Whether density is 0 everywhere.
     is_void: bool,
@@ -204,7 +204,7 @@ impl Noise {
             return Err(MediumError::Coefficients);
         }
         let phase = phase.into().check()?;
-        // A stretch costs about as much as a collision: long enough for one of each, short enough
+        // A segment costs about as much as a collision: long enough for one of each, short enough
         // for the first octave to be told from its extremes.
         let (_, dense) = shape.widest_bounds();
         let thickest = ((absorption + scattering) * dense).max_element();
@@ -276,12 +276,12 @@ impl Medium for Noise {
 
     /// Bounds from the value in the middle of a step and the steepest slope of every octave; up to
     /// eight empty steps are merged.
-    fn stretch(&self, ray: &Ray, from: f32) -> Stretch {
+    fn majorant_segment(&self, ray: &Ray, from: f32) -> MajorantSegment {
         const MERGED: u32 = 8;
         // Seven roundings of 2⁻²⁴ lie between a distance and a lattice coordinate.
         const ROUNDING: f32 = 1e-6;
         if self.is_void {
-            return Stretch::vacuum(f32::INFINITY);
+            return MajorantSegment::vacuum(f32::INFINITY);
         }
         let mut t = from;
         for _ in 0..MERGED {
@@ -292,14 +292,14 @@ impl Medium for Noise {
             let (half, blur) = (0.5 * (until - t), ROUNDING * coordinate);
             let (low, high) = self.shape.density_bounds(middle, ray.direction, half, blur);
             if high > 0.0 {
-                return if t > from { Stretch::vacuum(t) } else { self.bounded(until, low, high) };
+                return if t > from { MajorantSegment::vacuum(t) } else { self.bounded(until, low, high) };
             }
             t = until;
             if t > ray.length {
                 break;
             }
         }
-        Stretch::vacuum(t)
+        MajorantSegment::vacuum(t)
     }
 
     fn extinction(&self, point: Vec3) -> Spectrum {
@@ -331,16 +331,16 @@ impl Medium for Noise {
 
 impl Noise {
     #[inline]
-    fn bounded(&self, until: f32, low: f32, high: f32) -> Stretch {
+    fn bounded(&self, until: f32, low: f32, high: f32) -> MajorantSegment {
         let extinction = self.absorption + self.scattering;
-        let mut stretch = Stretch { until, minorant: extinction * low, majorant: extinction * high };
-        if stretch.is_constant() && low < high && self.is_emissive() {
+        let mut segment = MajorantSegment { until, minorant: extinction * low, majorant: extinction * high };
+        if segment.is_constant() && low < high && self.is_emissive() {
             // Only emission varies here, yet equal bounds would promise that nothing does.
-            stretch.majorant = stretch.majorant.map(|c| c.max(f32::MIN_POSITIVE) * (1.0 + 2.0 * f32::EPSILON));
+            segment.majorant = segment.majorant.map(|c| c.max(f32::MIN_POSITIVE) * (1.0 + 2.0 * f32::EPSILON));
         }
-        if stretch.majorant.is_black() && self.is_emissive() {
-            stretch.majorant = Spectrum::splat(f32::MIN_POSITIVE);
+        if segment.majorant.is_black() && self.is_emissive() {
+            segment.majorant = Spectrum::splat(f32::MIN_POSITIVE);
         }
-        stretch
+        segment
     }
 }

@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 use super::MediumError;
-use crate::host::{Face, Gradients, Medium, Properties, Stretch};
+use crate::host::{Face, Gradients, MajorantSegment, Medium, Properties};
 use crate::math::Ray;
 use crate::phase::Phase;
 use crate::spectrum::{Gradient, Hessian, Spectrum};
@@ -55,17 +55,17 @@ impl<'a, M: Medium> Overlap<'a, M> {
 
 impl<M> Overlap<'_, M> {
     /// Bounds of the sum of all media.
-    fn joined(&self, ask: impl Fn(&M) -> Stretch) -> Stretch {
+    fn joined(&self, ask: impl Fn(&M) -> MajorantSegment) -> MajorantSegment {
         if let [only] = self.0 {
             return ask(only);
         }
-        let mut sum = Stretch::vacuum(f32::INFINITY);
+        let mut sum = MajorantSegment::vacuum(f32::INFINITY);
         let mut is_constant = true;
-        for stretch in self.0.iter().map(ask) {
-            is_constant &= stretch.is_constant();
-            sum.until = sum.until.min(stretch.until);
-            sum.minorant += stretch.minorant;
-            sum.majorant += stretch.majorant;
+        for segment in self.0.iter().map(ask) {
+            is_constant &= segment.is_constant();
+            sum.until = sum.until.min(segment.until);
+            sum.minorant += segment.minorant;
+            sum.majorant += segment.majorant;
         }
         if !is_constant {
             // Sums round; and a thin cloud in thick fog may leave no trace in them.
@@ -102,12 +102,12 @@ impl<M: Medium> Medium for Overlap<'_, M> {
         sum
     }
 
-    fn stretch(&self, ray: &Ray, from: f32) -> Stretch {
-        self.joined(|medium| medium.stretch(ray, from))
+    fn majorant_segment(&self, ray: &Ray, from: f32) -> MajorantSegment {
+        self.joined(|medium| medium.majorant_segment(ray, from))
     }
 
-    fn run(&self, ray: &Ray, from: f32) -> Stretch {
-        self.joined(|medium| medium.run(ray, from))
+    fn marching_segment(&self, ray: &Ray, from: f32) -> MajorantSegment {
+        self.joined(|medium| medium.marching_segment(ray, from))
     }
 
     fn extinction(&self, point: Vec3) -> Spectrum {

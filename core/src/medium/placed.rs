@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 use super::{Crossing, Region, ball};
-use crate::host::{Face, Gradients, Medium, Properties, Stretch};
+use crate::host::{Face, Gradients, MajorantSegment, Medium, Properties};
 use crate::math::Ray;
 use crate::spectrum::{Gradient, Hessian, Spectrum};
 
@@ -19,9 +19,9 @@ use crate::spectrum::{Gradient, Hessian, Spectrum};
 /// let bubble = [Region::sphere(Vec3::ZERO, 1.0).unwrap()];
 /// let ball = Placed::new(fog, Region::sphere(Vec3::ZERO, 2.0).unwrap()).with_holes(&bubble);
 /// let ray = Ray::new(Vec3::new(-5.0, 0.0, 0.0), Vec3::X);
-/// assert_eq!(ball.stretch(&ray, 0.0).until, 3.0);     // vacuum before the ball
-/// assert_eq!(ball.stretch(&ray, 3.0).until, 4.0);     // fog before the hole
-/// assert_eq!(ball.stretch(&ray, 3.0).majorant, Spectrum::ONE);
+/// assert_eq!(ball.majorant_segment(&ray, 0.0).until, 3.0);     // vacuum before the ball
+/// assert_eq!(ball.majorant_segment(&ray, 3.0).until, 4.0);     // fog before the hole
+/// assert_eq!(ball.majorant_segment(&ray, 3.0).majorant, Spectrum::ONE);
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Placed<'a, M> {
@@ -108,15 +108,15 @@ impl<M> Placed<'_, M> {
 }
 
 impl<M: Medium> Placed<'_, M> {
-    /// A stretch of the medium itself, cut at the faces of the region and its holes; vacuum outside.
+    /// A segment of the medium itself, cut at the faces of the region and its holes; vacuum outside.
     #[inline]
-    fn within(&self, ray: &Ray, from: f32, ask: impl FnOnce(&M) -> Stretch) -> Stretch {
-        let Some((entry, exit)) = self.region.interval(ray) else { return Stretch::vacuum(f32::INFINITY) };
+    fn within(&self, ray: &Ray, from: f32, ask: impl FnOnce(&M) -> MajorantSegment) -> MajorantSegment {
+        let Some((entry, exit)) = self.region.interval(ray) else { return MajorantSegment::vacuum(f32::INFINITY) };
         if from >= exit {
-            return Stretch::vacuum(f32::INFINITY);
+            return MajorantSegment::vacuum(f32::INFINITY);
         }
         if from < entry {
-            return Stretch::vacuum(entry);
+            return MajorantSegment::vacuum(entry);
         }
         let mut end = exit;
         for (entry, exit) in self.holes.iter().filter_map(|hole| hole.interval(ray)) {
@@ -124,12 +124,12 @@ impl<M: Medium> Placed<'_, M> {
                 continue;
             }
             if from >= entry {
-                return Stretch::vacuum(exit);
+                return MajorantSegment::vacuum(exit);
             }
             end = end.min(entry);
         }
-        let stretch = ask(&self.medium);
-        Stretch { until: stretch.until.min(end), ..stretch }
+        let segment = ask(&self.medium);
+        MajorantSegment { until: segment.until.min(end), ..segment }
     }
 
     /// Reports the faces of one region: the outer one, or of the hole with index `hole`.
@@ -157,13 +157,13 @@ impl<M: Medium> Medium for Placed<'_, M> {
     }
 
     #[inline]
-    fn stretch(&self, ray: &Ray, from: f32) -> Stretch {
-        self.within(ray, from, |medium| medium.stretch(ray, from))
+    fn majorant_segment(&self, ray: &Ray, from: f32) -> MajorantSegment {
+        self.within(ray, from, |medium| medium.majorant_segment(ray, from))
     }
 
     #[inline]
-    fn run(&self, ray: &Ray, from: f32) -> Stretch {
-        self.within(ray, from, |medium| medium.run(ray, from))
+    fn marching_segment(&self, ray: &Ray, from: f32) -> MajorantSegment {
+        self.within(ray, from, |medium| medium.marching_segment(ray, from))
     }
 
     #[inline]

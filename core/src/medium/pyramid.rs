@@ -6,7 +6,7 @@ use glam::Vec3;
 
 use super::MediumError;
 use super::density::cell_count;
-use crate::host::{Face, Gradients, Medium, Properties, Stretch};
+use crate::host::{Face, Gradients, MajorantSegment, Medium, Properties};
 use crate::math::{Bounds, Ray, float};
 use crate::spectrum::{Gradient, Hessian, Spectrum};
 
@@ -346,8 +346,8 @@ fn halve(fine: &[Spectrum], size: [u32; 3], coarse: &mut [Spectrum]) {
 fn is_uniform(medium: &impl Medium, bounds: &Bounds, size: [u32; 3], cells: &[Spectrum]) -> bool {
     let rows = || (0..size[2]).flat_map(|z| (0..size[1]).map(move |y| (y, z)));
     let is_endless = |origin: Vec3, direction: Vec3| {
-        let stretch = medium.stretch(&Ray::new(origin, direction), 0.0);
-        stretch.is_constant() && stretch.until == f32::INFINITY
+        let segment = medium.majorant_segment(&Ray::new(origin, direction), 0.0);
+        segment.is_constant() && segment.until == f32::INFINITY
     };
     let first = medium.extinction(bounds.centre());
     // Sums over a cell's points round.
@@ -370,12 +370,12 @@ impl<M: Medium> Medium for Pyramid<'_, M> {
         self.medium.properties(point)
     }
     #[inline]
-    fn stretch(&self, ray: &Ray, from: f32) -> Stretch {
-        self.medium.stretch(ray, from)
+    fn majorant_segment(&self, ray: &Ray, from: f32) -> MajorantSegment {
+        self.medium.majorant_segment(ray, from)
     }
     #[inline]
-    fn run(&self, ray: &Ray, from: f32) -> Stretch {
-        self.medium.run(ray, from)
+    fn marching_segment(&self, ray: &Ray, from: f32) -> MajorantSegment {
+        self.medium.marching_segment(ray, from)
     }
     #[inline]
     fn extinction(&self, point: Vec3) -> Spectrum {

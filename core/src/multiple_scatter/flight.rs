@@ -89,7 +89,7 @@ pub(super) fn fly(
     let whole = to_end.then(|| optical_thickness_with_gradients(ray, medium, marching));
     let thickness = |distance| optical_thickness_with_gradients(&ray.with_length(distance), medium, marching);
     if let Lengths::Exponential { floor } = lengths {
-        let bound = medium.stretch(ray, 0.0).majorant.max_element();
+        let bound = medium.majorant_segment(ray, 0.0).majorant.max_element();
         let rate = medium.extinction(ray.origin).mean().max(floor * bound);
         // From vacuum there is no rate to go by; tracking crosses it.
         if rate > 0.0 {

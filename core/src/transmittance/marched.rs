@@ -145,22 +145,22 @@ impl Draw {
         if self.found.is_some() || !(length > 0.0) {
             return;
         }
-        let (mut run, mut rise) = (length, 0.5);
+        let (mut reach, mut rise) = (length, 0.5);
         let thickness = 0.5 * (a + b) * length;
         if self.left < thickness {
             let root = float::safe_sqrt(a * a + 2.0 * (b - a) * (self.left / length));
-            run = if a + root > 0.0 { (2.0 * self.left / (a + root)).min(length) } else { 0.0 };
-            let share = run / length;
+            reach = if a + root > 0.0 { (2.0 * self.left / (a + root)).min(length) } else { 0.0 };
+            let share = reach / length;
             rise = 0.5 * share;
             let density = a + (b - a) * share;
             // Vacuum at the very start of the piece, and a number of 0.
             if density > 0.0 {
-                self.found = Some((from + run, density));
+                self.found = Some((from + reach, density));
             }
         }
         self.left = (self.left - thickness).max(0.0);
-        let slope = (slope_a + (slope_b - slope_a) * rise) * run;
+        let slope = (slope_a + (slope_b - slope_a) * rise) * reach;
         self.joint += slope;
-        self.moment += slope * (from + 0.5 * run);
+        self.moment += slope * (from + 0.5 * reach);
     }
 }

@@ -6,7 +6,7 @@
 //! | [`marched`] | collisions drawn from a marched ray, with the thickness up to them |
 //! | [`thickness`] | optical thickness by closed forms and marching, with both gradients |
 //!
-//! Closed forms wherever a [`Stretch`](crate::host::Stretch) says that the medium is constant.
+//! Closed forms wherever a [`MajorantSegment`](crate::host::MajorantSegment) says that the medium is constant.
 
 pub mod marched;
 pub mod thickness;

@@ -1,13 +1,13 @@
 //! Optical thickness and its two gradients: Jarosz et al. 2008, Eq. 16–22, with the factor
 //! `(1 − t)` written out and the terms of the faces added (sheet § 1.4).
 //!
-//! Departs from the paper: stretches on which the medium is constant are integrated in closed form
+//! Departs from the paper: segments on which the medium is constant are integrated in closed form
 //! and only what lies between them is marched; a face that the segment crosses has a term of its
 //! own, without which light from outside a medium has a wrong gradient and a sun none.
 
 use glam::Vec3;
 
-use super::tracking::most_stretches;
+use super::tracking::most_segments;
 use crate::host::Medium;
 use crate::math::quadrature::GAUSS_8;
 use crate::math::{Ray, float};
@@ -16,23 +16,23 @@ use crate::spectrum::{Gradient, Spectrum};
 /// Smallest `|m·u|` in the term of a face: at grazing crossings it has no bound.
 const MIN_FACE_COSINE: f32 = 1e-3;
 
-/// Most samples on one run between constant stretches: beyond, a step is far below what `f32`
+/// Most samples on one part between constant segments: beyond, a step is far below what `f32`
 /// positions resolve, and a mistaken step length must not hang the host.
 const MAX_SAMPLES: u32 = 1 << 16;
 
-/// Stretches after which a run is marched, so that an endless one can end where nothing is seen
+/// Segments after which a changing part is marched, so that an endless one can end where nothing is seen
 /// through it.
-const MAX_RUN: u32 = 256;
+const MAX_JOINED: u32 = 256;
 
-/// How finely a run of changing extinction is sampled.
+/// How finely a part of a ray where extinction changes is sampled.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Steps {
-    /// Steps of about this length (m): `N = max(1, ⌈run / length⌉)`.
+    /// Steps of about this length (m): `N = max(1, ⌈part / length⌉)`.
     Length(f32),
-    /// This many steps per run, whatever its length: the choice for finite differences. A run ends
-    /// after 256 stretches of the medium at the latest.
+    /// This many steps per part, whatever its length: the choice for finite differences. A part ends
+    /// after 256 segments of the medium at the latest.
     Count(u32),
-    /// This many panels of 8 Gauss–Legendre nodes per run; the offset is not used. For smooth media
+    /// This many panels of 8 Gauss–Legendre nodes per part; the offset is not used. For smooth media
     /// as good as exact.
     Gauss(u32),
 }
@@ -63,7 +63,7 @@ impl Marching {
         Self { steps: Steps::Length(length), offset }
     }
 
-    /// A fixed number of steps per run, sampled in their middle.
+    /// A fixed number of steps per part, sampled in their middle.
     #[inline]
     #[must_use]
     pub const fn midpoints(count: u32) -> Self {
@@ -77,17 +77,17 @@ impl Marching {
         Self { offset, ..self }
     }
 
-    /// Calls `visit(distance, weight)` for the samples of a run; the weights sum to its length.
+    /// Calls `visit(distance, weight)` for the samples of a part; the weights sum to its length.
     #[inline]
     pub(super) fn samples(&self, from: f32, until: f32, mut visit: impl FnMut(f32, f32)) {
-        let run = until - from;
+        let extent = until - from;
         let count = match self.steps {
             // A length that is not positive gives NaN or ∞; both end at the maximum or at 1.
-            Steps::Length(length) => libm::ceilf(run / length) as u32,
+            Steps::Length(length) => libm::ceilf(extent / length) as u32,
             Steps::Count(count) | Steps::Gauss(count) => count,
         };
         let count = count.clamp(1, MAX_SAMPLES);
-        let step = run / count as f32;
+        let step = extent / count as f32;
         for j in 0..count {
             if let Steps::Gauss(_) = self.steps {
                 for (node, weight) in GAUSS_8 {
@@ -167,7 +167,7 @@ pub(super) enum Part {
     },
 }
 
-/// Most stretches asked for where a medium ends.
+/// Most segments asked for where a medium ends.
 const MOST_TO_END: u32 = 8;
 
 /// `ray`, cut off where the medium ends for good if it has no end itself; whole where that is not found soon.
@@ -175,59 +175,59 @@ pub(crate) fn until_the_end(ray: &Ray, medium: &(impl Medium + ?Sized)) -> Ray {
     let mut at = 0.0;
     if ray.length.is_infinite() {
         for _ in 0..MOST_TO_END {
-            let stretch = medium.run(ray, at);
-            if stretch.until.is_infinite() && stretch.majorant.is_black() {
+            let segment = medium.marching_segment(ray, at);
+            if segment.until.is_infinite() && segment.majorant.is_black() {
                 return ray.with_length(at);
             }
-            if !(stretch.until > at) || stretch.until.is_infinite() {
+            if !(segment.until > at) || segment.until.is_infinite() {
                 break;
             }
-            at = stretch.until;
+            at = segment.until;
         }
     }
     *ray
 }
 
-/// Splits a ray at the medium's constant stretches; what lies between two of them is one run, or
+/// Splits a ray at the medium's constant segments; what lies between two of them is one part, or
 /// several where it is long. Stops as soon as `visit(part, is_endless)` says so: on endless and very long rays, where nothing
-/// is seen beyond. What lies behind the most stretches a walk may visit counts as vacuum.
+/// is seen beyond. What lies behind the most segments a walk may visit counts as vacuum.
 #[inline]
 pub(super) fn for_each_part(ray: &Ray, medium: &(impl Medium + ?Sized), mut visit: impl FnMut(Part, bool) -> bool) {
-    let (mut at, mut run_from, mut run_count) = (0.0_f32, None, 0);
-    for visited in 0..most_stretches(ray) {
-        let is_endless = ray.length.is_infinite() || visited > 16 * MAX_RUN;
+    let (mut at, mut changing_from, mut joined) = (0.0_f32, None, 0);
+    for visited in 0..most_segments(ray) {
+        let is_endless = ray.length.is_infinite() || visited > 16 * MAX_JOINED;
         // Written so that NaN ends the loop, too.
         if !(at < ray.length) {
             break;
         }
-        let stretch = medium.run(ray, at);
+        let segment = medium.marching_segment(ray, at);
         // A host that does not advance must not hang us.
-        let until = if stretch.until > at { stretch.until } else { at + medium.resolution().max(at * 1e-6) };
+        let until = if segment.until > at { segment.until } else { at + medium.resolution().max(at * 1e-6) };
         let until = until.min(ray.length);
-        let is_changing = until.is_finite() && !stretch.is_constant();
-        if !is_changing || run_count >= MAX_RUN {
-            if let Some(from) = run_from.take()
+        let is_changing = until.is_finite() && !segment.is_constant();
+        if !is_changing || joined >= MAX_JOINED {
+            if let Some(from) = changing_from.take()
                 && visit(Part::Changing { from, until: at }, is_endless)
             {
                 return;
             }
-            run_count = 0;
+            joined = 0;
         }
         if until.is_infinite() {
-            visit(Part::Endless { extinction: stretch.majorant, from: at }, true);
+            visit(Part::Endless { extinction: segment.majorant, from: at }, true);
             return;
         }
         if is_changing {
-            run_from = run_from.or(Some(at));
-            run_count += 1;
-        } else if !stretch.majorant.is_black()
-            && visit(Part::Constant { extinction: stretch.majorant, from: at, until }, is_endless)
+            changing_from = changing_from.or(Some(at));
+            joined += 1;
+        } else if !segment.majorant.is_black()
+            && visit(Part::Constant { extinction: segment.majorant, from: at, until }, is_endless)
         {
             return;
         }
         at = until;
     }
-    if let Some(from) = run_from {
+    if let Some(from) = changing_from {
         visit(Part::Changing { from, until: at }, false);
     }
 }
@@ -246,13 +246,13 @@ pub(super) fn endless(extinction: Spectrum) -> Spectrum {
 /// Optical thickness along `ray`.
 ///
 /// ```text
-/// τ = ∫ σₜ ds,   marched on runs of changing extinction at (j + ξ)/N
+/// τ = ∫ σₜ ds,   marched where extinction changes, at (j + ξ)/N
 /// ```
 ///
-/// Exact on constant stretches; elsewhere unbiased for a random offset. A ray that never leaves
-/// the medium is infinitely thick in the channels where its last stretch may be anything but vacuum;
-/// where bounds have no last stretch (noise), the sum ends once every channel exceeds
-/// [`OPAQUE`](crate::math::float::OPAQUE), or after 65536 stretches.
+/// Exact on constant segments; elsewhere unbiased for a random offset. A ray that never leaves
+/// the medium is infinitely thick in the channels where its last segment may be anything but vacuum;
+/// where bounds have no last segment (noise), the sum ends once every channel exceeds
+/// [`OPAQUE`](crate::math::float::OPAQUE), or after 65536 segments.
 /// 0 for a ray without length. Source: Jarosz et al. 2008, Eq. 16 and 21.
 ///
 /// ```
@@ -286,7 +286,7 @@ pub fn optical_thickness(ray: &Ray, medium: &(impl Medium + ?Sized), marching: M
 /// ```
 ///
 /// with `u = −direction`, and the sums over the faces crossed (outward normal `m`, jump `Δσ` along
-/// it). For an infinite ray both are the same. Exact on constant stretches, else as noisy as the
+/// it). For an infinite ray both are the same. Exact on constant segments, else as noisy as the
 /// marching; 0 for a ray without length. Sources: Jarosz et al. 2008, Eq. 17–22; faces: sheet § 1.4.
 ///
 /// ```
@@ -373,7 +373,7 @@ pub fn transmittance_with_gradients(ray: &Ray, medium: &(impl Medium + ?Sized), 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::host::{Properties, Stretch};
+    use crate::host::{MajorantSegment, Properties};
 
     /// Fog where x lies between the first two numbers, or the next two.
     struct Slabs([f32; 4]);
@@ -382,11 +382,11 @@ mod tests {
         fn properties(&self, _: Vec3) -> Properties {
             Properties::VACUUM
         }
-        fn stretch(&self, ray: &Ray, from: f32) -> Stretch {
+        fn majorant_segment(&self, ray: &Ray, from: f32) -> MajorantSegment {
             let passed = self.0.iter().filter(|face| **face - ray.origin.x <= from).count();
             let until = self.0.get(passed).map_or(f32::INFINITY, |face| face - ray.origin.x);
             let extinction = Spectrum::splat(if passed % 2 == 1 { 1.0 } else { 0.0 });
-            Stretch { until, minorant: extinction, majorant: extinction }
+            MajorantSegment { until, minorant: extinction, majorant: extinction }
         }
     }
 

@@ -1,8 +1,8 @@
 //! Free flights and transmittance by null collisions.
 //!
 //! Delta tracking (Woodcock et al. 1965) and residual ratio tracking (Novák et al. 2014) over the
-//! bounds that [`Medium::stretch`] gives; coloured extinction by one-sample multiple importance
-//! sampling over the channels (Wilkie et al. 2014; Miller et al. 2019). On constant stretches both
+//! bounds that [`Medium::majorant_segment`] gives; coloured extinction by one-sample multiple importance
+//! sampling over the channels (Wilkie et al. 2014; Miller et al. 2019). On constant segments both
 //! turn into closed forms without a special case.
 
 use crate::host::{Medium, Properties, Rng};
@@ -10,35 +10,35 @@ use crate::math::{Ray, float};
 use crate::sampling::{Generator, uniform};
 use crate::spectrum::Spectrum;
 
-/// Most stretches a walk visits, on endless rays a fraction of it: a medium without end and mostly
+/// Most segments a walk visits, on endless rays a fraction of it: a medium without end and mostly
 /// without matter must not hang the host. What lies beyond counts as vacuum.
-pub(super) const MAX_STRETCHES: u32 = 1 << 20;
+pub(super) const MAX_SEGMENTS: u32 = 1 << 20;
 
 /// The same on a ray without end.
-pub(super) const MAX_STRETCHES_ENDLESS: u32 = 1 << 16;
+pub(super) const MAX_SEGMENTS_ENDLESS: u32 = 1 << 16;
 
-/// Most tentative collisions within one stretch: bounds so loose that a walk takes more move it less
+/// Most tentative collisions within one segment: bounds so loose that a walk takes more move it less
 /// than `f32` positions resolve.
 const MAX_COLLISIONS: u32 = 1 << 22;
 
-/// Tentative collisions expected at least on a stretch of an emissive medium: where there is light
+/// Tentative collisions expected at least on a segment of an emissive medium: where there is light
 /// but hardly extinction, collisions alone would never see it.
 const EMISSION_SAMPLES: f32 = 2.0;
 
-/// How many stretches of a ray a walk may visit.
+/// How many segments of a ray a walk may visit.
 #[inline]
-pub(super) fn most_stretches(ray: &Ray) -> u32 {
-    if ray.length.is_finite() { MAX_STRETCHES } else { MAX_STRETCHES_ENDLESS }
+pub(super) fn most_segments(ray: &Ray) -> u32 {
+    if ray.length.is_finite() { MAX_SEGMENTS } else { MAX_SEGMENTS_ENDLESS }
 }
 
-/// Bounds (m⁻¹) down to this are vacuum: on stretches without end, all that is no extinction at all
+/// Bounds (m⁻¹) down to this are vacuum: on segments without end, all that is no extinction at all
 /// but marks emission, which would be infinitely bright there.
 #[inline]
 fn vacuum_bound(end: f32) -> f32 {
     if end.is_finite() { 0.0 } else { 1e-30 }
 }
 
-/// Least bound (m⁻¹) for tentative collisions on a stretch.
+/// Least bound (m⁻¹) for tentative collisions on a segment.
 #[inline]
 fn floor_of(is_emissive: bool, length: f32) -> f32 {
     if is_emissive { (EMISSION_SAMPLES / length).min(1e30) } else { 0.0 }
@@ -123,19 +123,19 @@ fn grey(medium: &(impl Medium + ?Sized), ray: &Ray, u: f32, rng: &mut Generator)
     let mut emission = Spectrum::ZERO;
     let mut span = Span(None);
     let mut t = 0.0;
-    // Optical thickness up to the next tentative collision; what a stretch does not use up is
+    // Optical thickness up to the next tentative collision; what a segment does not use up is
     // carried into the next.
     let mut thickness = step(u);
-    for _ in 0..most_stretches(ray) {
+    for _ in 0..most_segments(ray) {
         // NaN ends the walk, too.
         if !(t < ray.length) {
             break;
         }
-        let stretch = medium.stretch(ray, t);
-        let end = stretch.until.min(ray.length);
-        if stretch.majorant[0] > vacuum_bound(end) {
-            let bound = stretch.majorant[0].max(floor_of(emissive, end - t));
-            let sure = stretch.minorant[0];
+        let segment = medium.majorant_segment(ray, t);
+        let end = segment.until.min(ray.length);
+        if segment.majorant[0] > vacuum_bound(end) {
+            let bound = segment.majorant[0].max(floor_of(emissive, end - t));
+            let sure = segment.minorant[0];
             let inverse = 1.0 / bound;
             let start = t;
             for _ in 0..MAX_COLLISIONS {
@@ -189,17 +189,17 @@ fn coloured(medium: &(impl Medium + ?Sized), ray: &Ray, throughput: Spectrum, u:
     let mut span = Span(None);
     let mut t = 0.0;
     let mut thickness = step(u);
-    for _ in 0..most_stretches(ray) {
+    for _ in 0..most_segments(ray) {
         if !(t < ray.length) {
             break;
         }
-        let stretch = medium.stretch(ray, t);
-        let end = stretch.until.min(ray.length);
+        let segment = medium.majorant_segment(ray, t);
+        let end = segment.until.min(ray.length);
         let start = t;
-        if stretch.majorant.max_element() > vacuum_bound(end) {
+        if segment.majorant.max_element() > vacuum_bound(end) {
             let floor = floor_of(emissive, end - t);
-            let majorant = stretch.majorant.map(|c| c.max(floor));
-            let is_sure = stretch.is_constant() && majorant == stretch.majorant;
+            let majorant = segment.majorant.map(|c| c.max(floor));
+            let is_sure = segment.is_constant() && majorant == segment.majorant;
             let bound = majorant[channel];
             for _ in 0..MAX_COLLISIONS {
                 let length = if bound > 0.0 { thickness / bound } else { f32::INFINITY };
@@ -292,13 +292,13 @@ fn grey_transmittance(medium: &(impl Medium + ?Sized), ray: &Ray, rng: &mut (imp
     let mut closed = 0.0;
     let mut ratio = 1.0;
     let mut t = 0.0;
-    for _ in 0..most_stretches(ray) {
+    for _ in 0..most_segments(ray) {
         if !(t < ray.length) {
             break;
         }
-        let stretch = medium.stretch(ray, t);
-        let end = stretch.until.min(ray.length);
-        let (low, high) = (stretch.minorant[0], stretch.majorant[0]);
+        let segment = medium.majorant_segment(ray, t);
+        let end = segment.until.min(ray.length);
+        let (low, high) = (segment.minorant[0], segment.majorant[0]);
         if low > 0.0 {
             closed += low * (end - t);
             if closed > float::OPAQUE {
@@ -331,13 +331,13 @@ fn coloured_transmittance(medium: &(impl Medium + ?Sized), ray: &Ray, rng: &mut 
     let mut closed = Spectrum::ZERO;
     let mut ratio = Spectrum::ONE;
     let mut t = 0.0;
-    for _ in 0..most_stretches(ray) {
+    for _ in 0..most_segments(ray) {
         if !(t < ray.length) {
             break;
         }
-        let stretch = medium.stretch(ray, t);
-        let end = stretch.until.min(ray.length);
-        let (low, high) = (stretch.minorant, stretch.majorant);
+        let segment = medium.majorant_segment(ray, t);
+        let end = segment.until.min(ray.length);
+        let (low, high) = (segment.minorant, segment.majorant);
         // 0 · ∞ in vacuum would be NaN.
         closed += low.map(|c| if c > 0.0 { c * (end - t) } else { 0.0 });
         if closed.min_element() > float::OPAQUE {

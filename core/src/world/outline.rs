@@ -17,7 +17,7 @@ const LOOKS: u32 = 24;
 /// Rays that look for surfaces and at the course of a medium. Fewer: small mirrors are missed.
 const RAYS: u32 = 1024;
 
-/// Stretches of a ray that are asked for: what changes has changed by then.
+/// MajorantSegmentes of a ray that are asked for: what changes has changed by then.
 const MOST_STRETCHES: u32 = 64;
 
 /// How many lights there are, of which kinds; a light may be of several.
@@ -237,15 +237,15 @@ impl Matter {
 fn is_constant_along(medium: &(impl Medium + ?Sized), ray: &Ray) -> bool {
     let mut at = 0.0;
     for _ in 0..MOST_STRETCHES {
-        let stretch = medium.stretch(ray, at);
-        if !stretch.is_constant() {
+        let segment = medium.majorant_segment(ray, at);
+        if !segment.is_constant() {
             return false;
         }
         // A host that does not advance, too.
-        if !(stretch.until > at && stretch.until < ray.length) {
+        if !(segment.until > at && segment.until < ray.length) {
             break;
         }
-        at = stretch.until;
+        at = segment.until;
     }
     true
 }
@@ -253,7 +253,7 @@ fn is_constant_along(medium: &(impl Medium + ?Sized), ray: &Ray) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::host::{Empty, Hit, Properties, Stretch};
+    use crate::host::{Empty, Hit, Properties, MajorantSegment};
     use crate::medium::{Homogeneous, Placed, Region};
     use crate::phase::Lobe;
     use crate::spectrum::Spectrum;
@@ -289,8 +289,8 @@ mod tests {
             let phase = Lobe::HenyeyGreenstein { g }.into();
             Properties { absorption: scattering, scattering, phase, ..Properties::VACUUM }
         }
-        fn stretch(&self, _: &Ray, _: f32) -> Stretch {
-            Stretch { until: f32::INFINITY, minorant: Spectrum::ONE, majorant: Spectrum::splat(2.0) }
+        fn majorant_segment(&self, _: &Ray, _: f32) -> MajorantSegment {
+            MajorantSegment { until: f32::INFINITY, minorant: Spectrum::ONE, majorant: Spectrum::splat(2.0) }
         }
     }
 

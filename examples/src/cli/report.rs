@@ -139,7 +139,7 @@ impl Report<'_> {
             "{{\n  \"scene\": {},\n  \"method\": \"{}\",\n  \"width\": {},\n  \"height\": {},\n  \
              \"samples_per_pixel\": {},\n  \"seed\": {},\n  \"ended\": \"{reason}\",\n  \
              \"seconds\": {{{phases}\n  }},\n  \"counts\": {{\"samples\": {}, \"rays\": {}, \"shadow_rays\": {}, \
-             \"collisions\": {}, \"medium_lookups\": {}, \"medium_stretches\": {}, \"cache_lookups\": {}, \"cache_misses\": {}, \"non_finite\": {}}},\n  \
+             \"collisions\": {}, \"medium_lookups\": {}, \"medium_segments\": {}, \"cache_lookups\": {}, \"cache_misses\": {}, \"non_finite\": {}}},\n  \
              {energy}\"records\": {{{records}}},\n  \"bytes\": {{{bytes}}}\n}}\n",
             quoted(&self.arguments.scene.display().to_string()),
             match self.arguments.method {
@@ -158,7 +158,7 @@ impl Report<'_> {
             counters.shadow_rays,
             counters.collisions,
             counters.lookups,
-            counters.stretches,
+            counters.segments,
             counters.cache_lookups,
             counters.cache_misses,
             counters.non_finite,

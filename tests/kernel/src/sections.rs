@@ -220,8 +220,8 @@ impl Medium for Haze {
         let scattering = Spectrum::new(0.3, 0.4, 0.5) * density.max(0.0);
         Properties { absorption: scattering * 0.1, scattering, ..Properties::VACUUM }
     }
-    fn stretch(&self, _: &Ray, _: f32) -> fogbow::host::Stretch {
-        fogbow::host::Stretch { until: f32::INFINITY, minorant: Spectrum::ZERO, majorant: Spectrum::splat(1.0) }
+    fn majorant_segment(&self, _: &Ray, _: f32) -> fogbow::host::MajorantSegment {
+        fogbow::host::MajorantSegment { until: f32::INFINITY, minorant: Spectrum::ZERO, majorant: Spectrum::splat(1.0) }
     }
 }
 
@@ -237,10 +237,10 @@ pub(crate) fn questions(out: &mut Digest, medium: &dyn Medium, rng: &mut Generat
     out.spectrum(medium.extinction_hessian(at).between(direction(rng), direction(rng)));
     out.spectrum(medium.mean_extinction(at, uniform(rng)));
     let ray = Ray::between(at, point(rng));
-    let stretch = medium.stretch(&ray, 0.5 * ray.length);
-    out.float(stretch.until);
-    out.spectrum(stretch.minorant);
-    out.spectrum(stretch.majorant);
+    let segment = medium.majorant_segment(&ray, 0.5 * ray.length);
+    out.float(segment.until);
+    out.spectrum(segment.minorant);
+    out.spectrum(segment.majorant);
     medium.faces(&ray, &mut |face| {
         out.float(face.distance);
         out.vec3(face.normal);

@@ -1,6 +1,6 @@
 //! What the tests of media share.
 
-use fogbow::host::{Medium, Stretch};
+use fogbow::host::{MajorantSegment, Medium};
 use fogbow::math::{Affine3, Mat3, Ray, Vec3, float};
 use fogbow::medium::{Density, Grid, MediumError, MinMax};
 use fogbow::phase::Phase;
@@ -74,19 +74,19 @@ pub(crate) fn assert_near(a: f32, b: f32, tolerance: f32, what: &str) {
     assert!((a - b).abs() <= tolerance, "{what}: {a} and {b} differ by more than {tolerance}");
 }
 
-/// Walks along a ray and checks every promise of [`Medium::stretch`] and of [`Medium::run`]; returns the number of
-/// stretches.
+/// Walks along a ray and checks every promise of [`Medium::majorant_segment`] and of [`Medium::marching_segment`]; returns the number of
+/// segments.
 ///
 /// Within `blur` (m) of a face its two sides cannot be told apart, and either's value is right.
 pub(crate) fn check_walk(medium: &impl Medium, ray: &Ray, end: f32, blur: f32, rng: &mut Generator) -> u32 {
-    let stretches = check_steps(medium, |t| medium.stretch(ray, t), ray, end, blur, rng);
-    check_steps(medium, |t| medium.run(ray, t), ray, end, blur, rng);
-    stretches
+    let segments = check_steps(medium, |t| medium.majorant_segment(ray, t), ray, end, blur, rng);
+    check_steps(medium, |t| medium.marching_segment(ray, t), ray, end, blur, rng);
+    segments
 }
 
 fn check_steps(
     medium: &impl Medium,
-    next: impl Fn(f32) -> Stretch,
+    next: impl Fn(f32) -> MajorantSegment,
     ray: &Ray,
     end: f32,
     blur: f32,
@@ -94,12 +94,12 @@ fn check_steps(
 ) -> u32 {
     let (mut t, mut steps) = (0.0_f32, 0);
     while t < end {
-        let stretch = next(t);
+        let segment = next(t);
         steps += 1;
-        assert!(stretch.until > t, "no progress at {t}: {stretch:?}, {ray:?}");
+        assert!(segment.until > t, "no progress at {t}: {segment:?}, {ray:?}");
         assert!(steps < 20_000, "endless walk: {ray:?}");
-        assert!(stretch.minorant.is_valid() && stretch.majorant.is_valid(), "{stretch:?}");
-        let until = stretch.until.min(end);
+        assert!(segment.minorant.is_valid() && segment.majorant.is_valid(), "{segment:?}");
+        let until = segment.until.min(end);
         for i in 0..6 {
             let s = match i {
                 0 => t,
@@ -111,8 +111,8 @@ fn check_steps(
             let apart = (gradient - medium.gradients(ray.at(s)).extinction).norm().max_element();
             assert!(value == sigma && apart <= 1e-5 * gradient.norm().max_element(), "{value:?}, {sigma:?}, {apart}");
             for channel in 0..3 {
-                let (low, high) = (stretch.minorant[channel], stretch.majorant[channel]);
-                assert!(low <= high, "{stretch:?}");
+                let (low, high) = (segment.minorant[channel], segment.majorant[channel]);
+                assert!(low <= high, "{segment:?}");
                 let keeps = |value: f32| value >= low && value <= high;
                 let value = sigma[channel];
                 // Where a face jumps within rounding of the point, the other side's value will do.
@@ -122,10 +122,10 @@ fn check_steps(
                         keeps(other) && (other - value).abs() > 1e-3 * value.max(other)
                     })
                 };
-                assert!(keeps(value) || jumps_to_bounds(), "{value} outside {stretch:?} at {s} of {ray:?}");
+                assert!(keeps(value) || jumps_to_bounds(), "{value} outside {segment:?} at {s} of {ray:?}");
             }
             let near_end = (s - t).abs() <= blur || (s - until).abs() <= blur;
-            if stretch.is_constant() && !near_end {
+            if segment.is_constant() && !near_end {
                 let middle = medium.properties(ray.at(t + 0.5 * (until - t)));
                 let here = medium.properties(ray.at(s));
                 if middle.scattering.is_black() || here.scattering.is_black() {

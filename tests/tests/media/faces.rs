@@ -10,14 +10,14 @@ use proptest::prelude::*;
 
 use crate::common::*;
 
-/// Optical thickness of a ray by stretches of vacuum and of constant medium alone.
+/// Optical thickness of a ray by segments of vacuum and of constant medium alone.
 fn thickness(medium: &impl Medium, ray: &Ray) -> f32 {
     let (mut t, mut sum) = (0.0_f32, 0.0_f64);
     while t < ray.length {
-        let stretch = medium.stretch(ray, t);
-        assert!(stretch.is_constant());
-        let until = stretch.until.min(ray.length);
-        sum += f64::from(stretch.majorant[0]) * f64::from(until - t);
+        let segment = medium.majorant_segment(ray, t);
+        assert!(segment.is_constant());
+        let until = segment.until.min(ray.length);
+        sum += f64::from(segment.majorant[0]) * f64::from(until - t);
         t = until;
     }
     sum as f32
@@ -197,8 +197,8 @@ proptest! {
         for medium in [AnyMedium::from(grid), AnyMedium::from(noise)] {
             for region in [Region::Everywhere, Region::sphere(Vec3::ZERO, 2.0).unwrap()] {
                 let placed = Placed::new(medium, region).with_holes(&hole);
-                let stretch = placed.stretch(&ray, from);
-                prop_assert!(stretch.until > from && stretch.majorant.is_valid() && stretch.minorant.is_valid());
+                let segment = placed.majorant_segment(&ray, from);
+                prop_assert!(segment.until > from && segment.majorant.is_valid() && segment.minorant.is_valid());
                 prop_assert!(placed.extinction(at).is_valid());
                 prop_assert!(placed.gradients(at).extinction.is_finite());
                 prop_assert!(placed.extinction_hessian(at).xx.is_finite());

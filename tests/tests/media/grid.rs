@@ -1,6 +1,6 @@
 //! Grids: bounds, lookups, derivatives.
 
-use fogbow::host::{Medium, Stretch};
+use fogbow::host::{MajorantSegment, Medium};
 use fogbow::math::{Affine3, Mat3, Ray, Vec3};
 use fogbow::medium::{BLOCK, Density, Grid, MinMax};
 use fogbow::phase::Phase;
@@ -83,12 +83,12 @@ fn rays_that_miss_a_grid_see_vacuum_for_ever() {
         (Vec3::new(-1.0, -1.0, 0.5), Vec3::new(-0.6, 0.8, 0.0)),
         (Vec3::new(0.5, 0.5, 1.0 + 1e-6), Vec3::Y),
     ] {
-        assert_eq!(grid.stretch(&Ray::new(origin, direction), 0.0), Stretch::vacuum(f32::INFINITY));
+        assert_eq!(grid.majorant_segment(&Ray::new(origin, direction), 0.0), MajorantSegment::vacuum(f32::INFINITY));
     }
     let through = Ray::new(Vec3::new(-1.0, 0.5, 0.5), Vec3::X);
-    assert_eq!(grid.stretch(&through, 0.0), Stretch::vacuum(1.0));
-    assert_eq!(grid.stretch(&through, 2.0), Stretch::vacuum(f32::INFINITY));
-    let inside = grid.stretch(&through, 1.0);
+    assert_eq!(grid.majorant_segment(&through, 0.0), MajorantSegment::vacuum(1.0));
+    assert_eq!(grid.majorant_segment(&through, 2.0), MajorantSegment::vacuum(f32::INFINITY));
+    let inside = grid.majorant_segment(&through, 1.0);
     assert!(inside.is_constant() && inside.until > 1.0 && inside.majorant == ABSORPTION + SCATTERING);
 }
 
@@ -97,23 +97,23 @@ fn empty_blocks_are_passed_in_one_step() {
     let n = 16 * BLOCK;
     let mut voxels = Voxels::new([n, 1, 1], Affine3::IDENTITY, |i| f32::from(u8::from(i as u32 == n - 1)));
     let grid = voxels.grid();
-    let stretch = grid.stretch(&Ray::new(Vec3::new(-1.0, 0.5, 0.5), Vec3::X), 0.0);
-    assert!(stretch.majorant.is_black());
+    let segment = grid.majorant_segment(&Ray::new(Vec3::new(-1.0, 0.5, 0.5), Vec3::X), 0.0);
+    assert!(segment.majorant.is_black());
     // The last block, or the one before it, which interpolates with its neighbour.
-    let run = grid.run(&Ray::new(Vec3::new(-1.0, 0.5, 0.5), Vec3::X), 0.0);
-    assert_eq!(run, stretch);
-    assert_near(stretch.until, 2.0 - 1.0 / 16.0, 1e-6, "start of the last block");
+    let marching = grid.marching_segment(&Ray::new(Vec3::new(-1.0, 0.5, 0.5), Vec3::X), 0.0);
+    assert_eq!(marching, segment);
+    assert_near(segment.until, 2.0 - 1.0 / 16.0, 1e-6, "start of the last block");
 }
 
-/// Thick smoke ends stretches early, so that bounds are tight; marching has no use for bounds.
+/// Thick smoke ends segments early, so that bounds are tight; marching has no use for bounds.
 #[test]
 fn smoke_is_one_run_however_thick() {
     let n = 16 * BLOCK;
     let mut voxels = Voxels::new([n, 1, 1], Affine3::IDENTITY, |i| 1e3 * (1.0 + i as f32));
     let grid = voxels.grid();
     let ray = Ray::new(Vec3::new(-1.0, 0.5, 0.5), Vec3::X);
-    assert!(grid.stretch(&ray, 1.0).until < 1.2);
-    assert_near(grid.run(&ray, 1.0).until, 2.0, 1e-5, "end of the smoke");
+    assert!(grid.majorant_segment(&ray, 1.0).until < 1.2);
+    assert_near(grid.marching_segment(&ray, 1.0).until, 2.0, 1e-5, "end of the smoke");
 }
 
 #[test]
@@ -266,7 +266,7 @@ fn a_second_grid_absorbs_and_a_third_emits() {
         let sum = grid.extinction(p) - q.extinction();
         assert_near(sum.map(f32::abs).max_element(), 0.0, 1e-6, "extinction");
         // Vacuum may not emit.
-        let stretch = grid.stretch(&Ray::new(p, ray.direction), 0.0);
-        assert!(q.emission.is_black() || !stretch.majorant.is_black());
+        let segment = grid.majorant_segment(&Ray::new(p, ray.direction), 0.0);
+        assert!(q.emission.is_black() || !segment.majorant.is_black());
     }
 }

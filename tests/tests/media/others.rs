@@ -46,10 +46,10 @@ fn noise_keeps_its_bounds_along_rays_and_its_gradient_is_right() {
     let (mut t, mut bound, mut value) = (0.0, 0.0, 0.0);
     let ray = Ray::new(Vec3::ZERO, Vec3::new(0.6, 0.48, 0.64));
     while t < 500.0 {
-        let stretch = noise.stretch(&ray, t);
-        bound += stretch.majorant[0] * (stretch.until - t);
-        value += noise.extinction(ray.at(t + uniform(&mut rng) * (stretch.until - t)))[0] * (stretch.until - t);
-        t = stretch.until;
+        let segment = noise.majorant_segment(&ray, t);
+        bound += segment.majorant[0] * (segment.until - t);
+        value += noise.extinction(ray.at(t + uniform(&mut rng) * (segment.until - t)))[0] * (segment.until - t);
+        t = segment.until;
     }
     println!("bound {bound}, mean {value}, largest {}", 4.0 * t);
     assert!(bound < 0.7 * (4.0 * t), "{bound} {value}");
@@ -87,7 +87,7 @@ fn overlapping_media_add_and_mix() {
     assert!(all.is_emissive() && !all.is_grey());
     let none = Overlap::<Homogeneous>::new(&[], Homogeneous::phase).unwrap();
     let ray = Ray::new(Vec3::ZERO, Vec3::X);
-    assert_eq!(none.stretch(&ray, 0.0), Empty.stretch(&ray, 0.0));
+    assert_eq!(none.majorant_segment(&ray, 0.0), Empty.majorant_segment(&ray, 0.0));
     let lobe = |i: usize| Lobe::HenyeyGreenstein { g: 0.1 * i as f32 };
     let five: [_; 5] = core::array::from_fn(|i| Homogeneous::new(ABSORPTION, SCATTERING, lobe(i)).unwrap());
     assert_eq!(Overlap::new(&five, Homogeneous::phase), Err(MediumError::TooManyLobes));

@@ -1,7 +1,7 @@
 //! Mean extinction in a ball from a pyramid of means.
 
 use fogbow::host::Medium;
-use fogbow::host::{Properties, Stretch};
+use fogbow::host::{MajorantSegment, Properties};
 use fogbow::math::{Affine3, Bounds, Mat3, Ray, Vec3};
 use fogbow::medium::{FractalNoise, Homogeneous, MediumError, Noise, Placed, Pyramid, Region};
 use fogbow::phase::Phase;
@@ -100,8 +100,8 @@ impl Medium for Bowl {
     fn properties(&self, point: Vec3) -> Properties {
         Properties { scattering: Spectrum::splat(1.0 + point.length_squared()), ..Properties::VACUUM }
     }
-    fn stretch(&self, _: &Ray, _: f32) -> Stretch {
-        Stretch { until: f32::INFINITY, minorant: Spectrum::ONE, majorant: Spectrum::splat(f32::MAX) }
+    fn majorant_segment(&self, _: &Ray, _: f32) -> MajorantSegment {
+        MajorantSegment { until: f32::INFINITY, minorant: Spectrum::ONE, majorant: Spectrum::splat(f32::MAX) }
     }
 }
 

@@ -69,21 +69,21 @@ fn measure(name: &str, medium: &impl Medium, rays: &[Ray], points: &[Vec3]) {
     const END: f32 = 4.0;
     let points = &points[..2000];
     let mut sum = 0.0;
-    let mut stretches = 0_usize;
+    let mut segments = 0_usize;
     let walks = least(rays.len(), || {
-        stretches = 0;
+        segments = 0;
         for ray in rays {
             let mut t = 0.0;
             while t < END {
-                let stretch = medium.stretch(ray, t);
-                stretches += 1;
-                sum += stretch.majorant[0];
-                t = stretch.until;
+                let segment = medium.majorant_segment(ray, t);
+                segments += 1;
+                sum += segment.majorant[0];
+                t = segment.until;
             }
         }
     });
-    let steps = stretches as f64 / rays.len() as f64;
-    let stretch = walks / steps;
+    let steps = segments as f64 / rays.len() as f64;
+    let segment = walks / steps;
     let lookup = least(points.len(), || sum += points.iter().map(|p| medium.extinction(*p)[0]).sum::<f32>());
     let properties =
         least(points.len(), || sum += points.iter().map(|p| medium.properties(*p).scattering[0]).sum::<f32>());
@@ -98,9 +98,9 @@ fn measure(name: &str, medium: &impl Medium, rays: &[Ray], points: &[Vec3]) {
             for ray in rays {
                 let (mut t, mut transmittance) = (0.0_f32, 1.0);
                 'ray: while t < END {
-                    let stretch = medium.stretch(ray, t);
-                    let bound = stretch.majorant.max_element();
-                    let end = stretch.until.min(END);
+                    let segment = medium.majorant_segment(ray, t);
+                    let bound = segment.majorant.max_element();
+                    let end = segment.until.min(END);
                     if bound == 0.0 {
                         t = end;
                         continue;
@@ -127,7 +127,7 @@ fn measure(name: &str, medium: &impl Medium, rays: &[Ray], points: &[Vec3]) {
     let (transmittance, tracked) = track(true);
     let (flight, collided) = track(false);
     println!(
-        "{name}: stretch {stretch:.1} ns ({steps:.1} a ray), extinction {lookup:.1} ns, properties {properties:.1} ns, \
+        "{name}: segment {segment:.1} ns ({steps:.1} a ray), extinction {lookup:.1} ns, properties {properties:.1} ns, \
          ball {ball:.0} ns, transmittance {transmittance:.0} ns ({tracked:.2} collisions), \
          free flight {flight:.0} ns ({collided:.2}) [{sum}]"
     );

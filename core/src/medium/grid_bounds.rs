@@ -3,16 +3,16 @@
 use super::Grid;
 use super::majorant::{Entry, Field, MinMax, Walk};
 use super::region::LocalLine;
-use crate::host::Stretch;
+use crate::host::MajorantSegment;
 use crate::math::Ray;
 use crate::spectrum::Spectrum;
 
-/// Expected null collisions a joined stretch may add over its blocks by themselves: asking for a
-/// stretch costs some three collisions. With 0 a ray through thin smoke takes twice the time; with
+/// Expected null collisions a joined segment may add over its blocks by themselves: asking for a
+/// segment costs some three collisions. With 0 a ray through thin smoke takes twice the time; with
 /// more, the bounds of thick clouds get loose.
 const WASTE: f32 = 1.0;
 
-/// Majorant thickness of a stretch at which no more is joined: a walk has most likely ended by then.
+/// Majorant thickness of a segment at which no more is joined: a walk has most likely ended by then.
 const ENOUGH: f32 = 2.0;
 
 /// Constant blocks that a ray crosses on fewer cells than this are marched with those around them.
@@ -57,57 +57,58 @@ impl FieldBounds {
 }
 
 impl Grid<'_> {
-    /// See [`Medium::stretch`](crate::host::Medium::stretch) and [`Medium::run`](crate::host::Medium::run) of a grid.
+    /// See [`Medium::majorant_segment`](crate::host::Medium::majorant_segment) and
+    /// [`Medium::marching_segment`](crate::host::Medium::marching_segment) of a grid.
     #[inline]
-    pub(super) fn joined_stretch(&self, ray: &Ray, from: f32, joining: Joining) -> Stretch {
+    pub(super) fn joined_segment(&self, ray: &Ray, from: f32, joining: Joining) -> MajorantSegment {
         let line = LocalLine::new(&self.cells_from_world, ray);
         let origin = ray.origin.abs().max_element();
         let mut walk = match Walk::enter(&line, self.size, from, origin, &self.reach) {
-            Entry::Miss => return Stretch::vacuum(f32::INFINITY),
-            Entry::Coarse(near, _) if near > from => return Stretch::vacuum(near),
-            Entry::Coarse(_, far) => return self.stretch_of(&self.bounds(None), far),
+            Entry::Miss => return MajorantSegment::vacuum(f32::INFINITY),
+            Entry::Coarse(near, _) if near > from => return MajorantSegment::vacuum(near),
+            Entry::Coarse(_, far) => return self.segment_of(&self.bounds(None), far),
             Entry::Blocks(walk) => walk,
         };
-        let (mut run, mut until) = loop {
-            let Some(segment) = walk.next() else { return Stretch::vacuum(f32::INFINITY) };
-            let bounds = self.bounds(Some(segment.block));
+        let (mut found, mut until) = loop {
+            let Some(span) = walk.next() else { return MajorantSegment::vacuum(f32::INFINITY) };
+            let bounds = self.bounds(Some(span.block));
             if !bounds.is_empty() {
-                if segment.begin > from {
-                    return Stretch::vacuum(segment.begin);
+                if span.begin > from {
+                    return MajorantSegment::vacuum(span.begin);
                 }
-                break (bounds, segment.end);
+                break (bounds, span.end);
             }
-            if segment.end > ray.length {
-                return Stretch::vacuum(segment.end);
+            if span.end > ray.length {
+                return MajorantSegment::vacuum(span.end);
             }
         };
-        let is_constant = run.is_constant();
-        let mut thickness = self.thickest(&run) * (until - from);
+        let is_constant = found.is_constant();
+        let mut thickness = self.thickest(&found) * (until - from);
         while until < ray.length && (is_constant || joining == Joining::Loose || thickness < ENOUGH) {
-            let Some(segment) = walk.next() else { break };
-            let bounds = self.bounds(Some(segment.block));
-            let joined = run.union(&bounds);
+            let Some(span) = walk.next() else { break };
+            let bounds = self.bounds(Some(span.block));
+            let joined = found.union(&bounds);
             if is_constant {
-                if joined != run {
+                if joined != found {
                     break;
                 }
             } else if joining == Joining::Loose {
-                if bounds.is_constant() && segment.end - segment.begin > SHORT * self.resolution {
+                if bounds.is_constant() && span.end - span.begin > SHORT * self.resolution {
                     break;
                 }
-                run = joined;
+                found = joined;
             } else {
                 let higher = self.thickest(&joined);
-                thickness += self.thickest(&bounds) * (segment.end - until);
-                let is_wasteful = higher * (segment.end - from) - thickness > WASTE;
+                thickness += self.thickest(&bounds) * (span.end - until);
+                let is_wasteful = higher * (span.end - from) - thickness > WASTE;
                 if is_wasteful || bounds.is_constant() && !bounds.is_empty() {
                     break;
                 }
-                run = joined;
+                found = joined;
             }
-            until = segment.end;
+            until = span.end;
         }
-        self.stretch_of(&run, until)
+        self.segment_of(&found, until)
     }
 
     /// Bounds of every density in a block, or in the whole grid.
@@ -125,7 +126,7 @@ impl Grid<'_> {
     }
 
     #[inline]
-    pub(super) fn stretch_of(&self, bounds: &FieldBounds, until: f32) -> Stretch {
+    pub(super) fn segment_of(&self, bounds: &FieldBounds, until: f32) -> MajorantSegment {
         let sum = |s: f32, a: f32| match self.absorption_density {
             // Rounded as in a lookup.
             None => (self.absorption + self.scattering) * s,
@@ -133,25 +134,25 @@ impl Grid<'_> {
         };
         let minorant = sum(bounds.density.min, bounds.absorption.min);
         let majorant = sum(bounds.density.max, bounds.absorption.max);
-        let mut stretch = Stretch { until, minorant, majorant };
-        if stretch.is_constant() {
-            self.keep_promises(bounds, &mut stretch);
+        let mut segment = MajorantSegment { until, minorant, majorant };
+        if segment.is_constant() {
+            self.keep_promises(bounds, &mut segment);
         }
-        stretch
+        segment
     }
 
     /// Equal bounds promise that everything is constant: not so where only emission, or the two
     /// parts of extinction in a sum that rounding makes constant, vary.
     #[cold]
-    fn keep_promises(&self, bounds: &FieldBounds, stretch: &mut Stretch) {
+    fn keep_promises(&self, bounds: &FieldBounds, segment: &mut MajorantSegment) {
         let is_constant = |bounds: MinMax, coefficient: Spectrum| coefficient.is_black() || bounds.min == bounds.max;
         let emits = !self.emission.is_black() && bounds.emission.max > 0.0;
         let holds = is_constant(bounds.density, self.scattering)
             && is_constant(bounds.absorption, self.absorption)
             && is_constant(bounds.emission, self.emission)
-            && !(emits && stretch.majorant.is_black());
+            && !(emits && segment.majorant.is_black());
         if !holds {
-            stretch.majorant = stretch.majorant.map(|c| c.max(f32::MIN_POSITIVE) * (1.0 + 2.0 * f32::EPSILON));
+            segment.majorant = segment.majorant.map(|c| c.max(f32::MIN_POSITIVE) * (1.0 + 2.0 * f32::EPSILON));
         }
     }
 }
