@@ -13,6 +13,61 @@ use crate::world::World;
 
 /// The caches of a world, by kind. They may be filled again for another view ([`RadianceCaches::fill`]), and then gain
 /// what is missing.
+///
+/// ```
+/// # #[cfg(feature = "alloc")] {
+/// # use fogbow::cache::{Asked, Kind, Output, RadianceCaches, Seen, Settings};
+/// # use fogbow::{host::Empty, light::{Light, PointLight}, math::{Bounds, Ray, Vec3}, medium::{Homogeneous, Placed, Region}};
+/// # use fogbow::{phase::Lobe, sampling::{Generator, Independent}, spectrum::Spectrum, work, world::{Outline, World}};
+/// let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::splat(0.8), Lobe::HenyeyGreenstein { g: 0.3 })?;
+/// let ball = Placed::new(fog, Region::sphere(Vec3::ZERO, 1.0)?);
+/// let lamps = [Light::Point(PointLight::from_flux(0.2 * Vec3::Y, Spectrum::ONE)?)];
+/// let world = World { medium: &ball, scene: &Empty, lights: &lamps };
+/// let bounds = Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE };
+///
+/// // Anywhere in a box: coarser than usual, so that this example is quick.
+/// let settings = Settings { rays: 60, ..Settings::for_outline(&Outline::of(&world, bounds)).with_walks(16) };
+/// let mut filling = RadianceCaches::new(settings).fill(Asked::<fn([f32; 2]) -> Ray>::Box(bounds));
+/// work::finish(&mut filling, &world, &mut Output::default());
+/// assert!(!filling.is_cut() && filling.computed(Kind::Multiple) > 0);
+/// assert!(!filling.caches().records(Kind::Multiple).is_empty());
+/// let caches = filling.finish();
+/// assert!(caches.settings().surface.is_some() && !caches.is_open() && caches.bytes(Kind::Multiple) > 0);
+/// assert!(caches.volume(Kind::Multiple).is_some() && caches.surface(Kind::Irradiance).is_some());
+/// assert!(caches.reader().single.is_none(), "one lamp is connected to");
+///
+/// // A pixel, and many; light that the medium scatters left out.
+/// let (ray, rng) = (Ray::new(-2.0 * Vec3::Z, Vec3::Z), &mut Generator::new(1));
+/// assert!(caches.radiance(&ray, &world, rng).medium_multiple.mean() > 0.0);
+/// assert_eq!(caches.radiance_beyond(&ray, &world, rng).total(), Spectrum::ZERO);
+/// let mut seen = [Seen::default(); 2];
+/// caches.radiance_many(&[ray, ray], &mut seen, &world, 0, &Independent);
+/// assert!(seen[1].total().mean() > 0.0);
+///
+/// // A point towards an eye, by part; a probe for any direction, whose degree 0 says the fluence.
+/// let point = 0.4 * Vec3::X;
+/// assert_eq!(caches.in_scattered(point, Vec3::NEG_Z, &world, rng).sampled, 1, "light of the lamp, not cached");
+/// let mut probe = [Spectrum::ZERO; 4];
+/// assert!(caches.in_scattered_sh(point, &mut probe));
+/// let fluence = caches.fluence(point).unwrap();
+/// assert!((fluence[0] / probe[0][0] - libm::sqrtf(4.0 * core::f32::consts::PI)).abs() < 1e-3);
+/// let (mut probes, mut fluences) = ([Spectrum::ZERO; 8], [Spectrum::ZERO; 2]);
+/// assert_eq!(caches.in_scattered_sh_many(&[point, 9.0 * Vec3::X], &mut probes), 1, "nothing is known out there");
+/// assert_eq!((caches.fluence_many(&[point, point], &mut fluences), fluences[1]), (0, fluence));
+///
+/// // There are no surfaces, so nothing is known of their irradiance.
+/// assert_eq!(caches.irradiance(Vec3::ZERO, Vec3::Y), None);
+/// assert_eq!(caches.irradiance_many(&[(Vec3::ZERO, Vec3::Y)], &mut [Spectrum::ONE]), 1);
+///
+/// // To bytes and back.
+/// let bytes = caches.to_bytes(7);
+/// let (mut copy, mut written) = (RadianceCaches::new(settings), 0);
+/// copy.read(&bytes, 7)?;
+/// copy.write(7, |part| Ok::<(), ()>(written += part.len())).unwrap();
+/// assert_eq!((copy.fluence(point), copy.byte_count(), written), (Some(fluence), bytes.len(), bytes.len()));
+/// # }
+/// # Ok::<(), Box<dyn core::error::Error>>(())
+/// ```
 #[derive(Debug)]
 pub struct RadianceCaches<'s> {
     pub(super) settings: Settings,

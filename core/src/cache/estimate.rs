@@ -97,7 +97,7 @@ impl Mixture<'_> {
 /// let random = (0.5, Vec2::splat(0.5));   // chooses the light and the point on it
 /// assert!(near(estimator.direct_at(at, &floor, false, random, &mut rng), 0.25));
 /// assert!(near(estimator.outgoing(&Ray::new(Vec3::Z, Vec3::NEG_Z), &floor, &mut rng), 0.5 / PI * 0.25));
-/// assert!(near(estimator.reflected(at, &floor, Vec3::Z, surface, random, &mut rng), 0.5 / PI * 0.25));
+/// assert!(near(estimator.reflected(at, &floor, Vec3::Z, random, &mut rng), 0.5 / PI * 0.25));
 /// // Nothing is scattered twice in vacuum.
 /// assert!(estimator.multiple(at, &phase, 8, &mut [], &mut rng).value.is_black());
 /// assert!(estimator.multiple_towards(at, Vec3::X, &phase, &mut rng).is_black());

@@ -155,6 +155,28 @@ enum Round {
 
 /// A fill of [`RadianceCaches`], as [`Rounds`] of jobs in a [`World`]. It owns the caches until
 /// [`Filling::finish`] gives them back, filled so far.
+///
+/// ```
+/// # #[cfg(feature = "alloc")] {
+/// # use fogbow::cache::{Asked, Kind, Memory, Output, RadianceCaches, Settings};
+/// # use fogbow::{host::Empty, math::{Bounds, Ray, Vec3}, medium::Homogeneous, phase::Phase, spectrum::Spectrum};
+/// # use fogbow::{work::step, world::{Outline, World}};
+/// # let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::ONE, Phase::ISOTROPIC)?;
+/// # let world = World { medium: &fog, scene: &Empty, lights: &[] };
+/// # let bounds = Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE };
+/// # let settings = Settings { rays: 20, ..Settings::for_outline(&Outline::of(&world, bounds)).with_walks(16) };
+/// # let asked = Asked::<fn([f32; 2]) -> Ray>::Box(bounds);
+/// let mut filling = RadianceCaches::new(settings).fill_in(Memory::default(), asked);
+/// let mut output = Output::default();
+/// for _ in 0..10 {
+///     step(&mut filling, &world, &mut output); // so many jobs a frame
+/// }
+/// // What there is by now can be read at any time.
+/// assert!(!filling.is_cut() && filling.computed(Kind::Single) == 0 && filling.caches().reader().single.is_none());
+/// let caches = filling.finish();
+/// # }
+/// # Ok::<(), Box<dyn core::error::Error>>(())
+/// ```
 #[derive(Debug)]
 pub struct Filling<'s, F> {
     caches: RadianceCaches<'s>,

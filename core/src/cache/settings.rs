@@ -43,6 +43,12 @@ impl Effort {
 /// // The records at which walks end follow from those of the picture.
 /// assert_eq!(settings.effort(Kind::CoarseMultiple).unwrap().samples, 128);
 /// assert!(settings.effort(Kind::Single).is_none());
+///
+/// // Four times the walks halve the noise of records.
+/// let mut finer = settings.with_walks(4096);
+/// assert_eq!(finer.effort(Kind::Multiple).unwrap().samples, 4096);
+/// finer.effort_mut(Kind::Multiple).unwrap().tolerance = 0.2;
+/// assert_eq!(finer.reading(Kind::Multiple).unwrap().tolerance, 0.2);
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Settings {

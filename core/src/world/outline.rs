@@ -253,7 +253,7 @@ fn is_constant_along(medium: &(impl Medium + ?Sized), ray: &Ray) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::host::{Empty, Hit, Properties, MajorantSegment};
+    use crate::host::{Empty, Hit, MajorantSegment, Properties};
     use crate::medium::{Homogeneous, Placed, Region};
     use crate::phase::Lobe;
     use crate::spectrum::Spectrum;
