@@ -13,7 +13,7 @@
 //! their neighbours' and by depth, for a narrow filter over few computed pixels finds one side of a border only.
 
 use fogbow::covariance::filter_precision;
-use fogbow::math::Symmetric2;
+use fogbow::math::{Symmetric2, float};
 use fogbow::spectrum::Spectrum;
 use rayon::prelude::*;
 
@@ -178,7 +178,7 @@ impl Filters {
         let is_same = near == far || (near - far).abs() < SAME_DEPTH * near.min(far) + rise.max(other);
         // Of the geometric mean of both Gaussians.
         let exponent = 0.25 * filter_precision(&self.shapes[a].plus(&self.shapes[b])).along(dx, dy);
-        is_same.then(|| if exponent < 8.0 { (-exponent).exp() } else { 0.0 })
+        is_same.then(|| if exponent < 8.0 { float::exp(-exponent) } else { 0.0 })
     }
 
     /// Pixels under a pixel's filter, those counted in part that it weighs less than itself.
