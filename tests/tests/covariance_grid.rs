@@ -9,7 +9,7 @@ use fogbow::covariance::{
     CovarianceGrid, Crossing, Fill, FrequencyPhotons, Grid, Lattice, OccluderCell, Occluders, Rule, Settings, Steps,
     Voxel,
 };
-use fogbow::host::{Empty, Hit, Scene};
+use fogbow::host::{Empty, Hit, Medium, Scene};
 use fogbow::light::{Light, PhongLight, PointLight, Sun};
 use fogbow::math::{Bounds, Ray, Symmetric3, Vec3, float::PI};
 use fogbow::medium::Homogeneous;
