@@ -6,11 +6,11 @@
 //! | [`seed`] | the random numbers of each pixel and sample: independent, or low-discrepancy |
 //! | [`tiles`] | parallel rendering, the same bits for any number of threads |
 //! | [`progress`] | progress, cancellation |
-//! | [`covariance`] | filling covariance grids in parallel; their files |
+//! | [`covariance`] | files of covariance grids |
 //! | [`photon_beams`] | shooting and gathering photon beams in parallel, pass by pass |
 //! | [`radiance_cache`] | filling radiance caches in parallel; their files |
 //! | [`image`] | PNG, PFM and (feature `exr`, on by default) OpenEXR files |
-//! | [`image_sampling`] | which pixels are computed, and filling in the others |
+//! | [`image_sampling`] | pixels that are not computed, filled in on threads |
 //! | [`virtual_lights`] | many virtual lights in parallel, pass by pass |
 //! | [`stats`] | seconds per phase, queries of the world |
 //!
