@@ -6,11 +6,12 @@
 //! | [`seed`] | the random numbers of each pixel and sample: independent, or low-discrepancy |
 //! | [`tiles`] | parallel rendering, the same bits for any number of threads |
 //! | [`progress`] | progress, cancellation |
-//! | [`covariance`] | filling covariance grids in parallel; their files |
+//! | [`covariance`] | files of covariance grids |
 //! | [`progressive`] | pictures in passes: photon beams, virtual lights |
-//! | [`radiance_cache`] | filling radiance caches in parallel; their files |
+//! | [`radiance_cache`] | files of radiance caches |
+//! | [`threads`] | the one driver: runs any work in rounds on threads |
 //! | [`image`] | PNG, PFM and (feature `exr`, on by default) OpenEXR files |
-//! | [`image_sampling`] | which pixels are computed, and filling in the others |
+//! | [`image_sampling`] | pixels that are not computed, filled in on threads |
 //! | [`virtual_lights`] | many virtual lights in parallel, pass by pass |
 //! | [`stats`] | seconds per phase, queries of the world |
 //!

@@ -430,3 +430,121 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Rounds<World<'_, M, S>> for Fill<'_>
         "fill grid"
     }
 }
+
+#[cfg(all(test, feature = "alloc"))]
+mod tests {
+    use alloc::vec;
+    use alloc::vec::Vec;
+
+    use super::*;
+    use crate::host::Hit;
+    use crate::light::{Light, PhongLight, PointLight};
+    use crate::math::Ray;
+    use crate::medium::Homogeneous;
+    use crate::phase::Lobe;
+    use crate::spectrum::Spectrum;
+    use crate::surface::Surface;
+    use crate::work::{finish, step};
+
+    const BOUNDS: Bounds = Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE };
+
+    /// A black plate across x with a slit along z.
+    struct Slit;
+
+    impl Scene for Slit {
+        fn closest_hit(&self, ray: &Ray) -> Option<Hit> {
+            let distance = -ray.origin.x / ray.direction.x;
+            if !(distance > 0.0 && distance < ray.length) || ray.at(distance).y.abs() < 0.3 {
+                return None;
+            }
+            let normal = Vec3::X * -ray.direction.x.signum();
+            Some(Hit { distance, normal, surface: Surface::BLACK, light: None })
+        }
+    }
+
+    fn with_world(test: impl FnOnce(&World<'_, Homogeneous, Slit>)) {
+        let fog = Homogeneous::new(Spectrum::splat(0.1), Spectrum::splat(0.8), Lobe::Isotropic).unwrap();
+        let point = PointLight::new(Vec3::new(-0.7, 0.1, 0.2), Spectrum::ONE).unwrap();
+        let spot = PhongLight::new(Vec3::NEG_ONE, Vec3::ONE, 30.0, Spectrum::new(1.0, 0.5, 0.2)).unwrap();
+        test(&World { medium: &fog, scene: &Slit, lights: &[Light::Point(point), Light::Phong(spot)] });
+    }
+
+    /// Walks of all parts in a plain loop, into voxels of each part.
+    fn plainly(world: &World<'_, Homogeneous, Slit>, settings: &Settings) -> Vec<Voxel> {
+        let lattice = Lattice::cubic(settings.bounds, settings.edge).unwrap();
+        let mut occluders = Occluders::new(lattice, List::default()).unwrap();
+        occluders.add_scene(world.scene, settings.occluder_rays);
+        let mut all = vec![Voxel::EMPTY; lattice.cell_count()];
+        for part in 0..PARTS {
+            let mut voxels = vec![Voxel::EMPTY; lattice.cell_count()];
+            let mut photons = FrequencyPhotons::new(*world, Some(&occluders), lattice);
+            for walk in settings.photons * part / PARTS..settings.photons * (part + 1) / PARTS {
+                let mut rng = independent(settings.seed, GRID_KEY | walk >> 32, walk as u32);
+                photon::trace(world, &settings.bounds, &settings.paths, &mut rng, &mut |event| {
+                    photons.visit(event, &mut voxels);
+                });
+            }
+            merge(&mut all, &voxels);
+        }
+        all
+    }
+
+    fn bits(voxels: &[Voxel]) -> Vec<u8> {
+        bytemuck::cast_slice(voxels).to_vec()
+    }
+
+    #[test]
+    fn jobs_sum_the_bits_of_a_plain_loop() {
+        with_world(|world| {
+            for photons in [1, 5, 9001] {
+                let settings = Settings { photons, edge: 9, seed: 3, ..Settings::new(BOUNDS) };
+                let mut fill = Fill::new(settings).unwrap();
+                finish(&mut fill, world, &mut Output::default());
+                assert!(!fill.is_cut() && fill.sent() == photons);
+                let grid = fill.finish();
+                assert!(grid.view().voxels().iter().any(|voxel| voxel.weight > 0.0));
+                assert!(bits(grid.view().voxels()) == bits(&plainly(world, &settings)), "{photons} photons");
+            }
+        });
+    }
+
+    #[test]
+    fn a_fill_that_was_left_is_a_grid_of_the_photons_so_far() {
+        with_world(|world| {
+            let settings = Settings { photons: 4000, edge: 5, ..Settings::new(BOUNDS) };
+            let mut fill = Fill::new(settings).unwrap();
+            let mut output = Output::default();
+            while fill.sent() < 700 {
+                assert!(step(&mut fill, world, &mut output));
+            }
+            let sent = fill.sent();
+            let grid = fill.finish();
+            assert_eq!(grid.view().paths(), sent);
+            let energy = |voxels: &[Voxel]| voxels.iter().map(|voxel| voxel.weight).sum::<f32>();
+            let all = energy(&plainly(world, &settings)) / 4000.0;
+            let some = energy(grid.view().voxels()) / sent as f32;
+            // A photon's length in the box varies by about its half.
+            assert!((some / all - 1.0).abs() < 0.1, "{some} instead of {all}");
+        });
+    }
+
+    #[test]
+    fn memory_that_is_too_small_is_told() {
+        let settings = Settings { edge: 4, ..Settings::new(BOUNDS) };
+        let memory = |voxels, part, occluders| Memory { voxels, part, occluders };
+        let mut few = [Voxel::EMPTY; 63];
+        let lent = memory(List::from(&mut few[..]), List::default(), List::default());
+        assert_eq!(Fill::new_in(lent, settings).err(), Some(FillError::Memory));
+        let mut few = [OccluderCell::default(); 63];
+        let lent = memory(List::default(), List::default(), List::from(&mut few[..]));
+        assert_eq!(Fill::new_in(lent, settings).err(), Some(FillError::Memory));
+        assert_eq!(Fill::new(Settings { photons: 0, ..settings }).err(), Some(FillError::NoPhotons));
+        assert!(matches!(Fill::new(Settings { edge: 0, ..settings }).err(), Some(FillError::Lattice(_))));
+        with_world(|world| {
+            let mut fill = Fill::new(settings).unwrap();
+            let (mut surface, mut deposits) = ([SurfacePoint::default(); 64], [Deposit::default(); 3]);
+            finish(&mut fill, world, &mut Output::lent(&mut surface, &mut deposits));
+            assert!(fill.is_cut());
+        });
+    }
+}

@@ -23,6 +23,7 @@
 //! | `steps` | [`Steps`] along an eye ray (Alg. 1) |
 //! | `radii` | [`Radii`] of kernels anywhere in the volume (Eq. 19) |
 //! | `image` | [`image_covariance`] along an eye ray |
+//! | [`image_sampling`] | which pixels are computed, and filling in the others |
 //! | [`bytes`] | grids saved and sent |
 //!
 //! Where the model is blind: an unoccluded point light's `1/r²` has no content of its own across the ray. Photons that
@@ -33,6 +34,7 @@ mod emission;
 mod fill;
 mod grid;
 mod image;
+pub mod image_sampling;
 mod lattice;
 mod light_field;
 mod lobe;

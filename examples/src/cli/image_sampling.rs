@@ -1,13 +1,17 @@
 //! `--image-sampling covariance`: fewer pixels computed where light is smooth.
 
 use clap::{Args, ValueEnum};
-use fogbow::covariance::{Grid, filter_precision, image_covariance};
-use fogbow::host::{Medium, Scene};
-use fogbow::math::{Frame, Ray, Symmetric2, Vec2};
+use fogbow::covariance::image_sampling::{self, LEAST_PLAN, Plan, Planning, USUAL_SHARE};
+use fogbow::covariance::{Grid, filter_precision};
+use fogbow::host::Medium;
+use fogbow::light::Light;
+use fogbow::math::{Ray, Vec2};
 use fogbow::spectrum::Spectrum;
 use fogbow_std::film::{Film, Image};
-use fogbow_std::image_sampling::{Outlook, Plan};
-use fogbow_std::stats::Statistics;
+use fogbow_std::image_sampling::filled;
+use fogbow_std::progress::Control;
+use fogbow_std::stats::{Seconds, Statistics};
+use fogbow_std::threads::{self, Threads};
 use fogbow_std::tiles::Sample;
 
 use super::Failure;
@@ -23,7 +27,7 @@ pub struct SamplingArguments {
     #[arg(long, value_enum, default_value_t = ImageSampling::Uniform)]
     pub image_sampling: ImageSampling,
     /// Share of pixels that `--image-sampling covariance` computes at most, from 0.05 to 1.
-    #[arg(long, value_name = "SHARE", value_parser = share, default_value_t = 0.4)]
+    #[arg(long, value_name = "SHARE", value_parser = share, default_value_t = USUAL_SHARE)]
     pub image_share: f32,
 }
 
@@ -38,7 +42,7 @@ pub enum ImageSampling {
 
 fn share(text: &str) -> Result<f32, String> {
     match text.parse::<f32>() {
-        Ok(value) if (0.05..=1.0).contains(&value) => Ok(value),
+        Ok(value) if (LEAST_PLAN..=1.0).contains(&value) => Ok(value),
         _ => Err("must be a number from 0.05 to 1".to_owned()),
     }
 }
@@ -52,54 +56,47 @@ impl SamplingArguments {
     /// Which pixels are computed; `None` for all.
     pub(super) fn plan(
         &self,
-        world: &World<'_>,
-        camera: Camera,
-        grid: Option<&Grid<'_>>,
-        size: (u32, u32),
+        sight: Sight<'_>,
+        (width, height): (u32, u32),
+        threads: &Threads,
         statistics: &mut Statistics,
-    ) -> Option<Plan> {
-        let grid = grid.filter(|_| !self.is_uniform())?;
-        Some(statistics.time("plan", || {
-            let outlooks = world.media().with(PlanJob { world, camera, grid, size });
-            Plan::new(size.0, size.1, self.image_share, outlooks)
-        }))
+    ) -> Result<Option<Plan<'static>>, Failure> {
+        if self.is_uniform() {
+            return Ok(None);
+        }
+        let mut planning = Planning::new([width, height], self.image_share)?;
+        let stages = sight.world.media().with(PlanJob { sight, planning: &mut planning, threads });
+        stages.iter().for_each(|(stage, seconds)| statistics.add(stage, *seconds));
+        Ok(Some(planning.finish()))
     }
+}
+
+/// What is seen, and from where.
+#[derive(Clone, Copy)]
+pub(super) struct Sight<'a> {
+    pub(super) world: &'a World<'a>,
+    pub(super) lights: &'a [Light<'a>],
+    pub(super) camera: Camera,
+    pub(super) grid: Grid<'a>,
 }
 
 struct PlanJob<'a> {
-    world: &'a World<'a>,
-    camera: Camera,
-    grid: &'a Grid<'a>,
-    size: (u32, u32),
+    sight: Sight<'a>,
+    planning: &'a mut Planning<'static>,
+    threads: &'a Threads,
 }
 
 impl WithMedium for PlanJob<'_> {
-    type Output = Vec<Outlook>;
+    /// Times by stage.
+    type Output = Vec<(&'static str, Seconds)>;
 
     fn with<M: Medium + Sync>(self, medium: &M) -> Self::Output {
-        let (width, height) = self.size;
-        let ray = |x: f32, y: f32| self.camera.ray(Vec2::new(x / width as f32, y / height as f32));
-        let outlook = |index: u32| {
-            let (x, y) = ((index % width) as f32 + 0.5, (index / width) as f32 + 0.5);
-            let centre = ray(x, y);
-            let hit = self.world.closest_hit(&centre);
-            let depth = hit.map_or(f32::INFINITY, |hit| hit.distance);
-            // One pixel to the right and one down, as angles.
-            let w = centre.direction;
-            let (right, down) = (ray(x + 1.0, y).direction - w, ray(x, y + 1.0).direction - w);
-            let frame = Frame::around(w);
-            let columns = [right, down].map(|d| Vec2::new(d.dot(frame.u), d.dot(frame.v)));
-            let seen = image_covariance(&Ray { length: depth, ..centre }, &frame, self.grid, medium);
-            Outlook { covariance: seen.map(|p| in_pixels(&p, columns)), depth }
-        };
-        (0..width * height).map(outlook).collect()
+        let Sight { world, lights, camera, grid } = self.sight;
+        let world = fogbow::world::World { medium, scene: world, lights };
+        let ray = |at: [f32; 2]| -> Ray { camera.ray(Vec2::from(at)) };
+        let sight = image_sampling::Sight { world, grid, ray };
+        threads::run(self.planning, &sight, self.threads, &Control::default(), None, |_| {}).stages
     }
-}
-
-/// `Jᵀ P J`: from cycles per radian to cycles per pixel.
-fn in_pixels(p: &Symmetric2, [a, b]: [Vec2; 2]) -> Symmetric2 {
-    let between = |a: Vec2, b: Vec2| p.xx * a.x * b.x + p.xy * (a.x * b.y + a.y * b.x) + p.yy * a.y * b.y;
-    Symmetric2::new(between(a, a), between(a, b), between(b, b))
 }
 
 /// Layers that adaptive sampling adds: which pixels were computed, the density wanted, and the filter's standard
@@ -108,16 +105,16 @@ const OWN: [&str; 3] = ["computed", "density", "filter"];
 
 /// Whether the medium's light is wanted at a pixel, or filled in from others.
 #[inline]
-pub(super) fn is_computed(plan: Option<&Plan>, sample: &Sample<'_>, width: u32) -> bool {
-    plan.is_none_or(|plan| plan.computed[(sample.y * width + sample.x) as usize])
+pub(super) fn is_computed(plan: Option<&Plan<'_>>, sample: &Sample<'_>, width: u32) -> bool {
+    plan.is_none_or(|plan| plan.is_computed((sample.y * width + sample.x) as usize))
 }
 
 /// The film with light of the medium filled in.
-pub(super) fn finished(film: &Film, plan: &Plan, has_layers: bool) -> Result<Film, Failure> {
+pub(super) fn finished(film: &Film, plan: &Plan<'_>, has_layers: bool, threads: &Threads) -> Result<Film, Failure> {
     let mut layers: Vec<Image> = (0..film.layers().len()).filter_map(|i| film.mean(i)).collect();
     for (layer, name) in layers.iter_mut().zip(film.layers()) {
         if name.starts_with("medium") {
-            *layer = plan.filled(layer);
+            *layer = filled(plan, layer, threads)?;
         }
     }
     let names: Vec<&str> =
@@ -126,13 +123,13 @@ pub(super) fn finished(film: &Film, plan: &Plan, has_layers: bool) -> Result<Fil
     // Layers of light, in any method; ray marching has one that counts.
     let parts = film.layers().iter().skip(1).take_while(|name| CACHE_LAYERS.contains(&name.as_str())).count();
     let mut colours = Vec::new();
-    for index in 0..plan.computed.len() {
+    for index in 0..layers[0].pixels.len() {
         colours.clear();
         colours.push(layers[1..=parts].iter().map(|layer| layer.pixels[index]).sum::<Spectrum>());
         if has_layers {
             colours.extend(layers[1..].iter().map(|layer| layer.pixels[index]));
-            colours.push(Spectrum::splat(f32::from(u8::from(plan.computed[index]))));
-            colours.push(Spectrum::splat(plan.density[index]));
+            colours.push(Spectrum::splat(f32::from(u8::from(plan.is_computed(index)))));
+            colours.push(Spectrum::splat(plan.density(index)));
             colours.push(ellipse(plan, index));
         }
         let index = index as u32;
@@ -141,7 +138,7 @@ pub(super) fn finished(film: &Film, plan: &Plan, has_layers: bool) -> Result<Fil
     Ok(out)
 }
 
-fn ellipse(plan: &Plan, index: usize) -> Spectrum {
+fn ellipse(plan: &Plan<'_>, index: usize) -> Spectrum {
     let precision = filter_precision(&plan.shape(index));
     let eigen = precision.eigen();
     let [short, long] = eigen.values.map(|value| 1.0 / value.max(1e-12).sqrt());

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::{Args, ValueEnum};
 use fogbow::bytes::Crc;
 use fogbow::cache::{self, Asked, CachesError, Extrapolation, EyeSettings, RadianceCaches, Seen};
+use fogbow::covariance::image_sampling::Plan;
 use fogbow::host::Medium;
 use fogbow::light::Light;
 use fogbow::math::{Ray, Vec2};
@@ -12,7 +13,6 @@ use fogbow::path;
 use fogbow::sampling::uniform2;
 use fogbow::world::{Outline, World as LitWorld};
 use fogbow_std::film::Film;
-use fogbow_std::image_sampling::Plan;
 use fogbow_std::progress::Control;
 use fogbow_std::radiance_cache::{self as files, Problem};
 use fogbow_std::stats::{CountingMedium, CountingScene, Seconds, Stopwatch};
@@ -184,7 +184,7 @@ pub(super) struct CacheJob<'a> {
     pub(super) control: &'a Control<'a>,
     pub(super) arguments: &'a CacheArguments,
     /// Which pixels are computed; `None` for all.
-    pub(super) plan: Option<&'a Plan>,
+    pub(super) plan: Option<&'a Plan<'a>>,
     /// See [`CacheArguments::tag`].
     pub(super) tag: u64,
 }

@@ -6,6 +6,7 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 use fogbow::cache::{Kind, RadianceCaches};
+use fogbow::covariance::image_sampling::Plan;
 use fogbow::covariance::{CovarianceGrid, Grid};
 use fogbow::host::Medium;
 use fogbow::light::Light;
@@ -17,14 +18,14 @@ use fogbow::vpl::VirtualLight;
 use fogbow::world::World as LitWorld;
 use fogbow_std::film::Film;
 use fogbow_std::image::write_film;
-use fogbow_std::image_sampling::Plan;
 use fogbow_std::progress::{Control, Progress};
 use fogbow_std::seed::SampleRng;
 use fogbow_std::stats::{CountingMedium, CountingScene, Statistics};
+use fogbow_std::threads::Threads;
 use fogbow_std::tiles::{self, Outcome, Reason, RenderError, Sample};
 
 use super::covariance::{CovarianceArguments, GridJob, MarchArguments, Step, Stopped};
-use super::image_sampling::{self, SamplingArguments};
+use super::image_sampling::{self, SamplingArguments, Sight};
 use super::march::MarchJob;
 use super::photon_beams::{BeamArguments, BeamJob, Kernel};
 use super::radiance_cache::{CacheArguments, CacheJob, check_depth};
@@ -272,7 +273,14 @@ pub(crate) fn render(arguments: &RenderArguments) -> Result<Rendered, Failure> {
         None
     };
     let grid = covariances.as_ref().map(CovarianceGrid::view);
-    let plan = arguments.sampling.plan(&world, camera, grid.as_ref(), (width, height), &mut statistics);
+    let threads = Threads::new(arguments.threads)?;
+    let plan = match grid {
+        Some(grid) => {
+            let sight = Sight { world: &world, lights: &lights, camera, grid };
+            arguments.sampling.plan(sight, (width, height), &threads, &mut statistics)?
+        }
+        None => None,
+    };
     let shot = Shot {
         world: &world,
         lights: &lights,
@@ -317,7 +325,7 @@ pub(crate) fn render(arguments: &RenderArguments) -> Result<Rendered, Failure> {
     };
     bar.finish();
     if let Some(plan) = &plan {
-        film = statistics.time("fill in", || image_sampling::finished(&film, plan, arguments.aov))?;
+        film = statistics.time("fill in", || image_sampling::finished(&film, plan, arguments.aov, &threads))?;
     }
     if let Some(grid) = grid.as_ref().filter(|_| arguments.aov) {
         film = statistics.time("draw ellipsoids", || ellipsoids::drawn(&film, grid, &camera, &world))?;
@@ -440,7 +448,7 @@ pub(super) struct Shot<'a> {
     pub(super) settings: &'a tiles::Settings,
     pub(super) control: &'a Control<'a>,
     pub(super) grid: Option<&'a Grid<'a>>,
-    pub(super) plan: Option<&'a Plan>,
+    pub(super) plan: Option<&'a Plan<'a>>,
 }
 
 impl Shot<'_> {
