@@ -370,19 +370,22 @@ fn bad_input_gives_errors_or_numbers() {
     assert!(radius(BOUNDS) > 0.0 && radius(Bounds::EMPTY) > 0.0);
 }
 
-fn smoke() -> Placed<Homogeneous> {
+/// A ball of fog.
+type Ball = Placed<'static, Homogeneous>;
+
+fn ball() -> Ball {
     let fog = Homogeneous::new(Spectrum::splat(0.2), Spectrum::splat(1.5), Phase::ISOTROPIC).unwrap();
     Placed::new(fog, Region::sphere(Vec3::ZERO, 0.8).unwrap())
 }
 
-/// A pass by whatever runs it, with witnesses along a line through the smoke.
+/// A pass by whatever runs it, with witnesses along a line through the ball.
 fn lights_of_a_pass(
     settings: impl Fn(vpl::Settings) -> vpl::Settings,
-    run: impl Fn(&mut vpl::Pass<'_, Independent>, &World<'_, Placed<Homogeneous>, Empty>),
+    run: impl Fn(&mut vpl::Pass<'_, Independent>, &World<'_, Ball, Empty>),
 ) -> Result<Vec<VirtualLight>, vpl::PassError> {
-    let smoke = smoke();
+    let ball = ball();
     let lamps = [Light::Point(PointLight::from_flux(Vec3::Z * 0.2, Spectrum::ONE).unwrap())];
-    let world = World { medium: &smoke, scene: &Empty, lights: &lamps };
+    let world = World { medium: &ball, scene: &Empty, lights: &lamps };
     let usual = vpl::Settings { lights: 150, paths: 400, ..vpl::Settings::for_outline(&Outline::of(&world, BOUNDS)) };
     let settings = settings(usual);
     let mut witnesses = Vec::new();
@@ -402,15 +405,15 @@ fn a_pass_has_the_same_lights_however_its_jobs_are_run() {
     assert!(expected.len().abs_diff(150) <= 1, "{} lights kept", expected.len());
     for threads in [2, 5] {
         let threads = Threads::new(threads).unwrap();
-        let run = |pass: &mut vpl::Pass<'_, Independent>, world: &World<'_, Placed<Homogeneous>, Empty>| {
+        let run = |pass: &mut vpl::Pass<'_, Independent>, world: &World<'_, Ball, Empty>| {
             threads::run(pass, world, &threads, &Control::default(), None, |_| {});
         };
         assert_eq!(lights_of_a_pass(|settings| settings, run).as_ref(), Ok(&expected));
     }
     // Every job in memory that held another's results, the last first.
-    let backwards = |pass: &mut vpl::Pass<'_, Independent>, world: &World<'_, Placed<Homogeneous>, Empty>| {
-        while !Rounds::<World<'_, Placed<Homogeneous>, Empty>>::jobs(pass).is_empty() {
-            let jobs = Rounds::<World<'_, Placed<Homogeneous>, Empty>>::jobs(pass);
+    let backwards = |pass: &mut vpl::Pass<'_, Independent>, world: &World<'_, Ball, Empty>| {
+        while !Rounds::<World<'_, Ball, Empty>>::jobs(pass).is_empty() {
+            let jobs = Rounds::<World<'_, Ball, Empty>>::jobs(pass);
             let end = jobs.end.min(jobs.start + 3);
             let outputs = (jobs.start..end).rev().map(|job| {
                 let mut output = vpl::Output::default();
@@ -420,7 +423,7 @@ fn a_pass_has_the_same_lights_however_its_jobs_are_run() {
             });
             let outputs: Vec<_> = outputs.collect();
             for output in outputs.iter().rev() {
-                Rounds::<World<'_, Placed<Homogeneous>, Empty>>::accept(pass, output);
+                Rounds::<World<'_, Ball, Empty>>::accept(pass, output);
             }
         }
     };
@@ -493,11 +496,11 @@ fn what_a_pass_cannot_do_is_an_error() {
 
 #[test]
 fn a_pass_in_lent_memory_has_the_same_lights_or_is_an_error() {
-    let smoke = smoke();
+    let ball = ball();
     let lamps = [Light::Point(PointLight::from_flux(Vec3::Z * 0.2, Spectrum::ONE).unwrap())];
-    let world = World { medium: &smoke, scene: &Empty, lights: &lamps };
+    let world = World { medium: &ball, scene: &Empty, lights: &lamps };
     let settings = vpl::Settings { lights: 50, paths: 100, ..vpl::Settings::for_outline(&Outline::of(&world, BOUNDS)) };
-    let properties = smoke.properties(Vec3::ZERO);
+    let properties = ball.properties(Vec3::ZERO);
     let witnesses = [Receiver::in_medium(Vec3::X * 0.3, Vec3::NEG_Z, &properties).unwrap()];
     let grown = || {
         let mut pass = vpl::Pass::new(&settings, 0, Independent, &witnesses);
