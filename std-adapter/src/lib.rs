@@ -12,7 +12,6 @@
 //! | [`threads`] | the one driver: runs any work in rounds on threads |
 //! | [`image`] | PNG, PFM and (feature `exr`, on by default) OpenEXR files |
 //! | [`image_sampling`] | pixels that are not computed, filled in on threads |
-//! | [`virtual_lights`] | many virtual lights in parallel, pass by pass |
 //! | [`stats`] | seconds per phase, queries of the world |
 //!
 //! A glowing fog in front of a black wall, 2 m away at the left and 6 m at the right:
@@ -52,4 +51,3 @@ pub mod seed;
 pub mod stats;
 pub mod threads;
 pub mod tiles;
-pub mod virtual_lights;

@@ -6,11 +6,14 @@ use fogbow::math::{Bounds, Ray, Vec3};
 use fogbow::medium::{Homogeneous, Placed, Region};
 use fogbow::path::{self, Settings};
 use fogbow::phase::{Lobe, Phase};
-use fogbow::sampling::{Generator, uniform};
+use fogbow::sampling::{Generator, Independent, uniform};
 use fogbow::spectrum::Spectrum;
 use fogbow::surface::Surface;
 use fogbow::vpl::{self, Bound, Compensation, EyeSettings, Flights, Gatherer, Receiver, Scatterer, VirtualLight};
-use fogbow::world::World;
+use fogbow::work::{self, Rounds};
+use fogbow::world::{Outline, World};
+use fogbow_std::progress::Control;
+use fogbow_std::threads::{self, Threads};
 use fogbow_tests::chi_square;
 use fogbow_tests::estimate::{Estimate, estimate};
 use fogbow_tests::hosts::{Analytic, Field};
@@ -362,6 +365,165 @@ fn bad_input_gives_errors_or_numbers() {
             }
         }
     }
-    let bound = vpl::usual_bound(&Empty, &BOUNDS);
-    assert!(bound.radius() > 0.0 && vpl::usual_bound(&Empty, &Bounds::EMPTY).radius() > 0.0);
+    let world = World { medium: &Empty, scene: &Empty, lights: &[] };
+    let radius = |bounds| vpl::usual_bound(&Outline::of(&world, bounds)).radius();
+    assert!(radius(BOUNDS) > 0.0 && radius(Bounds::EMPTY) > 0.0);
+}
+
+/// A ball of fog.
+type Ball = Placed<'static, Homogeneous>;
+
+fn ball() -> Ball {
+    let fog = Homogeneous::new(Spectrum::splat(0.2), Spectrum::splat(1.5), Phase::ISOTROPIC).unwrap();
+    Placed::new(fog, Region::sphere(Vec3::ZERO, 0.8).unwrap())
+}
+
+/// A pass by whatever runs it, with witnesses along a line through the ball.
+fn lights_of_a_pass(
+    settings: impl Fn(vpl::Settings) -> vpl::Settings,
+    run: impl Fn(&mut vpl::Pass<'_, Independent>, &World<'_, Ball, Empty>),
+) -> Result<Vec<VirtualLight>, vpl::PassError> {
+    let ball = ball();
+    let lamps = [Light::Point(PointLight::from_flux(Vec3::Z * 0.2, Spectrum::ONE).unwrap())];
+    let world = World { medium: &ball, scene: &Empty, lights: &lamps };
+    let usual = vpl::Settings { lights: 150, paths: 400, ..vpl::Settings::for_outline(&Outline::of(&world, BOUNDS)) };
+    let settings = settings(usual);
+    let mut witnesses = Vec::new();
+    let eye = |[x, y]: [f32; 2], _: &mut Generator| Ray::between(Vec3::NEG_Z * 2.0, Vec3::new(x - 0.5, y - 0.5, 0.0));
+    vpl::witnesses(&world, &settings, eye, |witness| witnesses.push(witness));
+    let mut pass = vpl::Pass::new(&settings, 2, Independent, &witnesses);
+    run(&mut pass, &world);
+    pass.finish().map(|lights| lights.as_slice().to_vec())
+}
+
+#[test]
+fn a_pass_has_the_same_lights_however_its_jobs_are_run() {
+    let serial = |settings: &dyn Fn(vpl::Settings) -> vpl::Settings| {
+        lights_of_a_pass(settings, |pass, world| work::finish(pass, world, &mut vpl::Output::default())).unwrap()
+    };
+    let expected = serial(&|settings| settings);
+    assert!(expected.len().abs_diff(150) <= 1, "{} lights kept", expected.len());
+    for threads in [2, 5] {
+        let threads = Threads::new(threads).unwrap();
+        let run = |pass: &mut vpl::Pass<'_, Independent>, world: &World<'_, Ball, Empty>| {
+            threads::run(pass, world, &threads, &Control::default(), None, |_| {});
+        };
+        assert_eq!(lights_of_a_pass(|settings| settings, run).as_ref(), Ok(&expected));
+    }
+    // Every job in memory that held another's results, the last first.
+    let backwards = |pass: &mut vpl::Pass<'_, Independent>, world: &World<'_, Ball, Empty>| {
+        while !Rounds::<World<'_, Ball, Empty>>::jobs(pass).is_empty() {
+            let jobs = Rounds::<World<'_, Ball, Empty>>::jobs(pass);
+            let end = jobs.end.min(jobs.start + 3);
+            let outputs = (jobs.start..end).rev().map(|job| {
+                let mut output = vpl::Output::default();
+                pass.run((job + 1).min(jobs.end - 1), world, &mut output);
+                pass.run(job, world, &mut output);
+                output
+            });
+            let outputs: Vec<_> = outputs.collect();
+            for output in outputs.iter().rev() {
+                Rounds::<World<'_, Ball, Empty>>::accept(pass, output);
+            }
+        }
+    };
+    assert_eq!(lights_of_a_pass(|settings| settings, backwards), Ok(expected.clone()));
+    assert_ne!(serial(&|settings| vpl::Settings { seed: 1, ..settings }), expected);
+}
+
+#[test]
+fn lights_that_are_kept_shine_for_those_that_are_not() {
+    let flux = |lights: &[VirtualLight]| lights.iter().map(|light| f64::from(light.flux.mean())).sum::<f64>();
+    let of = |candidates: u32, seed: u64| {
+        let change = |settings| vpl::Settings { candidates, seed, ..settings };
+        flux(&lights_of_a_pass(change, |pass, world| work::finish(pass, world, &mut vpl::Output::default())).unwrap())
+    };
+    // Of the same paths: their seed is the same.
+    let (mut sum, mut squares) = (0.0, 0.0);
+    const RUNS: u32 = 200;
+    for seed in 0..u64::from(RUNS) {
+        let ratio = of(16, seed) / of(1, seed);
+        (sum, squares) = (sum + ratio, squares + ratio * ratio);
+    }
+    let mean = sum / f64::from(RUNS);
+    let error = ((squares / f64::from(RUNS) - mean * mean) / f64::from(RUNS)).sqrt();
+    assert!((mean - 1.0).abs() < 4.0 * error && error < 0.02, "{mean} ± {error}");
+}
+
+#[test]
+fn a_pass_that_is_stopped_keeps_all_light() {
+    let part = |jobs: u32| {
+        lights_of_a_pass(
+            |settings| settings,
+            |pass, world| {
+                for _ in 0..jobs {
+                    work::step(pass, world, &mut vpl::Output::default());
+                }
+            },
+        )
+        .unwrap()
+    };
+    let all = |paths: u32| {
+        let change = |settings| vpl::Settings { paths, candidates: 1, ..settings };
+        lights_of_a_pass(change, |pass, world| work::finish(pass, world, &mut vpl::Output::default())).unwrap()
+    };
+    // While paths are followed: those so far. 64 of them are a job.
+    assert_eq!(part(3), all(3 * 64));
+    // While lights are weighed: all of them, sorted before they were mixed.
+    let key = |light: &VirtualLight| [light.position.to_array(), light.flux.0].map(|numbers| numbers.map(f32::to_bits));
+    let [mut some, mut every] = [part(7 + 2), all(400)];
+    some.sort_by_key(key);
+    every.sort_by_key(key);
+    assert_eq!(some, every);
+}
+
+#[test]
+fn what_a_pass_cannot_do_is_an_error() {
+    let finish = |settings: &dyn Fn(vpl::Settings) -> vpl::Settings| {
+        lights_of_a_pass(settings, |pass, world| work::finish(pass, world, &mut vpl::Output::default()))
+    };
+    assert_eq!(finish(&|settings| vpl::Settings { lights: 0, ..settings }), Err(vpl::PassError::Settings));
+    assert_eq!(finish(&|settings| vpl::Settings { points: 0, ..settings }), Err(vpl::PassError::Settings));
+    let glowing = Homogeneous::new(Spectrum::ONE, Spectrum::ONE, Phase::ISOTROPIC)
+        .and_then(|fog| fog.with_emission(Spectrum::ONE))
+        .unwrap();
+    let world = World { medium: &glowing, scene: &Empty, lights: &[] };
+    let settings = vpl::Settings::for_outline(&Outline::of(&world, BOUNDS));
+    let mut pass = vpl::Pass::new(&settings, 0, Independent, &[]);
+    work::finish(&mut pass, &world, &mut vpl::Output::default());
+    assert_eq!(pass.finish().map(|lights| lights.len()), Err(vpl::PassError::Glowing));
+}
+
+#[test]
+fn a_pass_in_lent_memory_has_the_same_lights_or_is_an_error() {
+    let ball = ball();
+    let lamps = [Light::Point(PointLight::from_flux(Vec3::Z * 0.2, Spectrum::ONE).unwrap())];
+    let world = World { medium: &ball, scene: &Empty, lights: &lamps };
+    let settings = vpl::Settings { lights: 50, paths: 100, ..vpl::Settings::for_outline(&Outline::of(&world, BOUNDS)) };
+    let properties = ball.properties(Vec3::ZERO);
+    let witnesses = [Receiver::in_medium(Vec3::X * 0.3, Vec3::NEG_Z, &properties).unwrap()];
+    let grown = || {
+        let mut pass = vpl::Pass::new(&settings, 0, Independent, &witnesses);
+        work::finish(&mut pass, &world, &mut vpl::Output::default());
+        pass.finish().unwrap().as_slice().to_vec()
+    };
+    let all = {
+        let mut pass = vpl::Pass::new(&settings, 0, Independent, &[]);
+        work::finish(&mut pass, &world, &mut vpl::Output::default());
+        pass.finish().unwrap().len()
+    };
+    assert!(all > 50);
+    let lent = |lights: usize, others: usize| {
+        let dark = VirtualLight::in_medium(Vec3::ZERO, Vec3::Z, Spectrum::ZERO, 1, &Phase::ISOTROPIC);
+        let (mut lights, mut order) = (vec![dark; lights], vec![vpl::Place::default(); others]);
+        let (mut importance, mut seen) = (vec![0.0; others], vec![0.0; others]);
+        let (mut of_job, mut seen_by_job) = (vec![dark; all], [0.0; 512]);
+        let memory = vpl::Memory::new(&mut lights[..], &mut order[..], &mut importance[..], &mut seen[..]);
+        let mut pass = vpl::Pass::new_in(memory, &settings, 0, Independent, &witnesses);
+        work::finish(&mut pass, &world, &mut vpl::Output::new(&mut of_job[..], &mut seen_by_job[..]));
+        pass.finish().map(|lights| lights.as_slice().to_vec())
+    };
+    assert_eq!(lent(all, all), Ok(grown()));
+    assert_eq!(lent(all - 1, all), Err(vpl::PassError::TooMany));
+    assert_eq!(lent(all, all - 1), Err(vpl::PassError::TooMany));
 }

@@ -1,9 +1,7 @@
 //! How much of a connection is kept, and how much is lost.
 
-use glam::Vec3;
-
-use crate::host::Medium;
-use crate::math::{Bounds, float};
+use crate::math::float;
+use crate::world::Outline;
 
 /// The bound `b` (m⁻²) by which geometry terms are clamped.
 ///
@@ -184,45 +182,26 @@ const LEFT: f32 = 0.25;
 /// The radius of [`usual_bound`] in thin media, as a part of the diagonal of what there is: surfaces lose light, too.
 const THIN: f32 = 0.09;
 
-/// Points along each side of the box at which a medium is looked at.
-const LOOKS: u32 = 24;
-
 /// A bound that works: within a radius at which a step of compensation leaves a quarter, `κ_B(σ̄, d) = 0.25`, so that two
-/// bring back nearly all; never beyond 0.09 of the diagonal of `bounds`.
+/// bring back nearly all; never beyond 0.09 of the diagonal of the bounds.
 ///
 /// Larger radii clamp more, and leave smoother light to the virtual lights; but more has to be brought back. `σ̄` is the
-/// extinction where light collides, `∫ σₜ² dV/∫ σₜ dV`, from a lattice of points in `bounds`. Engelhardt et
-/// al. 2012 leave the bound to the user.
+/// extinction where light collides ([`Outline::extinction`]). Engelhardt et al. 2012 leave the bound to the user.
 ///
 /// ```
-/// # use fogbow::{math::{Bounds, Vec3}, medium::Homogeneous, phase::Lobe, spectrum::Spectrum};
-/// # use fogbow::vpl::{contraction, usual_bound};
-/// let dense = Homogeneous::new(Spectrum::ZERO, Spectrum::splat(4.0), Lobe::Isotropic)?;
-/// let room = Bounds { min: Vec3::ZERO, max: Vec3::splat(3.0) };
-/// let radius = usual_bound(&dense, &room).radius();
-/// assert!((contraction(4.0, 1.0, radius) - 0.25).abs() < 1e-3);   // a step leaves a quarter
-/// let thin = Homogeneous::new(Spectrum::ZERO, Spectrum::splat(0.01), Lobe::Isotropic)?;
-/// assert!((usual_bound(&thin, &room).radius() / room.size().length() - 0.09).abs() < 1e-4);
-/// # Ok::<(), fogbow::medium::MediumError>(())
+/// # use fogbow::{host::Empty, math::{Bounds, Vec3}, vpl::usual_bound, world::{Outline, World}};
+/// let world = World { medium: &Empty, scene: &Empty, lights: &[] };
+/// let bounds = Bounds { min: Vec3::ZERO, max: Vec3::new(3.0, 4.0, 0.0) };
+/// assert!((usual_bound(&Outline::of(&world, bounds)).radius() - 0.45).abs() < 1e-6);
 /// ```
 #[must_use]
-pub fn usual_bound(medium: &(impl Medium + ?Sized), bounds: &Bounds) -> Bound {
-    let size = bounds.size();
-    let diagonal = size.length();
+pub fn usual_bound(outline: &Outline) -> Bound {
+    let diagonal = outline.bounds.size().length();
     if !(diagonal > 0.0 && diagonal.is_finite()) {
         return Bound(1.0);
     }
-    let (mut first, mut second, mut scattered) = (0.0_f64, 0.0_f64, 0.0_f64);
-    for i in 0..LOOKS * LOOKS * LOOKS {
-        let at = [i % LOOKS, i / LOOKS % LOOKS, i / (LOOKS * LOOKS)].map(|k| (k as f32 + 0.5) / LOOKS as f32);
-        let properties = medium.properties(bounds.min + size * Vec3::from_array(at));
-        let extinction = f64::from(properties.extinction().mean());
-        first += extinction;
-        second += extinction * extinction;
-        scattered += f64::from(properties.scattering.mean());
-    }
     let most = THIN * diagonal;
     let radius =
-        if first > 0.0 { radius_for(LEFT, (second / first) as f32, (scattered / first) as f32, most) } else { most };
+        if outline.extinction > 0.0 { radius_for(LEFT, outline.extinction, outline.albedo, most) } else { most };
     Bound::within(radius).unwrap_or(Bound(1.0))
 }

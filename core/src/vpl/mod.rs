@@ -20,6 +20,8 @@
 //! | `compensate` | [`Compensation`]; [`next_vertex`] of a compensation path |
 //! | [`gather`] | [`Gatherer`]: clamped light and compensation at a point |
 //! | [`eye`] | [`radiance`]: eye rays |
+//! | `settings` | [`Settings`]: every tuned number, from an [`Outline`](crate::world::Outline) |
+//! | `pass` | [`Pass`]: the lights of a pass, as work in rounds; [`witnesses`] of what matters |
 
 pub mod bound;
 mod compensate;
@@ -27,7 +29,9 @@ pub mod eye;
 pub mod gather;
 mod generate;
 pub mod light;
+mod pass;
 mod scatterer;
+mod settings;
 
 pub use bound::{Bound, NoBound, contraction, geometry, radius_for, usual_bound};
 pub use compensate::{Compensation, Flights, next_vertex};
@@ -35,4 +39,6 @@ pub use eye::{EyeSettings, Seen, radiance, receivers};
 pub use gather::{Gathered, Gatherer, LEVELS};
 pub use generate::{select, shoot};
 pub use light::{Connection, VirtualLight};
+pub use pass::{Memory, Output, Pass, PassError, Place, witnesses};
 pub use scatterer::{Receiver, Scatterer};
+pub use settings::Settings;

@@ -298,10 +298,10 @@ pub(crate) fn render(arguments: &RenderArguments) -> Result<Rendered, Failure> {
         Method::Vpl => {
             let pass_samples = arguments.beams.pass_samples;
             let job = VplJob { shot, film: &mut film, arguments: &arguments.vpl, pass_samples };
-            let (outcome, bound) = world.media().with(job)?;
-            let bytes = u64::from(arguments.vpl.lights) * size_of::<VirtualLight>() as u64;
+            let (outcome, settings) = world.media().with(job)?;
+            let bytes = u64::from(settings.lights) * size_of::<VirtualLight>() as u64;
             statistics.bytes.push(("virtual lights".to_owned(), bytes));
-            audit = arguments.is_audited().then(|| Audit::new(&film, bound, &arguments.vpl));
+            audit = arguments.is_audited().then(|| Audit::new(&film, settings.bound, &arguments.vpl));
             outcome
         }
         Method::March => world.media().with(MarchJob { shot, film: &mut film, arguments: &arguments.march })?,

@@ -5,34 +5,33 @@ use core::str::FromStr;
 
 use clap::{Args, ValueEnum};
 use fogbow::host::Medium;
-use fogbow::math::Bounds;
+use fogbow::math::{Ray, Vec2};
+use fogbow::medium::Pyramid;
+use fogbow::sampling::{Generator, uniform2};
 use fogbow::spectrum::Spectrum;
-use fogbow::vpl::{self, Bound, Compensation, LEVELS, Seen};
+use fogbow::vpl::{self, Bound, Compensation, EyeSettings, LEVELS, Seen, Settings};
+use fogbow::world::{Outline, World as LitWorld};
 use fogbow_std::film::Film;
-use fogbow_std::tiles::Outcome;
-use fogbow_std::virtual_lights::{self, Settings, View};
+use fogbow_std::progressive;
+use fogbow_std::seed::Sequence;
+use fogbow_std::stats::{CountingMedium, CountingScene};
+use fogbow_std::tiles::{Outcome, Passes};
 
 use super::Failure;
 use super::render::{LAYERS, Shot, write_layers};
 use crate::world::WithMedium;
 
-/// Default of `--lights`.
-const LIGHTS: u32 = 1000;
-
-/// Default of `--candidates`.
-const CANDIDATES: u32 = 16;
-
 /// Options of `--method vpl`.
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Virtual lights")]
 pub struct VplArguments {
-    /// Virtual lights of each pass.
-    #[arg(long, value_name = "N", default_value_t = LIGHTS, value_parser = clap::value_parser!(u32).range(1..=1 << 24))]
-    pub lights: u32,
+    /// Virtual lights of each pass [default: 1000].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1 << 24))]
+    pub lights: Option<u32>,
     /// How many times as many are made; those are kept that matter most for the picture. 1 keeps all; no more
-    /// than 131072 are made, or as many as lights.
-    #[arg(long, value_name = "N", default_value_t = CANDIDATES, value_parser = clap::value_parser!(u32).range(1..=256))]
-    pub candidates: u32,
+    /// than 131072 are made, or as many as lights [default: 16].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=256))]
+    pub candidates: Option<u32>,
     /// Bound of geometry terms, by which near virtual lights are clamped, in the scene's unit of length to the power of
     /// -2; `auto` finds one that two steps of compensation nearly bring back, `off` leaves bright splotches.
     #[arg(long, value_name = "auto|off|VALUE", default_value = "auto", allow_hyphen_values = true)]
@@ -50,9 +49,9 @@ pub struct VplArguments {
     /// noisier together [default: 1, for abc 4].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1 << 24))]
     pub share: Option<u32>,
-    /// Points on each eye ray at which each light is gathered.
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=4096))]
-    pub light_points: u32,
+    /// Points on each eye ray at which each light is gathered [default: 1].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=4096))]
+    pub light_points: Option<u32>,
 }
 
 /// How what clamping takes away is brought back.
@@ -134,9 +133,9 @@ impl VplArguments {
             || self.steps.is_some()
             || self.local_visibility.is_some()
             || self.share.is_some()
-            || self.lights != LIGHTS
-            || self.candidates != CANDIDATES
-            || self.light_points != 1
+            || self.lights.is_some()
+            || self.candidates.is_some()
+            || self.light_points.is_some()
     }
 
     fn compensation(&self) -> Option<Compensation> {
@@ -155,10 +154,21 @@ impl VplArguments {
         Some(Compensation { steps: self.steps.unwrap_or(base.steps), local_visibility, ..base })
     }
 
-    fn bound(&self, medium: &impl Medium, bounds: &Bounds) -> Bound {
-        match self.clamp {
-            Clamp::Auto => vpl::usual_bound(medium, bounds),
-            Clamp::To(bound) => bound,
+    fn settings(&self, outline: &Outline, pass_samples: Option<NonZero<u32>>, shot: &Shot<'_>) -> Settings {
+        let usual = Settings::for_outline(outline);
+        Settings {
+            walk: shot.paths,
+            lights: self.lights.unwrap_or(usual.lights),
+            candidates: self.candidates.unwrap_or(usual.candidates),
+            samples: pass_samples.map_or(usual.samples, NonZero::get),
+            bound: match self.clamp {
+                Clamp::Auto => usual.bound,
+                Clamp::To(bound) => bound,
+            },
+            compensation: self.compensation(),
+            points: self.light_points.unwrap_or(usual.points),
+            seed: shot.settings.seed,
+            ..usual
         }
     }
 }
@@ -177,40 +187,61 @@ pub(super) struct VplJob<'a> {
 }
 
 impl WithMedium for VplJob<'_> {
-    type Output = Result<(Outcome, Bound), Failure>;
+    type Output = Result<(Outcome, Settings), Failure>;
 
     fn with<M: Medium + Sync>(self, medium: &M) -> Self::Output {
         let shot = self.shot;
         let (width, height) = (self.film.width(), self.film.height());
-        let bounds = shot.world.bounds();
-        let bound = self.arguments.bound(medium, &bounds);
-        let usual = Settings::new(bound);
-        let settings = Settings {
-            lights: self.arguments.lights,
-            candidates: self.arguments.candidates,
-            samples: self.pass_samples.unwrap_or(usual.samples),
-            compensation: self.arguments.compensation(),
-            points: self.arguments.light_points,
-            has_mirrors: shot.world.has_mirrors(),
-            ..usual
-        };
-        let view = View {
-            world: fogbow::world::World { medium, scene: shot.world, lights: shot.lights },
-            bounds,
-            paths: shot.paths,
-        };
-        let outcome = virtual_lights::render(
+        let world = LitWorld { medium, scene: shot.world, lights: shot.lights };
+        let usual = self.arguments.settings(&shot.world.outline(&world), self.pass_samples, &shot);
+        let (bounds, size) = usual.pyramid();
+        let mut means = vec![Spectrum::ZERO; Pyramid::<()>::cell_count(size)];
+        let medium = Pyramid::new(medium, bounds, size, &mut means)
+            .map_err(|error| format!("virtual lights cannot average the medium's extinction: {error}"))?;
+        let world = LitWorld { medium: &medium, scene: shot.world, lights: shot.lights };
+        let mut witnesses = Vec::new();
+        let eye = |at, rng: &mut Generator| scout(&shot, at, (width, height), rng);
+        vpl::witnesses(&world, &usual, eye, |witness| witnesses.push(witness));
+        let length = NonZero::new(usual.samples).unwrap_or(NonZero::<u32>::MIN);
+        let mut piloted = None;
+        let outcome = progressive::render(
             self.film,
             shot.settings,
-            &settings,
             shot.control,
-            &view,
-            |sample, rng| shot.eye_ray(sample, (width, height), rng),
-            |sample| shot.is_computed(sample, width),
-            write,
+            Passes { length, may_break: true },
+            |pass, runner| {
+                let settings = *piloted.get_or_insert_with(|| {
+                    let mut pilot = vpl::Pass::pilot(&usual, Sequence::LowDiscrepancy);
+                    runner.run(&mut pilot, &world);
+                    pilot.settings_for_lights()
+                });
+                let mut pass = vpl::Pass::new(&settings, pass, Sequence::LowDiscrepancy, &witnesses);
+                runner.run(&mut pass, &world);
+                pass.finish()
+            },
+            |lights, sample, rng, layers| {
+                let world = LitWorld {
+                    medium: &CountingMedium { medium: &medium, tally: sample.tally },
+                    scene: &CountingScene { scene: shot.world, tally: sample.tally },
+                    lights: shot.lights,
+                };
+                let ray = shot.eye_ray(sample, (width, height), rng);
+                let eye = EyeSettings { sees_medium: shot.is_computed(sample, width), ..usual.eye() };
+                let (part, share) = usual.part(lights.as_slice(), sample.index);
+                let seen = vpl::radiance(&ray, &usual.gatherer(&world), part, share, &eye, rng);
+                sample.tally.collide(seen.radiance.collisions);
+                write(&seen, layers);
+            },
         )?;
-        Ok((outcome, bound))
+        Ok((outcome, usual))
     }
+}
+
+/// An eye ray somewhere in the pixel of a point of the film.
+fn scout(shot: &Shot<'_>, at: [f32; 2], (width, height): (u32, u32), rng: &mut Generator) -> Ray {
+    let [x, y] = [(at[0], width), (at[1], height)].map(|(at, side)| (f64::from(at) * f64::from(side)).floor() as f32);
+    let at = Vec2::new(x, y) + uniform2(rng);
+    shot.camera.ray(at / Vec2::new(width as f32, height as f32))
 }
 
 fn write(seen: &Seen, layers: &mut [Spectrum]) {

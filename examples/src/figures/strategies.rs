@@ -9,12 +9,13 @@ use fogbow::medium::Pyramid;
 use fogbow::path;
 use fogbow::sampling::uniform2;
 use fogbow::spectrum::Spectrum;
-use fogbow::vpl::{self, Bound, Compensation, EyeSettings, Flights, Gatherer};
-use fogbow::world::World as LitWorld;
+use fogbow::vpl::{self, Bound, Compensation, EyeSettings, Flights, Gatherer, Settings};
+use fogbow::world::{Outline, World as LitWorld};
 use fogbow_std::film::{Film, Image};
 use fogbow_std::progress::Control;
+use fogbow_std::seed::Sequence;
+use fogbow_std::threads::{self, Threads};
 use fogbow_std::tiles;
-use fogbow_std::virtual_lights::{self, Settings, View};
 
 use super::engelhardt::{mean, strip};
 use super::judged::Judges;
@@ -65,18 +66,28 @@ impl WithMedium for Job<'_> {
         let mut means = vec![Spectrum::ZERO; Pyramid::<()>::cell_count(size)];
         let medium = Pyramid::new(medium, bounds, size, &mut means).map_err(|e| e.to_string())?;
         let lit = LitWorld { medium: &medium, scene: self.world, lights: self.lamps };
-        let view = View { world: lit, bounds, paths };
-        let count = virtual_lights::paths_for(&view, self.wanted, self.run);
-        let lights = virtual_lights::lights(&view, &Settings::new(bound), count, &[], 0, self.run);
+        let settings = Settings {
+            walk: paths,
+            lights: self.wanted,
+            candidates: 1,
+            seed: self.run,
+            ..Settings::for_outline(&Outline::of(&lit, bounds))
+        };
+        let threads = Threads::new(0)?;
+        let mut pilot = vpl::Pass::pilot(&settings, Sequence::LowDiscrepancy);
+        threads::run(&mut pilot, &lit, &threads, &Control::default(), None, |_| {});
+        let mut pass = vpl::Pass::new(&pilot.settings_for_lights(), 0, Sequence::LowDiscrepancy, &[]);
+        threads::run(&mut pass, &lit, &threads, &Control::default(), None, |_| {});
+        let lights = pass.finish()?;
         // The lamps are off: what comes straight from them is the same for all strategies.
-        let world = LitWorld { lights: &[], ..view.world };
+        let world = LitWorld { lights: &[], ..lit };
         let gatherer = Gatherer { world, bound, compensation: Some(self.compensation), has_mirrors: false };
         let eye = EyeSettings { single: 1, primary: 1, ..EyeSettings::new(paths) };
         let camera = self.world.camera_for(self.film.width(), self.film.height());
         let size = Vec2::new(self.film.width() as f32, self.film.height() as f32);
         let outcome = tiles::render(self.film, self.settings, &Control::default(), |sample, rng, layers| {
             let at = Vec2::new(sample.x as f32, sample.y as f32) + uniform2(rng);
-            let seen = vpl::radiance(&camera.ray(at / size), &gatherer, &lights, 1.0, &eye, rng);
+            let seen = vpl::radiance(&camera.ray(at / size), &gatherer, lights.as_slice(), 1.0, &eye, rng);
             layers[0] = seen.compensated.into_iter().sum();
         })?;
         Ok(outcome.seconds.cpu.unwrap_or(outcome.seconds.wall))
