@@ -479,8 +479,8 @@ impl Plan<'_> {
             let own = pixel.density;
             if bound < own {
                 let variance = |s: f32| {
-                    let frequency = 1.0 / (2.0 * PI * s);
-                    frequency * frequency
+                    let length = 2.0 * PI * s;
+                    1.0 / (length * length)
                 };
                 let more = variance(bound) - variance(own);
                 pixel.shape = pixel.shape.plus(&Symmetric2::diagonal(more, more));
