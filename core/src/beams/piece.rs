@@ -9,6 +9,7 @@ use crate::path::Settings;
 use crate::photon::{self, Event};
 use crate::sampling::{Generator, uniform};
 use crate::spectrum::Spectrum;
+use crate::transmittance::segments;
 use crate::world::World;
 
 /// Below this share of a beam's power at its start, roulette ends it with probability one half.
@@ -141,19 +142,17 @@ pub fn pieces(
 ) {
     let weak = ROULETTE_BELOW * power.max_element();
     let mut power = power;
-    let mut t = 0.0;
     let mut left = MAX_PIECES;
-    // NaN ends the walk, too.
-    while t < reach.length && left > 0 {
-        let segment = medium.majorant_segment(reach, t);
-        let end = segment.until.min(reach.length);
-        let (low, range) = (segment.minorant, (segment.majorant - segment.minorant).max_element());
+    for (from, segment) in segments(medium, reach) {
         if segment.majorant.max_element() <= 0.0 {
-            t = end;
-            left -= 1;
             continue;
         }
-        while t < end && left > 0 {
+        let (low, range) = (segment.minorant, (segment.majorant - segment.minorant).max_element());
+        let (mut t, end) = (from, segment.until);
+        while t < end {
+            if left == 0 {
+                return;
+            }
             let step = if range > 0.0 { -float::ln(1.0 - uniform(rng)) / range } else { f32::INFINITY };
             let tentative = t + step;
             let next = tentative.min(end);

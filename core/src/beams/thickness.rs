@@ -4,6 +4,7 @@ use crate::host::{Medium, Rng};
 use crate::math::Ray;
 use crate::sampling::uniform;
 use crate::spectrum::Spectrum;
+use crate::transmittance::segments;
 
 /// Parts that an eye ray is divided into at most. Larger: more stack (28 bytes each). Smaller: coarser steps
 /// through grids of more cells.
@@ -37,7 +38,8 @@ impl Thickness {
         let mut found = Self { parts: heapless::Vec::new(), last: Spectrum::ZERO };
         let (mut varying, mut count) = (0.0_f32, 0);
         let (mut first, mut end_of_medium) = (f32::INFINITY, 0.0_f32);
-        for_segments(medium, ray, |from, to, low, high| {
+        for (from, segment) in segments(medium, ray).take(MOST) {
+            let (to, low, high) = (segment.until, segment.minorant, segment.majorant);
             count += 1;
             if low != high {
                 varying += to - from;
@@ -46,7 +48,7 @@ impl Thickness {
                 first = first.min(from);
                 end_of_medium = to;
             }
-        });
+        }
         if count > MAX_SEGMENTS || !varying.is_finite() {
             // Too many to follow: even steps from the first to the last, as far as that is finite.
             let last =
@@ -60,7 +62,8 @@ impl Thickness {
         let room = (PARTS - count) as f32;
         // Every segment may round its number of steps up by one, for which `count` more are kept.
         let step = medium.resolution().max(varying / (room - count as f32).max(1.0));
-        for_segments(medium, ray, |from, to, low, high| {
+        for (from, segment) in segments(medium, ray).take(MOST) {
+            let (to, low, high) = (segment.until, segment.minorant, segment.majorant);
             if low == high {
                 found.push(from, low);
                 if to.is_finite() {
@@ -70,7 +73,7 @@ impl Thickness {
                 let steps = ((to - from) / step) as usize + 1;
                 found.march(medium, ray, (from, to), steps, offset);
             }
-        });
+        }
         found
     }
 
@@ -101,18 +104,5 @@ impl Thickness {
             Some(part) => part.thickness + part.slope * (distance - part.from),
             None => Spectrum::ZERO,
         }
-    }
-}
-
-fn for_segments(medium: &(impl Medium + ?Sized), ray: &Ray, mut visit: impl FnMut(f32, f32, Spectrum, Spectrum)) {
-    let mut t = 0.0;
-    for _ in 0..MOST {
-        if !(t < ray.length) {
-            return;
-        }
-        let segment = medium.majorant_segment(ray, t);
-        let end = segment.until.min(ray.length);
-        visit(t, end, segment.minorant, segment.majorant);
-        t = end;
     }
 }

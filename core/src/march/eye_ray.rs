@@ -7,6 +7,7 @@ use crate::host::{Medium, Properties};
 use crate::math::Ray;
 use crate::sampling::distance::truncated_exponential;
 use crate::spectrum::Spectrum;
+use crate::transmittance::segments;
 
 /// Most steps along one ray: a step function that returns too little must not hang the host.
 const MAX_STEPS: u32 = 1 << 20;
@@ -86,24 +87,21 @@ pub fn steps(
 ) -> EyeRay {
     let mut radiance = Spectrum::ZERO;
     let mut thickness = Spectrum::ZERO;
-    let mut at = 0.0_f32;
     let mut left = MAX_STEPS;
-    while at < ray.length && left > 0 {
-        let segment = medium.majorant_segment(ray, at);
-        let until = if segment.until > at { segment.until } else { at + medium.resolution().max(at * 1e-6) };
-        let until = until.min(ray.length);
-        left -= 1;
+    for (entry, segment) in segments(medium, ray) {
         if segment.majorant.is_black() {
-            at = until;
             continue;
         }
-        let constant = segment.is_constant();
-        let (entry, before) = (at, thickness);
+        let (until, constant) = (segment.until, segment.is_constant());
+        let (mut at, before) = (entry, thickness);
         // A host's step of 0 or NaN must still lead on.
         let least = if until.is_finite() { (until - at) * 1e-6 } else { 1e-6 };
-        while at < until && left > 0 {
-            left -= 1;
+        while at < until {
             let transmittance = thickness.transmitted();
+            if left == 0 {
+                return EyeRay { radiance, transmittance };
+            }
+            left -= 1;
             if transmittance.max_element() < NEGLIGIBLE && (until.is_infinite() || transmittance.is_black()) {
                 return EyeRay { radiance, transmittance: Spectrum::ZERO };
             }
@@ -114,7 +112,6 @@ pub fn steps(
             let end = if end.is_finite() { end } else { at + 1.0 / segment.majorant.max_element() };
             let length = end - at;
             if !(length > 0.0) {
-                at = until;
                 break;
             }
             let (distance, extinction, weight, properties);

@@ -4,6 +4,7 @@ use super::EyeRay;
 use crate::host::{Medium, Properties};
 use crate::math::{Ray, float};
 use crate::spectrum::Spectrum;
+use crate::transmittance::segments;
 
 /// Most pieces along one ray: a resolution far too fine must not hang the host.
 const MAX_PIECES: u32 = 1 << 20;
@@ -53,31 +54,35 @@ pub fn scattering_points(
     let mut emitted = Spectrum::ZERO;
     let mut thickness = Spectrum::ZERO;
     let emissive = medium.is_emissive();
-    let mut at = 0.0_f32;
+    // A resolution of 0, or that is no number, says nothing.
+    let resolution = Some(medium.resolution()).filter(|r| *r > 0.0).unwrap_or(f32::INFINITY);
     let mut left = MAX_PIECES;
-    while at < ray.length && left > 0 {
-        let segment = medium.majorant_segment(ray, at);
-        let until = if segment.until > at { segment.until } else { at + medium.resolution().max(at * 1e-6) };
-        let until = until.min(ray.length);
+    for (start, segment) in segments(medium, ray) {
         if segment.majorant.is_black() {
-            left -= 1;
-            at = until;
             continue;
         }
-        let (start, before) = (at, thickness);
-        let count = if segment.is_constant() || until.is_infinite() {
+        if left == 0 {
+            break;
+        }
+        let until = segment.until;
+        // A segment without end that changes: pieces of one free path each.
+        let is_endless = until.is_infinite() && !segment.is_constant();
+        let count = if is_endless {
+            left
+        } else if segment.is_constant() {
             1
         } else {
-            (libm::ceilf((until - at) / medium.resolution().max(1e-30)) as u32).clamp(1, left)
+            (libm::ceilf((until - start) / resolution) as u32).clamp(1, left)
         };
+        left -= count;
+        let mut at = start;
         for i in 0..count {
-            left -= 1;
-            let end = if i + 1 == count { until } else { start + (until - start) * ((i + 1) as f32 / count as f32) };
-            // An endless segment that changes: pieces of one free path each.
-            let end = if end.is_infinite() && !segment.is_constant() {
+            let end = if is_endless {
                 at + 1.0 / segment.majorant.max_element().max(1e-30)
+            } else if i + 1 == count {
+                until
             } else {
-                end
+                start + (until - start) * ((i + 1) as f32 / count as f32)
             };
             let look = if end.is_finite() { at + jitter * (end - at) } else { at };
             let properties = medium.properties(ray.at(look));
@@ -97,18 +102,14 @@ pub fn scattering_points(
                 let lengths = extinction.map(|sigma| attenuated_length(sigma, end - at));
                 emitted += thickness.transmitted() * properties.emission * lengths;
             }
-            thickness =
-                if count == 1 { before + extinction * (end - start) } else { thickness + extinction * (end - at) };
+            thickness += extinction * (end - at);
             // 0 · ∞
             thickness = thickness.map(|t| if t.is_nan() { 0.0 } else { t });
             at = end;
-            if left == 0 || thickness.min_element() > 13.8 {
-                break;
+            // The exponential of what is clearly less need not be taken.
+            if thickness.min_element() > 13.8 && thickness.transmitted().max_element() < NEGLIGIBLE {
+                return EyeRay { radiance: emitted, transmittance: Spectrum::ZERO };
             }
-        }
-        let transmittance = thickness.transmitted();
-        if transmittance.max_element() < NEGLIGIBLE {
-            return EyeRay { radiance: emitted, transmittance: Spectrum::ZERO };
         }
     }
     EyeRay { radiance: emitted, transmittance: thickness.transmitted() }

@@ -7,7 +7,7 @@
 
 use glam::Vec3;
 
-use super::tracking::most_segments;
+use super::marching_segments;
 use crate::host::Medium;
 use crate::math::quadrature::GAUSS_8;
 use crate::math::{Ray, float};
@@ -22,7 +22,7 @@ const MAX_SAMPLES: u32 = 1 << 16;
 
 /// Segments after which a changing part is marched, so that an endless one can end where nothing is seen
 /// through it.
-const MAX_JOINED: u32 = 256;
+const MAX_JOINED: usize = 256;
 
 /// How finely a part of a ray where extinction changes is sampled.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -168,21 +168,15 @@ pub(super) enum Part {
 }
 
 /// Most segments asked for where a medium ends.
-const MOST_TO_END: u32 = 8;
+const MOST_TO_END: usize = 8;
 
 /// `ray`, cut off where the medium ends for good if it has no end itself; whole where that is not found soon.
 pub(crate) fn until_the_end(ray: &Ray, medium: &(impl Medium + ?Sized)) -> Ray {
-    let mut at = 0.0;
     if ray.length.is_infinite() {
-        for _ in 0..MOST_TO_END {
-            let segment = medium.marching_segment(ray, at);
+        for (from, segment) in marching_segments(medium, ray).take(MOST_TO_END) {
             if segment.until.is_infinite() && segment.majorant.is_black() {
-                return ray.with_length(at);
+                return ray.with_length(from);
             }
-            if !(segment.until > at) || segment.until.is_infinite() {
-                break;
-            }
-            at = segment.until;
         }
     }
     *ray
@@ -190,45 +184,38 @@ pub(crate) fn until_the_end(ray: &Ray, medium: &(impl Medium + ?Sized)) -> Ray {
 
 /// Splits a ray at the medium's constant segments; what lies between two of them is one part, or
 /// several where it is long. Stops as soon as `visit(part, is_endless)` says so: on endless and very long rays, where nothing
-/// is seen beyond. What lies behind the most segments a walk may visit counts as vacuum.
+/// is seen beyond. What lies behind the most [`segments`](super::segments()) there may be counts as vacuum.
 #[inline]
 pub(super) fn for_each_part(ray: &Ray, medium: &(impl Medium + ?Sized), mut visit: impl FnMut(Part, bool) -> bool) {
-    let (mut at, mut changing_from, mut joined) = (0.0_f32, None, 0);
-    for visited in 0..most_segments(ray) {
+    let (mut end, mut changing_from, mut joined) = (0.0_f32, None, 0);
+    for (visited, (from, segment)) in marching_segments(medium, ray).enumerate() {
         let is_endless = ray.length.is_infinite() || visited > 16 * MAX_JOINED;
-        // Written so that NaN ends the loop, too.
-        if !(at < ray.length) {
-            break;
-        }
-        let segment = medium.marching_segment(ray, at);
-        // A host that does not advance must not hang us.
-        let until = if segment.until > at { segment.until } else { at + medium.resolution().max(at * 1e-6) };
-        let until = until.min(ray.length);
+        let until = segment.until;
         let is_changing = until.is_finite() && !segment.is_constant();
         if !is_changing || joined >= MAX_JOINED {
-            if let Some(from) = changing_from.take()
-                && visit(Part::Changing { from, until: at }, is_endless)
+            if let Some(start) = changing_from.take()
+                && visit(Part::Changing { from: start, until: from }, is_endless)
             {
                 return;
             }
             joined = 0;
         }
         if until.is_infinite() {
-            visit(Part::Endless { extinction: segment.majorant, from: at }, true);
+            visit(Part::Endless { extinction: segment.majorant, from }, true);
             return;
         }
         if is_changing {
-            changing_from = changing_from.or(Some(at));
+            changing_from = changing_from.or(Some(from));
             joined += 1;
         } else if !segment.majorant.is_black()
-            && visit(Part::Constant { extinction: segment.majorant, from: at, until }, is_endless)
+            && visit(Part::Constant { extinction: segment.majorant, from, until }, is_endless)
         {
             return;
         }
-        at = until;
+        end = until;
     }
     if let Some(from) = changing_from {
-        visit(Part::Changing { from, until: at }, false);
+        visit(Part::Changing { from, until: end }, false);
     }
 }
 

@@ -5,17 +5,11 @@
 //! sampling over the channels (Wilkie et al. 2014; Miller et al. 2019). On constant segments both
 //! turn into closed forms without a special case.
 
+use super::segments;
 use crate::host::{Medium, Properties, Rng};
 use crate::math::{Ray, float};
 use crate::sampling::{Generator, uniform};
 use crate::spectrum::Spectrum;
-
-/// Most segments a walk visits, on endless rays a fraction of it: a medium without end and mostly
-/// without matter must not hang the host. What lies beyond counts as vacuum.
-pub(super) const MAX_SEGMENTS: u32 = 1 << 20;
-
-/// The same on a ray without end.
-pub(super) const MAX_SEGMENTS_ENDLESS: u32 = 1 << 16;
 
 /// Most tentative collisions within one segment: bounds so loose that a walk takes more move it less
 /// than `f32` positions resolve.
@@ -24,12 +18,6 @@ const MAX_COLLISIONS: u32 = 1 << 22;
 /// Tentative collisions expected at least on a segment of an emissive medium: where there is light
 /// but hardly extinction, collisions alone would never see it.
 const EMISSION_SAMPLES: f32 = 2.0;
-
-/// How many segments of a ray a walk may visit.
-#[inline]
-pub(super) fn most_segments(ray: &Ray) -> u32 {
-    if ray.length.is_finite() { MAX_SEGMENTS } else { MAX_SEGMENTS_ENDLESS }
-}
 
 /// Bounds (m⁻¹) down to this are vacuum: on segments without end, all that is no extinction at all
 /// but marks emission, which would be infinitely bright there.
@@ -122,22 +110,16 @@ fn grey(medium: &(impl Medium + ?Sized), ray: &Ray, u: f32, rng: &mut Generator)
     let emissive = medium.is_emissive();
     let mut emission = Spectrum::ZERO;
     let mut span = Span(None);
-    let mut t = 0.0;
     // Optical thickness up to the next tentative collision; what a segment does not use up is
     // carried into the next.
     let mut thickness = step(u);
-    for _ in 0..most_segments(ray) {
-        // NaN ends the walk, too.
-        if !(t < ray.length) {
-            break;
-        }
-        let segment = medium.majorant_segment(ray, t);
-        let end = segment.until.min(ray.length);
+    for (from, segment) in segments(medium, ray) {
+        let end = segment.until;
         if segment.majorant[0] > vacuum_bound(end) {
-            let bound = segment.majorant[0].max(floor_of(emissive, end - t));
+            let bound = segment.majorant[0].max(floor_of(emissive, end - from));
             let sure = segment.minorant[0];
             let inverse = 1.0 / bound;
-            let start = t;
+            let mut t = from;
             for _ in 0..MAX_COLLISIONS {
                 let length = thickness * inverse;
                 if !(t + length < end) {
@@ -153,7 +135,7 @@ fn grey(medium: &(impl Medium + ?Sized), ray: &Ray, u: f32, rng: &mut Generator)
                 let level = if sure < bound { uniform(rng) * bound } else { 0.0 };
                 if level < sure || level < medium.extinction(point)[0] {
                     let properties = medium.properties(point);
-                    span.extend(start, t);
+                    span.extend(from, t);
                     return Flight {
                         distance: t,
                         collision: Some(properties),
@@ -164,9 +146,8 @@ fn grey(medium: &(impl Medium + ?Sized), ray: &Ray, u: f32, rng: &mut Generator)
                 }
                 thickness = step(uniform(rng));
             }
-            span.extend(start, end);
+            span.extend(from, end);
         }
-        t = end;
     }
     Flight { distance: ray.length, collision: None, weight: Spectrum::ONE, emission, span: span.finish(ray.length) }
 }
@@ -187,20 +168,15 @@ fn coloured(medium: &(impl Medium + ?Sized), ray: &Ray, throughput: Spectrum, u:
     let mixture = |relative: Spectrum| (share * relative).0.iter().sum::<f32>();
     let mut emission = Spectrum::ZERO;
     let mut span = Span(None);
-    let mut t = 0.0;
     let mut thickness = step(u);
-    for _ in 0..most_segments(ray) {
-        if !(t < ray.length) {
-            break;
-        }
-        let segment = medium.majorant_segment(ray, t);
-        let end = segment.until.min(ray.length);
-        let start = t;
+    for (from, segment) in segments(medium, ray) {
+        let end = segment.until;
         if segment.majorant.max_element() > vacuum_bound(end) {
-            let floor = floor_of(emissive, end - t);
+            let floor = floor_of(emissive, end - from);
             let majorant = segment.majorant.map(|c| c.max(floor));
             let is_sure = segment.is_constant() && majorant == segment.majorant;
             let bound = majorant[channel];
+            let mut t = from;
             for _ in 0..MAX_COLLISIONS {
                 let length = if bound > 0.0 { thickness / bound } else { f32::INFINITY };
                 let travelled = length.min(end - t);
@@ -218,7 +194,7 @@ fn coloured(medium: &(impl Medium + ?Sized), ray: &Ray, throughput: Spectrum, u:
                 let extinction = properties.extinction();
                 if is_sure || uniform(rng) * bound < extinction[channel] {
                     relative = bounded(relative * (extinction / extinction[channel]));
-                    span.extend(start, t);
+                    span.extend(from, t);
                     return Flight {
                         distance: t,
                         collision: Some(properties),
@@ -231,9 +207,8 @@ fn coloured(medium: &(impl Medium + ?Sized), ray: &Ray, throughput: Spectrum, u:
                 relative = bounded(relative * (null / null[channel]));
                 thickness = step(uniform(rng));
             }
-            span.extend(start, end);
+            span.extend(from, end);
         }
-        t = end;
     }
     let weight = relative / mixture(relative);
     Flight { distance: ray.length, collision: None, weight, emission, span: span.finish(ray.length) }
@@ -291,16 +266,11 @@ const ROULETTE_BELOW: f32 = 0.05;
 fn grey_transmittance(medium: &(impl Medium + ?Sized), ray: &Ray, rng: &mut (impl Rng + ?Sized)) -> f32 {
     let mut closed = 0.0;
     let mut ratio = 1.0;
-    let mut t = 0.0;
-    for _ in 0..most_segments(ray) {
-        if !(t < ray.length) {
-            break;
-        }
-        let segment = medium.majorant_segment(ray, t);
-        let end = segment.until.min(ray.length);
+    for (from, segment) in segments(medium, ray) {
+        let end = segment.until;
         let (low, high) = (segment.minorant[0], segment.majorant[0]);
         if low > 0.0 {
-            closed += low * (end - t);
+            closed += low * (end - from);
             if closed > float::OPAQUE {
                 return 0.0;
             }
@@ -308,6 +278,7 @@ fn grey_transmittance(medium: &(impl Medium + ?Sized), ray: &Ray, rng: &mut (imp
         let range = high - low;
         if range > 0.0 {
             let inverse = 1.0 / range;
+            let mut t = from;
             for _ in 0..MAX_COLLISIONS {
                 t += step(uniform(rng)) * inverse;
                 if !(t < end) {
@@ -322,7 +293,6 @@ fn grey_transmittance(medium: &(impl Medium + ?Sized), ray: &Ray, rng: &mut (imp
                 }
             }
         }
-        t = end;
     }
     if closed > 0.0 { ratio * float::exp(-closed) } else { ratio }
 }
@@ -330,22 +300,18 @@ fn grey_transmittance(medium: &(impl Medium + ?Sized), ray: &Ray, rng: &mut (imp
 fn coloured_transmittance(medium: &(impl Medium + ?Sized), ray: &Ray, rng: &mut (impl Rng + ?Sized)) -> Spectrum {
     let mut closed = Spectrum::ZERO;
     let mut ratio = Spectrum::ONE;
-    let mut t = 0.0;
-    for _ in 0..most_segments(ray) {
-        if !(t < ray.length) {
-            break;
-        }
-        let segment = medium.majorant_segment(ray, t);
-        let end = segment.until.min(ray.length);
+    for (from, segment) in segments(medium, ray) {
+        let end = segment.until;
         let (low, high) = (segment.minorant, segment.majorant);
         // 0 · ∞ in vacuum would be NaN.
-        closed += low.map(|c| if c > 0.0 { c * (end - t) } else { 0.0 });
+        closed += low.map(|c| if c > 0.0 { c * (end - from) } else { 0.0 });
         if closed.min_element() > float::OPAQUE {
             return Spectrum::ZERO;
         }
         let range = (high - low).max_element();
         if range > 0.0 {
             let inverse = 1.0 / range;
+            let mut t = from;
             for _ in 0..MAX_COLLISIONS {
                 t += step(uniform(rng)) * inverse;
                 if !(t < end) {
@@ -360,7 +326,6 @@ fn coloured_transmittance(medium: &(impl Medium + ?Sized), ray: &Ray, rng: &mut 
                 }
             }
         }
-        t = end;
     }
     ratio * closed.transmitted()
 }

@@ -107,7 +107,7 @@ fn empty_blocks_are_passed_in_one_step() {
 
 /// Thick smoke ends segments early, so that bounds are tight; marching has no use for bounds.
 #[test]
-fn smoke_is_one_run_however_thick() {
+fn smoke_is_one_segment_however_thick() {
     let n = 16 * BLOCK;
     let mut voxels = Voxels::new([n, 1, 1], Affine3::IDENTITY, |i| 1e3 * (1.0 + i as f32));
     let grid = voxels.grid();

@@ -5,6 +5,7 @@ mod common;
 mod faces;
 mod grid;
 mod mean;
+mod mistakes;
 mod others;
 mod pyramid;
 mod refusals;
