@@ -1,5 +1,5 @@
 //! Nanoseconds per operator on covariances of light fields, beside the same written with a general matrix crate:
-//! `cargo bench -p fogbow-examples --bench covariance -- [--quick]`
+//! `cargo bench -p fogbow-examples --features benches --bench covariance -- [--quick]`
 //!
 //! The other is `nalgebra`, in `f32`: products of 4×4 matrices and their dense inverse, as the formulas stand in
 //! Belcour et al. 2014. Both work on the same covariances, regular ones, since a dense inverse knows no others, and

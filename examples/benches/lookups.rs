@@ -1,5 +1,5 @@
 //! Nanoseconds per lookup in the cache's index, beside other trees:
-//! `cargo bench -p fogbow-examples --bench lookups -- [--quick]`
+//! `cargo bench -p fogbow-examples --features benches --bench lookups -- [--quick]`
 //!
 //! Every tree answers the same question: which spheres contain this point, and how deep does it lie in
 //! each? Radii are scaled until ten spheres contain a point. The others are an R*-tree (`rstar`), packed

@@ -1,8 +1,6 @@
 //! The program as users call it: exit codes, files, messages.
 
-#[path = "program/radiance_cache.rs"]
 mod radiance_cache;
-#[path = "program/vpl.rs"]
 mod vpl;
 
 use std::path::{Path, PathBuf};

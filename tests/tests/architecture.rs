@@ -427,6 +427,26 @@ fn lock_files_outside_the_workspace_agree_with_it() {
     }
 }
 
+/// A file that `tests/main.rs` does not name is never compiled, and its tests never fail.
+#[test]
+fn every_file_of_tests_belongs_to_the_program_of_its_package() {
+    for package in ["tests", "examples"] {
+        let folder = repository().join(package).join("tests");
+        let program = tokens(&read(&folder.join("main.rs")));
+        let named: BTreeSet<&str> =
+            program.windows(2).filter(|pair| pair[0].word() == Some("mod")).filter_map(|pair| pair[1].word()).collect();
+        for entry in fs::read_dir(&folder).expect("tests can be listed") {
+            let path = entry.expect("tests can be listed").path();
+            let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+            let is_module = path.extension().is_some_and(|kind| kind == "rs") || path.join("mod.rs").is_file();
+            assert!(
+                !is_module || name == "main" || named.contains(name.as_str()),
+                "{package}/tests/main.rs lacks `mod {name};`"
+            );
+        }
+    }
+}
+
 // ---------------------------------------------------------------------------------------------
 // The reader of source text itself: a check that cannot fail proves nothing.
 

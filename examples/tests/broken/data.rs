@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use crate::common::{OBJ, PLY, densities, sky, volume};
+use super::common::{OBJ, PLY, densities, sky, volume};
 use fogbow_examples::mesh::Mesh;
 use fogbow_examples::picture::Picture;
 use fogbow_examples::volume::Volume;

@@ -13,7 +13,7 @@ use fogbow_examples::scene_file::SceneFile;
 use fogbow_examples::volume::Volume;
 use fogbow_examples::world::{Storage, World};
 
-use crate::common::{Folder, OBJ, PLY, SCENE, densities, sky, volume};
+use super::common::{Folder, OBJ, PLY, SCENE, densities, sky, volume};
 
 /// xorshift64.
 struct Random(u64);
@@ -164,7 +164,8 @@ fn fuzz_images() {
     let header = b"{'descr': '<f4', 'fortran_order': False, 'shape': (1, 2, 3), }\n";
     let npy = [b"\x93NUMPY\x01\x00", &(header.len() as u16).to_le_bytes()[..], header, &[0; 24]].concat();
     let hdr = b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 1 +X 2\n\x80\x80\x80\x80\x80\x80\x80\x80".to_vec();
-    for (extension, seed) in [("npy", npy), ("hdr", hdr), ("pfm", sky())] {
+    let png = fogbow_std::image::png::encode(&fogbow_std::image::pfm::decode(&sky()).unwrap(), 0.0).unwrap();
+    for (extension, seed) in [("npy", npy), ("hdr", hdr), ("pfm", sky()), ("png", png)] {
         assert!(Picture::from_bytes(Path::new("i"), extension, &seed).is_ok(), "{extension}");
         fuzz(&[seed], |bytes| drop(Picture::from_bytes(Path::new("i"), extension, bytes)));
     }

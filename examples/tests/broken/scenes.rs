@@ -1,6 +1,6 @@
 //! Broken scene files: every one is an error that says where and what.
 
-use crate::common::{Folder, SCENE};
+use super::common::{Folder, SCENE};
 
 /// The scene with one piece replaced, and what the error must mention.
 const CASES: &[(&str, &str, &[&str])] = &[

@@ -8,7 +8,7 @@ use fogbow::sampling::{Generator, uniform, warp};
 use fogbow::spectrum::Spectrum;
 use proptest::prelude::*;
 
-use crate::common::*;
+use super::common::*;
 
 /// Optical thickness of a ray by segments of vacuum and of constant medium alone.
 fn thickness(medium: &impl Medium, ray: &Ray) -> f32 {

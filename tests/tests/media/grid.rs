@@ -7,7 +7,7 @@ use fogbow::phase::Phase;
 use fogbow::sampling::{Generator, uniform};
 use fogbow::spectrum::Spectrum;
 
-use crate::common::*;
+use super::common::*;
 
 /// Densities by the definition: eight weighted corners, in `f64`.
 fn trilinear(size: [u32; 3], values: &[f32], local: [f64; 3]) -> f64 {

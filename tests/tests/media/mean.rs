@@ -6,7 +6,7 @@ use fogbow::medium::{Homogeneous, Placed, Region};
 use fogbow::phase::Phase;
 use fogbow::sampling::{Generator, uniform};
 
-use crate::common::*;
+use super::common::*;
 
 /// Mean over a ball by many random points, and its standard error.
 fn brute_mean(medium: &impl Medium, centre: Vec3, radius: f32, rng: &mut Generator) -> (f32, f32) {

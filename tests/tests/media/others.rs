@@ -7,7 +7,7 @@ use fogbow::phase::{Lobe, Phase};
 use fogbow::sampling::{Generator, uniform};
 use fogbow::spectrum::Spectrum;
 
-use crate::common::*;
+use super::common::*;
 
 #[test]
 fn noise_keeps_its_bounds_along_rays_and_its_gradient_is_right() {

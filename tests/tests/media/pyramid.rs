@@ -8,7 +8,7 @@ use fogbow::phase::Phase;
 use fogbow::sampling::{Generator, uniform};
 use fogbow::spectrum::Spectrum;
 
-use crate::common::*;
+use super::common::*;
 
 /// The cube of edge 2 m that all of these lie in.
 const CUBE: Bounds = Bounds { min: Vec3::splat(-1.0), max: Vec3::splat(1.0) };

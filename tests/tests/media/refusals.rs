@@ -5,7 +5,7 @@ use fogbow::medium::{Density, FractalNoise, Grid, MediumError, MinMax, Noise, Re
 use fogbow::phase::Phase;
 use fogbow::spectrum::Spectrum;
 
-use crate::common::*;
+use super::common::*;
 
 #[test]
 fn constructors_name_what_they_refuse() {

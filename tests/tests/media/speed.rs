@@ -9,7 +9,7 @@ use fogbow::phase::Phase;
 use fogbow::sampling::{Generator, uniform};
 use fogbow::spectrum::Spectrum;
 
-use crate::common::*;
+use super::common::*;
 
 /// Prints times: `cargo test -p fogbow-tests --test media -- --ignored --nocapture speed`. A file
 /// that ends in 64³ floats, such as a Mitsuba volume, takes the place of the cloud if the variable

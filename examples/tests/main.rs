@@ -1,0 +1,5 @@
+//! All tests of the program and of what it reads, linked once.
+
+mod broken;
+mod caches;
+mod program;

@@ -1,0 +1,31 @@
+//! All tests of this package, as one program: linking thirty takes longer than running them.
+
+mod architecture;
+mod cache;
+mod cache_bytes;
+mod cache_index;
+mod cache_light;
+mod covariance;
+mod covariance_grid;
+mod estimators;
+mod examples;
+mod figures;
+mod furnace;
+mod furnace_media;
+mod golden;
+mod gradients;
+mod image_sampling;
+mod light_fields;
+mod march;
+mod marched;
+mod media;
+mod no_alloc;
+mod photon_beams;
+mod photons;
+mod radiance_cache;
+mod sampling;
+mod sh;
+mod shift;
+mod threads;
+mod vpl;
+mod world;
