@@ -38,14 +38,14 @@ pub struct IndexRoom {
 }
 
 impl IndexRoom {
-    /// For so many spheres; `reach` is how many times as large as usual they are.
-    const fn of(spheres: usize, reach: usize) -> Self {
+    /// For so many spheres, which are so many times as large as usual. Blocks have a bound that does not depend on it.
+    const fn of(spheres: usize, wider: usize) -> Self {
         let few = if spheres == 0 { 0 } else { 16 };
         Self {
-            nodes: reach * spheres + few,
-            entries: 6 * reach * spheres + few,
+            nodes: wider * spheres + few,
+            entries: 6 * wider * spheres + few,
             spheres,
-            blocks: 4 * reach * spheres + few,
+            blocks: 4 * spheres + few,
         }
     }
 }
