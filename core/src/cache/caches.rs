@@ -3,6 +3,7 @@
 use super::eye::{Caches, Reader, Seen, radiance, radiance_beyond};
 use super::kind::Kind;
 use super::record::Record;
+use super::room::{KindSlots, stride_of};
 use super::settings::Settings;
 use super::slot::{ByKind, Slot};
 use super::{Estimator, SurfaceCache, VolumeCache};
@@ -83,13 +84,70 @@ impl RadianceCaches<'static> {
     /// Empty caches in memory that grows.
     #[must_use]
     pub fn new(settings: Settings) -> Self {
-        use crate::sh::coefficient_count;
-        let slot = |kind: Kind| match settings.effort(kind) {
+        let slot = |kind: Kind| match stride_of(&settings, kind) {
             None => Slot::Off,
-            Some(_) if kind.is_on_surfaces() => Slot::Surface(SurfaceCache::growing(1)),
-            Some(effort) => Slot::Volume(VolumeCache::growing(coefficient_count(effort.degree) - 1)),
+            Some(stride) if kind.is_on_surfaces() => Slot::Surface(SurfaceCache::growing(stride)),
+            Some(stride) => Slot::Volume(VolumeCache::growing(stride)),
         };
         Self { settings, slots: ByKind(Kind::ALL.map(slot)), views: List::default(), settled: ByKind([0; Kind::COUNT]) }
+    }
+}
+
+impl<'s> RadianceCaches<'s> {
+    /// Empty caches in lent memory, kind by kind in the order of [`Kind::ALL`]; that of kinds that the settings do not use is not
+    /// touched. `views` has room for a number for each view that they are to be filled for.
+    /// [`room_for`](super::room_for) tells how much is needed. Where there is too little, places have no record, and eye rays
+    /// sample what is missing: [`Filling::is_cut`](super::Filling::is_cut).
+    ///
+    /// ```
+    /// # use fogbow::cache::*;
+    /// # use fogbow::{host::Empty, math::{Bounds, Ray, Vec3}, medium::Homogeneous, phase::Phase, sh::Coefficient};
+    /// # use fogbow::{spectrum::Spectrum, work, world::{Outline, World}};
+    /// # let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::ONE, Phase::ISOTROPIC)?;
+    /// # let world = World { medium: &fog, scene: &Empty, lights: &[] };
+    /// # let bounds = Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE };
+    /// # let limits = Limits { min: 0.1, max: 1.0 };
+    /// # let effort = Effort { tolerance: 0.5, samples: 16, degree: 1, limits, clearance: f32::INFINITY };
+    /// const RECORDS: usize = 48;
+    /// let settings = Settings { surface: Some(effort), rays: 16, ..Settings::default() };
+    /// let (mut records, mut higher) = ([Record::default(); RECORDS], [Coefficient::ZERO; 3 * RECORDS]);
+    /// let (mut nodes, mut entries) = ([[Node::default(); 4 * RECORDS]; 2], [[0; 24 * RECORDS]; 2]);
+    /// let (mut spheres, mut blocks) = ([[[0.0; 4]; RECORDS]; 2], [[Block::default(); 14 * RECORDS]; 2]);
+    /// let mut parts = nodes.iter_mut().zip(&mut entries).zip(spheres.iter_mut().zip(&mut blocks));
+    /// let mut index = || {
+    ///     let ((nodes, entries), (spheres, blocks)) = parts.next().unwrap();
+    ///     Index::new(&mut nodes[..], &mut entries[..], &mut spheres[..], &mut blocks[..])
+    /// };
+    /// let mut kinds: [KindSlots<'_>; Kind::COUNT] = Default::default();
+    /// kinds[Kind::Surface as usize] =
+    ///     KindSlots { records: &mut records, higher: &mut higher, facings: &mut [], index: index(), wide: index() };
+    /// let mut views = [0; 1];
+    /// let caches = RadianceCaches::lent(settings, &mut views[..], kinds);
+    ///
+    /// // As much for the fill and for its jobs; here there is none, so that no place is even looked for.
+    /// let asked = Asked::<fn([f32; 2]) -> Ray>::Box(bounds);
+    /// let mut filling = caches.fill_in(Memory::lent(Slots::default()), asked);
+    /// work::finish(&mut filling, &world, &mut Output::lent(&mut [], &mut [], &mut []));
+    /// assert!(filling.is_cut() && filling.finish().records(Kind::Surface).is_empty());
+    /// # Ok::<(), fogbow::medium::MediumError>(())
+    /// ```
+    #[must_use]
+    pub fn lent(settings: Settings, views: impl Into<List<'s, u64>>, kinds: [KindSlots<'s>; Kind::COUNT]) -> Self {
+        let mut number = 0;
+        let slots = kinds.map(|KindSlots { records, higher, facings, index, wide }| {
+            let kind = Kind::ALL[number];
+            number += 1;
+            match stride_of(&settings, kind) {
+                None => Slot::Off,
+                Some(stride) if kind.is_on_surfaces() => {
+                    Slot::Surface(SurfaceCache::new(records, facings, index, wide, stride))
+                }
+                Some(stride) => Slot::Volume(VolumeCache::new(records, higher, index, wide, stride)),
+            }
+        });
+        let mut views = views.into();
+        views.clear();
+        Self { settings, slots: ByKind(slots), views, settled: ByKind([0; Kind::COUNT]) }
     }
 }
 

@@ -15,6 +15,7 @@ use super::guide::{Guide, Guided, Looks};
 use super::kind::{Kind, Pass, Places, STEPS, Step};
 use super::lookup::Reading;
 use super::radius::{Limits, clearance};
+use super::room::Slots;
 use super::settings::{Effort, Settings};
 use super::slot::{Attached, ByKind, Inserted, learnt_near};
 use super::{Estimator, Facing, Record};
@@ -25,7 +26,7 @@ use crate::sampling::uniform::mix;
 use crate::sampling::{Generator, uniform2, warp};
 use crate::sh::Coefficient;
 use crate::single_scatter::Sums;
-use crate::storage::List;
+use crate::storage::{Full, List};
 use crate::work::Rounds;
 use crate::world::World;
 
@@ -40,7 +41,10 @@ const LAST_BATCH: u32 = 4096;
 const RAYS_PER_JOB: u32 = 16;
 
 /// Places that one job looks up.
-const PLACES_PER_JOB: u32 = 1024;
+pub(super) const PLACES_PER_JOB: u32 = 1024;
+
+/// Places that one job is expected to find at most, where memory is lent: some hundreds for each of its rays. Rays with more lose them.
+pub(super) const PLACES_OF_JOB: usize = 256 * RAYS_PER_JOB as usize;
 
 /// The first records of kinds on which all others stand get so many times the samples: what they have wrong nothing
 /// averages out.
@@ -89,6 +93,8 @@ pub struct Wanted {
 /// An estimate for one record.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Estimate {
+    /// The number of its job.
+    job: u32,
     place: Place,
     sums: Sums,
     facing: Facing,
@@ -109,6 +115,24 @@ pub struct Output<'o> {
     is_cut: bool,
 }
 
+impl<'o> Output<'o> {
+    /// In lent memory: for the places that a job finds, the numbers of those it looks up, and the coefficients of the estimate it
+    /// makes. [`room_for`](super::room_for) says how many; where that is too small, [`Filling::is_cut`] says so.
+    ///
+    /// ```
+    /// # use fogbow::cache::{Output, Wanted};
+    /// # use fogbow::sh::Coefficient;
+    /// let (mut wanted, mut open) = ([Wanted::default(); 256], [0; 256]);
+    /// let mut higher = [Coefficient::ZERO; 3];
+    /// let output = Output::lent(&mut wanted, &mut open, &mut higher);
+    /// # let _ = output;
+    /// ```
+    #[must_use]
+    pub fn lent(wanted: &'o mut [Wanted], open: &'o mut [u32], higher: &'o mut [Coefficient]) -> Self {
+        Self { wanted: wanted.into(), open: open.into(), estimate: None, higher: higher.into(), is_cut: false }
+    }
+}
+
 /// What a fill remembers between its rounds, besides the caches.
 #[derive(Debug)]
 #[cfg_attr(feature = "alloc", derive(Default))]
@@ -125,7 +149,36 @@ pub struct Memory<'s> {
     guides: ByKind<List<'s, Guide>>,
 }
 
-impl Memory<'_> {
+impl<'s> Memory<'s> {
+    /// In lent memory, whose size [`room_for`](super::room_for) tells; where that is too small, [`Filling::is_cut`] says so.
+    ///
+    /// ```
+    /// # use fogbow::cache::{Guide, Memory, Slots, Wanted};
+    /// let mut wanted = [Wanted::default(); 1000];
+    /// let [mut open, mut still_open] = [[0; 1000]; 2];
+    /// let mut guides = [[Guide::default(); 10]; 6];
+    /// let memory = Memory::lent(Slots {
+    ///     wanted: &mut wanted,
+    ///     open: [&mut open, &mut still_open],
+    ///     guides: guides.each_mut().map(|guides| &mut guides[..]),
+    ///     ..Slots::default() // and so on
+    /// });
+    /// # let _ = memory;
+    /// ```
+    #[must_use]
+    pub fn lent(slots: Slots<'s>) -> Self {
+        let [open, still_open] = slots.open;
+        Self {
+            wanted: slots.wanted.into(),
+            open: open.into(),
+            still_open: still_open.into(),
+            chosen: slots.chosen.into(),
+            estimates: slots.estimates.into(),
+            higher: slots.higher.into(),
+            guides: ByKind(slots.guides.map(List::from)),
+        }
+    }
+
     fn clear(&mut self) {
         self.wanted.clear();
         self.open.clear();
@@ -454,19 +507,22 @@ impl<'s, F> Filling<'s, F> {
         let is_first = row.is_ground && self.first == 0 && number < FIRST.0;
         let count = samples(&effort, limits.max, self.usual) * if is_first { FIRST.1 } else { 1 };
         let mut rng = Generator::new(mix(settings.seed ^ mix(row.stream + 1)) ^ number);
-        let mut estimate = Estimate { place, limits, effort: 1.0, ..Estimate::default() };
-        self.estimate(step, world, Looks { count, guide: None, learnt: None }, &mut estimate, &mut rng, output);
-        output.estimate = Some(estimate);
+        let mut estimate = Estimate { job, place, limits, effort: 1.0, ..Estimate::default() };
+        let looks = Looks { count, guide: None, learnt: None };
+        let is_made = self.estimate(step, world, looks, &mut estimate, &mut rng, output);
+        output.estimate = is_made.then_some(estimate);
     }
 
     fn again<M: Medium + ?Sized, S: Scene + ?Sized>(
         &self,
-        number: usize,
+        from: u32,
+        job: u32,
         world: &World<'_, M, S>,
         output: &mut Output<'_>,
     ) {
         let Some((step, effort)) = self.at_hand() else { return };
         let Pass::Again { stream, .. } = step.pass else { return };
+        let number = (from + job) as usize;
         let (slot, row) = (&self.caches.slots[step.kind], step.kind.row());
         let (Some(place), radius) = (slot.place(number), slot.records()[number].radius) else { return };
         let around = learnt_near(slot, self.memory.guides[step.kind].as_slice(), self.before[step.kind], place.point);
@@ -474,19 +530,13 @@ impl<'s, F> Filling<'s, F> {
         let more = (around.relative_variance() / row.spread).clamp(1.0, MOST_SAMPLES);
         let count = (samples(&effort, radius, self.usual) as f32 * more) as u32;
         let mut rng = Generator::new(mix(self.settings().seed ^ mix(stream + 16)) ^ number as u64);
-        let mut estimate = Estimate { place, effort: more, ..Estimate::default() };
-        self.estimate(
-            step,
-            world,
-            Looks { count, guide: guide.as_ref(), learnt: None },
-            &mut estimate,
-            &mut rng,
-            output,
-        );
-        output.estimate = Some(estimate);
+        let mut estimate = Estimate { job, place, effort: more, ..Estimate::default() };
+        let looks = Looks { count, guide: guide.as_ref(), learnt: None };
+        let is_made = self.estimate(step, world, looks, &mut estimate, &mut rng, output);
+        output.estimate = is_made.then_some(estimate);
     }
 
-    /// The light that a step's kind holds, at one place.
+    /// The light that a step's kind holds, at one place; `false` if there is no memory for it.
     fn estimate<M: Medium + ?Sized, S: Scene + ?Sized>(
         &self,
         step: Step,
@@ -495,17 +545,18 @@ impl<'s, F> Filling<'s, F> {
         estimate: &mut Estimate,
         rng: &mut Generator,
         output: &mut Output<'_>,
-    ) {
+    ) -> bool {
         let estimator = self.estimator(world, step);
         let looks = Looks { learnt: Some(&mut estimate.learnt), ..looks };
         let point = estimate.place.point;
         if step.kind.is_on_surfaces() {
             let normal = estimate.place.normal.unwrap_or(Vec3::Z);
             (estimate.sums, estimate.facing) = estimator.irradiance(point, normal, looks, rng);
-            return;
+            return true;
         }
-        for _ in 0..self.caches.slots[step.kind].stride() {
-            output.is_cut |= output.higher.push(Coefficient::ZERO).is_err();
+        if output.higher.reset(self.caches.slots[step.kind].stride(), Coefficient::ZERO).is_err() {
+            output.is_cut = true;
+            return false;
         }
         let (phase, higher) = (estimator.phase(point), output.higher.as_mut_slice());
         estimate.sums = match step.kind {
@@ -513,6 +564,7 @@ impl<'s, F> Filling<'s, F> {
             Kind::Surface => estimator.surface(point, &phase, looks, higher, rng),
             _ => estimator.multiple(point, &phase, looks, higher, rng),
         };
+        true
     }
 
     /// How far a record may reach because of surfaces near it.
@@ -727,8 +779,10 @@ impl<'s, F> Filling<'s, F> {
             // More of an estimate that took more samples.
             let share = 1.0 - (1.0 - share) / estimate.effort;
             let attached = attached(step.kind, estimate, self.memory.higher.as_slice(), i, stride);
-            slot.blend(from + i, effort.tolerance, &estimate.sums, attached, share);
-            if let Some(guide) = self.memory.guides[step.kind].as_mut_slice().get_mut(i) {
+            // Where memory was too small some jobs have left none.
+            let job = estimate.job as usize;
+            slot.blend(from + job, effort.tolerance, &estimate.sums, attached, share);
+            if let Some(guide) = self.memory.guides[step.kind].as_mut_slice().get_mut(job) {
                 guide.merge(&estimate.learnt, 1.0);
             }
         }
@@ -764,7 +818,7 @@ where
             Round::Search => self.search(job, world, output),
             Round::Look => self.look(job, output),
             Round::Make => self.make(job, world, output),
-            Round::Again { from } => self.again((from + job) as usize, world, output),
+            Round::Again { from } => self.again(from, job, world, output),
             Round::Done => {}
         }
     }
@@ -777,8 +831,12 @@ where
         let mut kept = memory.wanted.extend_from_slice(output.wanted.as_slice());
         kept = kept.and(memory.still_open.extend_from_slice(output.open.as_slice()));
         if let Some(estimate) = output.estimate {
-            kept = kept.and(memory.estimates.push(estimate));
-            kept = kept.and(memory.higher.extend_from_slice(output.higher.as_slice()));
+            // Both or none, so that the coefficients of the others stay where they are looked for.
+            kept = kept.and(if memory.higher.room() < output.higher.len() {
+                Err(Full)
+            } else {
+                memory.estimates.push(estimate).and_then(|()| memory.higher.extend_from_slice(output.higher.as_slice()))
+            });
         }
         self.is_cut |= kept.is_err() | output.is_cut;
         self.taken += 1;

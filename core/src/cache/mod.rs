@@ -27,6 +27,7 @@
 //! | `estimate` | [`Estimator`]: what records are made of |
 //! | `evidence` | how far gradients can be believed; edges of the sky |
 //! | `eye` | [`places`] and [`radiance`] of eye rays |
+//! | `room` | [`Slots`] and [`room_for`]: lent memory, and how much of it is needed |
 //! | [`bytes`] | caches as bytes, to be saved |
 
 mod aim;
@@ -45,6 +46,7 @@ mod presets;
 mod radius;
 mod readers;
 mod record;
+mod room;
 mod set_bytes;
 mod settings;
 mod slot;
@@ -62,6 +64,7 @@ pub use lookup::{Basis, Reading, TURNING_DEGREE, TurningBasis};
 pub use radius::{Limits, clamp_gradient, clearance, log_gradient_radius, neighbour_clamped, valid_radius};
 pub use readers::InScattered;
 pub use record::{Attachment, Facing, Record};
+pub use room::{IndexRoom, KindRoom, KindSlots, Room, Slots, room_for};
 pub use set_bytes::CachesError;
 pub use settings::{Effort, Settings};
 pub use store::{Cache, InsertError, SurfaceCache, VolumeCache};

@@ -15,7 +15,7 @@ use crate::spectrum::{Gradient, Spectrum};
 /// In isotropic media `value` is in-scattered radiance (W·m⁻²·sr⁻¹); in others its mean over
 /// directions, the expansion's `L₀₀ Y₀₀`, with the higher degrees in the cache's pool; on surfaces
 /// irradiance (W·m⁻²). Source: sheet § 1.8 (Jarosz et al. 2008 print 48 bytes; 16 floats are 64).
-#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Pod, Zeroable)]
 #[repr(C)]
 pub struct Record {
     /// Where (m).

@@ -6,9 +6,9 @@
 
 #![no_std]
 
-mod caching;
 mod digest;
 mod estimates;
+pub mod lent;
 mod media;
 mod sections;
 mod walks;

@@ -12,7 +12,7 @@ use fogbow::spectrum::{Gradient, Hessian, Spectrum};
 use fogbow::storage::List;
 use fogbow::surface::Surface;
 
-use crate::{Digest, Section, caching, estimates, media, walks};
+use crate::{Digest, Section, estimates, lent, media, walks};
 
 /// Every section, lowest layer first.
 pub const SECTIONS: &[Section] = &[
@@ -32,7 +32,9 @@ pub const SECTIONS: &[Section] = &[
     Section { name: "march", run: estimates::march },
     Section { name: "multiple_scatter", run: estimates::multiple_scatter },
     Section { name: "path", run: walks::path },
-    Section { name: "cache", run: caching::cache },
+    Section { name: "cache", run: lent::caches },
+    Section { name: "beams", run: lent::beams },
+    Section { name: "vpl", run: lent::lights },
 ];
 
 /// Inputs of each section: enough to pass through every branch, few enough for a browser.

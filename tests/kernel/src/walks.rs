@@ -40,7 +40,7 @@ impl Scene for Balls {
             if let Some(distance) = meets(ray, centre, radius)
                 && distance < hit.distance
             {
-                hit = Hit { distance, normal: (ray.at(distance) - centre) / radius, surface, light };
+                hit = Hit { distance, normal: (ray.at(distance) - centre).normalize(), surface, light };
                 is_hit = true;
             }
         }
@@ -49,7 +49,7 @@ impl Scene for Balls {
 }
 
 /// Centre and radius of the light.
-const SHINING: (Vec3, f32) = (Vec3::new(0.0, 1.5, 0.5), 0.4);
+pub(crate) const SHINING: (Vec3, f32) = (Vec3::new(0.0, 1.5, 0.5), 0.4);
 
 /// The first distance at which a ray meets a ball, from outside or inside.
 fn meets(ray: &Ray, centre: Vec3, radius: f32) -> Option<f32> {
