@@ -41,12 +41,7 @@ impl IndexRoom {
     /// For so many spheres, which are so many times as large as usual. Blocks have a bound that does not depend on it.
     const fn of(spheres: usize, wider: usize) -> Self {
         let few = if spheres == 0 { 0 } else { 16 };
-        Self {
-            nodes: wider * spheres + few,
-            entries: 6 * wider * spheres + few,
-            spheres,
-            blocks: 4 * spheres + few,
-        }
+        Self { nodes: wider * spheres + few, entries: 6 * wider * spheres + few, spheres, blocks: 4 * spheres + few }
     }
 }
 
