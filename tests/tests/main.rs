@@ -7,6 +7,7 @@ mod cache_index;
 mod cache_light;
 mod covariance;
 mod covariance_grid;
+mod engine;
 mod estimators;
 mod examples;
 mod figures;

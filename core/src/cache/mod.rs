@@ -62,7 +62,7 @@ pub use index::{Block, Index, Node};
 pub use kind::Kind;
 pub use lookup::{Basis, Reading, TURNING_DEGREE, TurningBasis};
 pub use radius::{Limits, clamp_gradient, clearance, log_gradient_radius, neighbour_clamped, valid_radius};
-pub use readers::InScattered;
+pub use readers::ScatteredLight;
 pub use record::{Attachment, Facing, Record};
 pub use room::{IndexRoom, KindRoom, KindSlots, Room, Slots, room_for};
 pub use set_bytes::CachesError;

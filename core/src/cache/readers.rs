@@ -29,7 +29,7 @@ const MEAN: f32 = 3.544_907_7;
 
 /// In-scattered radiance (W·m⁻²·sr⁻¹) at a point towards a direction, per unit of the scattering coefficient (m⁻¹).
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct InScattered {
+pub struct ScatteredLight {
     /// Light of the lights, scattered once.
     pub single: Spectrum,
     /// Light of surfaces and of a sky, scattered once.
@@ -40,12 +40,12 @@ pub struct InScattered {
     pub sampled: u32,
 }
 
-impl InScattered {
+impl ScatteredLight {
     /// All light together.
     ///
     /// ```
-    /// # use fogbow::{cache::InScattered, spectrum::Spectrum};
-    /// let light = InScattered { single: Spectrum::ONE, multiple: Spectrum::ONE, ..InScattered::default() };
+    /// # use fogbow::{cache::ScatteredLight, spectrum::Spectrum};
+    /// let light = ScatteredLight { single: Spectrum::ONE, multiple: Spectrum::ONE, ..ScatteredLight::default() };
     /// assert_eq!(light.total(), Spectrum::splat(2.0));
     /// ```
     #[must_use]
@@ -127,10 +127,10 @@ impl RadianceCaches<'_> {
         to_eye: Vec3,
         world: &World<'_, M, S>,
         rng: &mut (impl Rng + ?Sized),
-    ) -> InScattered {
+    ) -> ScatteredLight {
         let estimator = self.estimator(world);
         let (phase, mut rng) = (estimator.phase(point), Generator::child(rng));
-        let mut light = InScattered::default();
+        let mut light = ScatteredLight::default();
         for kind in SCATTERED {
             let known = self.volume(kind).and_then(|reader| {
                 reader.cache.lookup(point, &Basis::new(to_eye, reader.cache.degree()), &reader.reading)
