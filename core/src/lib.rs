@@ -41,6 +41,7 @@
 //! | render a picture | [`path`] (unbiased), [`cache`], [`beams`], [`vpl`], [`march`]; [`picture`] decides how many samples |
 //! | run a method on threads, or a little in every frame | [`work`]; `fogbow_std::threads::run` is a driver for threads |
 //! | know light at a point, with its gradient | [`single_scatter`], [`multiple_scatter`], [`cache`] |
+//! | know light at a point from caches, for any direction (a probe) | `in_scattered_sh` of [`cache::RadianceCaches`] |
 //! | know how much light gets through | [`transmittance`] |
 //! | know how fast light varies | [`covariance`] |
 //! | follow light from the lights | [`photon`] |

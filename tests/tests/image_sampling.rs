@@ -26,7 +26,7 @@ fn filled(plan: &Plan<'_>, pixels: &[Spectrum]) -> Vec<Spectrum> {
 fn one_two_and_seven_threads_plan_the_same_pixels() {
     let outlook = |i: u32| {
         let (x, y) = ((i % 37) as f32, (i / 37) as f32);
-        let covariance = (i % 11 > 0).then(|| Symmetric2::diagonal(1e-3 * x / (1.0 + y), 1e-5 * y));
+        let covariance = (!i.is_multiple_of(11)).then(|| Symmetric2::diagonal(1e-3 * x / (1.0 + y), 1e-5 * y));
         Outlook { covariance, depth: if x + y < 30.0 { 1.0 + 0.01 * x } else { f32::INFINITY } }
     };
     let outlooks: Vec<Outlook> = (0..37 * 23).map(outlook).collect();

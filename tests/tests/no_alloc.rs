@@ -5,6 +5,16 @@ use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
+use fogbow::beams;
+use fogbow::cache::RadianceCaches;
+use fogbow::sampling::Independent;
+use fogbow::vpl;
+use fogbow::work::Rounds;
+use fogbow_kernel::lent::{self, Foggy};
+use fogbow_kernel::{Digest, SECTIONS};
+use fogbow_std::progress::Control;
+use fogbow_std::threads::{Ending, Threads, run};
+
 /// Runs cargo on the program of `tests/no_alloc`, in a target directory of its own: the one in use
 /// is locked by the cargo that runs this test.
 fn cargo(arguments: &[&str]) -> Output {
@@ -48,4 +58,48 @@ fn the_core_links_and_runs_without_an_allocator() {
     fogbow_kernel::report(&mut expected).expect("a string takes any text");
     assert!(expected.lines().count() > 5, "the kernel computes nothing:\n{expected}");
     assert_eq!(text(&run.stdout), expected, "without `alloc` (left) and with it (right)");
+}
+
+/// Does `work` on two threads, in memory that grows: as the program does it.
+fn driven<'w, R>(mut work: R, world: &Foggy<'w>) -> R
+where
+    R: Rounds<Foggy<'w>> + Sync,
+    R::Output<'static>: Default + Send,
+{
+    let ran = run(&mut work, world, &Threads::new(2).unwrap(), &Control::default(), None, |_| {});
+    assert_eq!(ran.ending, Ending::Done);
+    work
+}
+
+/// The bits of a section of the kernel, which has lent memory and one thread.
+fn of_kernel(name: &str) -> u64 {
+    SECTIONS.iter().find(|section| section.name == name).expect("there is such a section").bits()
+}
+
+/// What `fold` leaves in the world of the kernel.
+fn folded(fold: impl FnOnce(&mut Digest, &Foggy<'_>)) -> u64 {
+    let mut digest = Digest::default();
+    lent::with_world(|world| fold(&mut digest, world)).expect("the world can be made");
+    // As sections do at their end.
+    digest.int(1);
+    digest.bits()
+}
+
+#[test]
+fn hosts_give_the_bits_that_the_program_gives() {
+    let cache = folded(|out, world| {
+        let filling = RadianceCaches::new(lent::cache_settings()).fill(lent::ASKED);
+        lent::read_caches(out, &driven(filling, world).finish(), world);
+    });
+    let beams = folded(|out, world| {
+        let pass = beams::Pass::new(&lent::beam_settings(world), 0, |_, pass| pass);
+        lent::gather_beams(out, &driven(pass, world).finish().unwrap(), world);
+    });
+    let vpl = folded(|out, world| {
+        let mut witnesses = Vec::new();
+        lent::each_witness(world, |witness| witnesses.push(witness));
+        let pass = vpl::Pass::new(&lent::light_settings(world), 0, Independent, &witnesses);
+        lent::see_lights(out, driven(pass, world).finish().unwrap().as_slice(), world);
+    });
+    assert_eq!([cache, beams, vpl], ["cache", "beams", "vpl"].map(of_kernel));
 }

@@ -3,8 +3,9 @@
 use core::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 use fogbow::cache::{
-    Asked, Effort, EyeSettings, Filling, Kind, Limits, Output, Place, RadianceCaches, Reading, Record, Settings,
-    clearance, places,
+    Asked, Block, Effort, Estimate, EyeSettings, Facing, Filling, Guide, Index, IndexRoom, Kind, KindSlots, Limits,
+    Memory, Node, Output, Place, RadianceCaches, Reading, Record, Room as Lengths, Settings, Slots, Wanted, clearance,
+    places, room_for,
 };
 use fogbow::host::{Gradients, MajorantSegment, Medium, Properties};
 use fogbow::light::{Light, PointLight};
@@ -12,6 +13,7 @@ use fogbow::math::{Bounds, Ray, Vec2, Vec3};
 use fogbow::medium::Homogeneous;
 use fogbow::phase::Lobe;
 use fogbow::sampling::{Generator, uniform};
+use fogbow::sh::Coefficient;
 use fogbow::spectrum::Spectrum;
 use fogbow::surface::Surface;
 use fogbow::transmittance::thickness::Steps;
@@ -391,4 +393,107 @@ fn an_estimate_of_nothing_fills_no_radius() {
         let records = caches.records(kind);
         assert!(!records.is_empty() && records.iter().all(|r| r.value.is_black() && r.radius == 0.8), "{records:?}");
     }
+}
+
+/// What an index lies in.
+struct OfIndex {
+    nodes: Vec<Node>,
+    entries: Vec<u32>,
+    spheres: Vec<[f32; 4]>,
+    blocks: Vec<Block>,
+}
+
+impl OfIndex {
+    fn new(room: IndexRoom) -> Self {
+        Self {
+            nodes: vec![Node::default(); room.nodes],
+            entries: vec![0; room.entries],
+            spheres: vec![[0.0; 4]; room.spheres],
+            blocks: vec![Block::default(); room.blocks],
+        }
+    }
+
+    fn index(&mut self) -> Index<'_> {
+        Index::new(&mut self.nodes[..], &mut self.entries[..], &mut self.spheres[..], &mut self.blocks[..])
+    }
+}
+
+/// A fill in memory of just these lengths: the bytes of the caches, whether it was cut, and how many records there are.
+fn filled_in(room: &Lengths) -> (Vec<u8>, bool, [usize; 6]) {
+    let (fog, walls, lights) = (fog(), self::room(), [lamp()]);
+    let world = World { medium: &fog, scene: &walls, lights: &lights };
+    let mut records = room.kinds.map(|kind| vec![Record::default(); kind.records]);
+    let mut higher = room.kinds.map(|kind| vec![Coefficient::ZERO; kind.higher]);
+    let mut facings = room.kinds.map(|kind| vec![Facing::default(); kind.facings]);
+    let mut indices = room.kinds.map(|kind| [OfIndex::new(kind.index), OfIndex::new(kind.wide)]);
+    let mut parts = records.iter_mut().zip(&mut higher).zip(facings.iter_mut().zip(&mut indices));
+    let kinds = Kind::ALL.map(|_| {
+        let ((records, higher), (facings, [index, wide])) = parts.next().unwrap();
+        KindSlots { records, higher, facings, index: index.index(), wide: wide.index() }
+    });
+    let mut views = [0; 1];
+    let caches = RadianceCaches::lent(settings(), &mut views[..], kinds);
+
+    let mut wanted = vec![Wanted::default(); room.wanted];
+    let [mut open, mut still_open] = [vec![0; room.open], vec![0; room.open]];
+    let mut chosen = vec![(0, 0.0); room.chosen];
+    let mut estimates = vec![Estimate::default(); room.estimates];
+    let mut of_estimates = vec![Coefficient::ZERO; room.higher];
+    let mut guides = room.guides.map(|count| vec![Guide::default(); count]);
+    let memory = Memory::lent(Slots {
+        wanted: &mut wanted,
+        open: [&mut open, &mut still_open],
+        chosen: &mut chosen,
+        estimates: &mut estimates,
+        higher: &mut of_estimates,
+        guides: guides.each_mut().map(|guides| &mut guides[..]),
+    });
+    let mut of_job = vec![Wanted::default(); room.of_job_wanted];
+    let mut open_of_job = vec![0; room.of_job_open];
+    let mut higher_of_job = vec![Coefficient::ZERO; room.of_job_higher];
+    let mut filling = caches.fill_in(memory, VIEW);
+    finish(&mut filling, &world, &mut Output::lent(&mut of_job, &mut open_of_job, &mut higher_of_job));
+    let is_cut = filling.is_cut();
+    let caches = filling.finish();
+    // Whatever there is can be read.
+    let seen = caches.radiance(&eye_ray([0.4, 0.6]), &world, &mut Generator::new(1));
+    assert!(seen.total().is_valid() && seen.total().mean() > 0.0, "{seen:?}");
+    (caches.to_bytes(0), is_cut, Kind::ALL.map(|kind| caches.records(kind).len()))
+}
+
+#[test]
+fn a_fill_in_lent_memory_has_the_bits_of_one_that_grows_or_says_that_it_was_cut() {
+    let grown = filled(settings());
+    let counts = Kind::ALL.map(|kind| grown.records(kind).len());
+    let most = counts.into_iter().max().unwrap();
+    let ample = room_for(&settings(), 20_000, most);
+    let (bytes, is_cut, _) = filled_in(&ample);
+    assert!(!is_cut && bytes == stored(&grown));
+
+    // Too little of one thing after the other.
+    let mut kinds = ample.kinds;
+    kinds[Kind::Multiple as usize].records = 7;
+    let (_, is_cut, fewer) = filled_in(&Lengths { kinds, ..ample });
+    assert!(is_cut && fewer[Kind::Multiple as usize] == 7 && fewer[Kind::Single as usize] == counts[0]);
+    let mut kinds = ample.kinds;
+    kinds[Kind::Surface as usize].index.blocks = 3;
+    kinds[Kind::Multiple as usize].wide.nodes = 0;
+    assert!(filled_in(&Lengths { kinds, ..ample }).1);
+    for room in [
+        Lengths { wanted: 100, ..ample },
+        Lengths { open: 50, ..ample },
+        Lengths { estimates: 5, ..ample },
+        Lengths { higher: 40, ..ample },
+        Lengths { guides: [3; 6], ..ample },
+        Lengths { of_job_wanted: 10, ..ample },
+        Lengths { of_job_open: 10, ..ample },
+    ] {
+        let (_, is_cut, counts) = filled_in(&room);
+        assert!(is_cut && counts.iter().any(|&count| count > 0), "{room:?}: {counts:?}");
+    }
+    // Expansions have no room at all; without any memory nothing is made.
+    let (_, is_cut, counts) = filled_in(&Lengths { of_job_higher: 2, ..ample });
+    assert!(is_cut && counts[Kind::Multiple as usize] == 0 && counts[Kind::CoarseIrradiance as usize] > 0);
+    let (_, is_cut, counts) = filled_in(&Lengths::default());
+    assert!(is_cut && counts == [0; 6]);
 }

@@ -254,6 +254,10 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
 
     /// An arrival whose gradient is no larger than [`Estimator::finest`] lets it be.
     fn steadied(&self, arrival: Arrival) -> Arrival {
+        // At 0 nothing is too steep; a black channel over it would be no number.
+        if !(self.finest > 0.0) {
+            return arrival;
+        }
         let steepest = arrival.irradiance / self.finest;
         let scale = steepest.zip(arrival.gradient.norm(), |most, norm| if norm > most { most / norm } else { 1.0 });
         Arrival { gradient: arrival.gradient * scale, turning: arrival.turning.min(steepest), ..arrival }
@@ -491,13 +495,15 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
         higher: &mut [Coefficient],
         estimate: impl FnOnce(&mut Directional<'_>) -> Sums,
     ) -> Sums {
-        let degree = crate::sh::degree_of(higher.len() + 1).unwrap_or(0);
+        // What there is no degree for stays 0.
+        let degree = crate::sh::degree_of(higher.len() + 1).unwrap_or(0).min(MAX_DEGREE);
         let moments = single_scatter::moments(phase, degree);
         let mut all = [Coefficient::ZERO; crate::sh::MAX_COEFFICIENTS];
-        let count = crate::sh::coefficient_count(degree.min(MAX_DEGREE));
+        let count = crate::sh::coefficient_count(degree);
         let mut into = Directional { moments: &moments[..=degree], coefficients: &mut all[..count] };
         let sums = estimate(&mut into);
-        higher.copy_from_slice(&all[1..=higher.len()]);
+        higher.fill(Coefficient::ZERO);
+        higher.iter_mut().zip(&all[1..]).for_each(|(slot, found)| *slot = *found);
         sums
     }
 }
@@ -511,6 +517,24 @@ fn tilted(arrival: &Arrival, tilt: Vec3) -> Contribution {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// A red sky over a black floor, seen without a bound on steepness and with more coefficients than there are degrees for.
+    #[test]
+    fn no_bound_and_too_many_coefficients_leave_numbers() {
+        let sky = [Light::Constant(Spectrum::new(1.0, 0.0, 0.0))];
+        let world = World { medium: &crate::host::Empty, scene: &crate::host::Empty, lights: &sky };
+        let walk = multiple_scatter::Settings::new(crate::transmittance::thickness::Steps::Length(0.1));
+        let paths = path::Settings::default();
+        let estimator =
+            Estimator { world, surfaces: None, scattered: None, walk, paths, light_samples: 1, finest: 0.0 };
+        let mut higher = [Coefficient::ZERO; 399];
+        let sums = estimator.surface(Vec3::ZERO, &Phase::ISOTROPIC, 8, &mut higher, &mut Generator::new(1));
+        assert!((sums.value[0] - 1.0).abs() < 1e-5 && sums.value[1] == 0.0, "{sums:?}");
+        assert!(sums.gradient.is_finite() && sums.gradient_norms.is_finite());
+        assert!(higher.iter().all(|c| c.value.is_finite() && c.gradient.is_finite()));
+        let (sums, facing) = estimator.irradiance(Vec3::ZERO, Vec3::Z, 8, &mut Generator::new(1));
+        assert!(sums.gradient.is_finite() && facing.turn.is_finite());
+    }
 
     /// As many lengths within 10⁻⁵ mean free paths as there should be, and hardly any of none.
     #[test]

@@ -673,8 +673,8 @@ impl<'s, F> Filling<'s, F> {
             self.batch = [self.batch[1], rays.min(self.batch[1].saturating_add(size))];
             let at = |ray: u32| wanted.partition_point(|wanted| wanted.ray < ray);
             self.memory.open.clear();
-            for number in at(self.batch[0])..at(self.batch[1]) {
-                let place = &wanted[number].place;
+            let (first, last) = (at(self.batch[0]), at(self.batch[1]));
+            for (number, Wanted { place, .. }) in wanted.iter().enumerate().take(last).skip(first) {
                 let is_for = match step.kind.row().places {
                     Places::InMedium => place.normal.is_none(),
                     Places::OnSurfaces => place.normal.is_some(),

@@ -6,16 +6,23 @@
 //!
 //! Light scattered in a medium is smooth: it is computed with its gradient at few points
 //! ([`Record`]s) and carried to all others within a radius that the gradients themselves give.
-//! Every part has a cache of its own with its own tolerance and effort. The host orders the steps,
-//! and nothing here waits or locks:
+//! Every part has a cache of its own ([`Kind`]) with its own tolerance and effort. [`RadianceCaches`] holds them all:
 //!
-//! 1. [`places`] along eye rays: where is something asked for?
-//! 2. where no record reaches ([`VolumeCache::covers`]), an [`Estimator`] computes one against the frozen caches;
-//! 3. [`Cache::insert`]; back to 1 with other rays;
-//! 4. [`Cache::finish`], then [`radiance`] for every sample of the image.
+//! 1. [`Settings::for_outline`] says how fine each is in this world;
+//! 2. [`RadianceCaches::fill`] is work in rounds ([`crate::work`]): [`places`] along eye rays or in a box, and where no record
+//!    reaches, one from an [`Estimator`] against the frozen caches;
+//! 3. [`Filling::finish`] gives the caches, to be read: [`RadianceCaches::radiance`] of an eye ray,
+//!    [`RadianceCaches::in_scattered_sh`] of a probe.
 //!
 //! | file | holds |
 //! |---|---|
+//! | `caches` | [`RadianceCaches`]: all caches of a world |
+//! | `kind` | [`Kind`]: what caches hold, what lights them, in which order they are made |
+//! | `settings`, `presets` | [`Settings`], [`Effort`]; every tuned number of the method, from an outline of the world |
+//! | `fill` | [`Filling`]: which places get records, rounds of new ones, better estimates for old ones |
+//! | `slot` | a cache of either sort, as filling needs it |
+//! | `readers` | probes, fluence, irradiance, in-scattered light; many at a time |
+//! | `set_bytes` | all caches as bytes |
 //! | `record` | [`Record`], [`Attachment`]: what is stored |
 //! | `radius` | Eq. 34, limits, distance to surfaces, clamping of gradients and neighbours |
 //! | `extrapolate` | Eq. 35, and a mixture of second order: [`Blend`] |

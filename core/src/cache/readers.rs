@@ -174,7 +174,7 @@ impl RadianceCaches<'_> {
         if points.is_empty() {
             return 0;
         }
-        assert!(coefficients.len() % points.len() == 0, "as many coefficients for every point");
+        assert!(coefficients.len().is_multiple_of(points.len()), "as many coefficients for every point");
         let each = (coefficients.len() / points.len()).max(1);
         let pairs = points.iter().zip(coefficients.chunks_exact_mut(each));
         pairs.filter_map(|(point, slots)| (!self.in_scattered_sh(*point, slots)).then_some(())).count()

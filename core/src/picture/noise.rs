@@ -1,6 +1,8 @@
 //! How many samples are enough, by the noise they still have.
 
-use crate::storage::{Full, List};
+#[cfg(feature = "alloc")]
+use crate::storage::Full;
+use crate::storage::List;
 
 /// Share of the picture's mean that is added, in square, to what a pixel's noise is measured against: black
 /// corners need not be known to their own precision.
@@ -115,6 +117,7 @@ impl Noise<'_> {
     }
 
     /// Adds the next tile, with so many pixels.
+    #[cfg(feature = "alloc")]
     pub(super) fn add_tile(&mut self, count: u32) -> Result<(), Full> {
         let from = self.pixels.len() as u32;
         (0..count).try_for_each(|_| self.pixels.push(Pixel::default()))?;

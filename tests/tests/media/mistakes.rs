@@ -60,7 +60,8 @@ impl Mistaken {
 
 /// Does `check` with all mistakes there are: each with a name, constant bounds or not, grey or not.
 fn with_mistakes(mut check: impl FnMut(&str, &Mistaken)) {
-    let mistakes: [(&str, fn(f32) -> f32); 6] = [
+    type Mistake = (&'static str, fn(f32) -> f32);
+    let mistakes: [Mistake; 6] = [
         ("stands", |from| from),
         ("turns back", |from| from - 0.25),
         ("starts again", |_| 0.0),
