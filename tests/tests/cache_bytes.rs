@@ -362,13 +362,13 @@ fn files_damaged_anywhere_are_refused() {
     assert!(refusal(&folder.with(&whole[..12]), settings(), TAG).contains("cut off"));
     assert!(refusal(&folder.with(&whole[..whole.len() - 1]), settings(), TAG).contains("cut off"));
     assert!(refusal(&folder.with(&[&whole[..], b"."].concat()), settings(), TAG).contains("goes on after its end"));
-    assert!(refusal(&folder.with(b""), settings(), TAG).contains("not a set of radiance caches"));
+    assert!(refusal(&folder.with(b""), settings(), TAG).contains("not a file of radiance caches"));
     assert!(
         refusal(&folder.with(b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR"), settings(), TAG)
-            .contains("not a set of radiance caches")
+            .contains("not a file of radiance caches")
     );
     assert!(
-        refusal(&folder.with(&to_bytes(&volume(2, 0, 1))), settings(), TAG).contains("not a set of radiance caches")
+        refusal(&folder.with(&to_bytes(&volume(2, 0, 1))), settings(), TAG).contains("not a file of radiance caches")
     );
     assert!(refusal(&folder.with(&with(&whole, 8, &[9])), settings(), TAG).contains("version 9"));
     assert!(refusal(&folder.with(&with(&whole, 12, &[0xff; 8])), settings(), TAG).contains("cut off"));

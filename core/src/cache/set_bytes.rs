@@ -103,7 +103,7 @@ impl From<Full> for CachesError {
 impl fmt::Display for CachesError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Magic => f.write_str("is not a set of radiance caches: other first bytes"),
+            Self::Magic => f.write_str("is not a file of radiance caches: other first bytes"),
             Self::Version(found) => write!(f, "has version {found} of the format; {VERSION} is known"),
             Self::Length { found, due } if found < due => {
                 write!(f, "is cut off: {due} bytes are due, {found} are there")
