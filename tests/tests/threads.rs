@@ -170,7 +170,8 @@ fn a_cancelled_render_leaves_a_valid_film_that_can_be_finished() {
         .unwrap();
         assert_eq!((outcome.reason, outcome.samples), (Reason::Cancelled, 2));
         assert_eq!(found.total_count(), outcome.counters.samples);
-        assert!(found.total_count() <= 2001);
+        // Jobs that have begun are ended: up to eight pixels of two samples, on every thread.
+        assert!(found.total_count() <= 2001 + 16 * threads as u64);
         assert!(found.mean(0).unwrap().pixels.iter().all(|p| p.0.iter().all(|c| c.is_finite())));
 
         let mut expected = film();
