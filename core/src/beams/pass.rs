@@ -73,7 +73,7 @@ impl<'o> Output<'o> {
 /// use fogbow::beams::{Output, Pass, Settings};
 /// use fogbow::{host::Empty, light::{Light, PointLight}, math::*, medium::Homogeneous, phase::Phase};
 /// use fogbow::{sampling::Generator, spectrum::Spectrum, work, world::{Outline, World}};
-/// let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::ONE, Phase::ISOTROPIC)?;
+/// let fog = Homogeneous::new(Spectrum::ONE, Spectrum::ONE, Phase::ISOTROPIC)?;
 /// let lamps = [Light::Point(PointLight::from_flux(Vec3::ZERO, Spectrum::ONE)?)];
 /// let world = World { medium: &fog, scene: &Empty, lights: &lamps };
 /// let outline = Outline::of(&world, Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE });

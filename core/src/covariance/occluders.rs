@@ -52,7 +52,7 @@ pub struct OccluderCell {
 /// # use fogbow::{covariance::{Lattice, OccluderCell, Occluders}, math::{Bounds, Vec3, float::PI}};
 /// let lattice = Lattice::new(Bounds { min: Vec3::ZERO, max: Vec3::ONE }, [1, 1, 1])?;
 /// let mut cells = [OccluderCell::default()];
-/// let mut occluders = Occluders::new(lattice, &mut cells)?;
+/// let mut occluders = Occluders::new(lattice, &mut cells[..])?;
 /// assert_eq!((occluders.covariance(Vec3::splat(0.5), Vec3::Z), occluders.occupied()), (None, 0));
 /// // A wall at x = 1, 0.5 m beside a ray along z: the light is cut off across x, at that distance.
 /// occluders.add(Vec3::new(1.0, 0.5, 0.5), Vec3::NEG_X);
@@ -108,7 +108,7 @@ impl<'a> Occluders<'a> {
     /// }
     /// let lattice = Lattice::new(Bounds { min: Vec3::ZERO, max: Vec3::ONE }, [2, 2, 2])?;
     /// let mut cells = [OccluderCell::default(); 8];
-    /// let mut occluders = Occluders::new(lattice, &mut cells)?;
+    /// let mut occluders = Occluders::new(lattice, &mut cells[..])?;
     /// occluders.add_scene(&Floor, 2);
     /// assert_eq!(occluders.occupied(), 4);   // the lower half of the cells
     /// # Ok::<(), fogbow::covariance::LatticeError>(())

@@ -138,10 +138,10 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Walk<'_, M, S> {
     ///
     /// ```
     /// # use fogbow::{host::Empty, math::{Ray, Vec3}, medium::Homogeneous, phase::Lobe, sampling::Generator};
-    /// # use fogbow::{multiple_scatter::{Settings, Walk}, spectrum::Spectrum, transmittance::thickness::Steps};
+    /// # use fogbow::{multiple_scatter::{Settings, Walk}, spectrum::Spectrum, transmittance::thickness::Steps, world::World};
     /// let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::splat(2.0), Lobe::Isotropic).unwrap();
     /// let settings = Settings::new(Steps::Length(0.1));
-    /// let walk = Walk { medium: &fog, scene: &Empty, lights: &[], settings };
+    /// let walk = Walk { world: World { medium: &fog, scene: &Empty, lights: &[] }, settings };
     /// let flown = walk.first(&Ray::new(Vec3::ZERO, Vec3::X), None, 0.5, false, &mut Generator::new(1));
     /// let median = flown.collision.unwrap().distance;
     /// assert!((median - core::f32::consts::LN_2 / 2.0).abs() < 1e-6);   // half of all light comes farther

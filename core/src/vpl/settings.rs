@@ -175,7 +175,8 @@ impl Settings {
     /// # let world = World { medium: &Empty, scene: &Empty, lights: &[] };
     /// # let light = VirtualLight::in_medium(Vec3::ZERO, Vec3::Z, Spectrum::ONE, 1, &Phase::ISOTROPIC);
     /// let settings = Settings { samples: 4, ..Settings::for_outline(&Outline::of(&world, Bounds::EVERYTHING)) };
-    /// let (part, share) = settings.part(&[light; 8], 5);
+    /// let lights = [light; 8];
+    /// let (part, share) = settings.part(&lights, 5);
     /// assert_eq!((part.len(), share), (2, 4.0));
     /// ```
     #[must_use]
