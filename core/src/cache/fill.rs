@@ -9,24 +9,23 @@
 
 use core::ops::Range;
 
+use super::asked::{Asked, Wanted};
 use super::caches::RadianceCaches;
-use super::eye::{Place, places, places_around};
+use super::eye::Place;
 use super::guide::{Guide, Guided, Looks};
 use super::kind::{Kind, Pass, Places, STEPS, Step};
 use super::lookup::Reading;
-use super::radius::{Limits, clearance};
-use super::room::Slots;
+use super::memory::{Estimate, Memory, Output};
+use super::radius::clearance;
 use super::settings::{Effort, Settings};
 use super::slot::{Attached, ByKind, Inserted, learnt_near};
-use super::{Estimator, Facing, Record};
-use crate::bytes::Crc;
+use super::{Estimator, Record};
 use crate::host::{Medium, Scene};
-use crate::math::{Bounds, Ray, Vec3};
+use crate::math::{Ray, Vec3};
+use crate::sampling::Generator;
 use crate::sampling::uniform::mix;
-use crate::sampling::{Generator, uniform2, warp};
 use crate::sh::Coefficient;
-use crate::single_scatter::Sums;
-use crate::storage::{Full, List};
+use crate::storage::Full;
 use crate::work::Rounds;
 use crate::world::World;
 
@@ -65,130 +64,6 @@ const LEAST_SAMPLES: u32 = 16;
 
 /// Records that reach less far than usual take a share of the samples down to this.
 const LEAST_SHARE: f32 = 0.25;
-
-/// Where light is asked for.
-#[derive(Debug, Clone, Copy)]
-pub enum Asked<F = fn([f32; 2]) -> Ray> {
-    /// Along the eye rays of a picture.
-    View {
-        /// The eye ray of a point of the film, both coordinates in [0, 1].
-        ray: F,
-        /// Angular width of a pixel (rad): bounds radii.
-        pixel: f32,
-    },
-    /// Anywhere in a box of the medium, for probes: points spread evenly over it, and the surfaces that light them.
-    Box(Bounds),
-}
-
-/// A place where light is asked for, and from where.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Wanted {
-    place: Place,
-    /// How far the eye is (m); infinite if there is none.
-    distance: f32,
-    /// The number of the ray that asks.
-    ray: u32,
-}
-
-/// An estimate for one record.
-#[derive(Debug, Clone, Copy, Default)]
-pub struct Estimate {
-    /// The number of its job.
-    job: u32,
-    place: Place,
-    sums: Sums,
-    facing: Facing,
-    limits: Limits,
-    learnt: Guide,
-    /// How many times the samples of a usual one it took.
-    effort: f32,
-}
-
-/// What a job of a [`Filling`] leaves.
-#[derive(Debug)]
-#[cfg_attr(feature = "alloc", derive(Default))]
-pub struct Output<'o> {
-    wanted: List<'o, Wanted>,
-    open: List<'o, u32>,
-    estimate: Option<Estimate>,
-    higher: List<'o, Coefficient>,
-    is_cut: bool,
-}
-
-impl<'o> Output<'o> {
-    /// In lent memory: for the places that a job finds, the numbers of those it looks up, and the coefficients of the estimate it
-    /// makes. [`room_for`](super::room_for) says how many; where that is too small, [`Filling::is_cut`] says so.
-    ///
-    /// ```
-    /// # use fogbow::cache::{Output, Wanted};
-    /// # use fogbow::sh::Coefficient;
-    /// let (mut wanted, mut open) = ([Wanted::default(); 256], [0; 256]);
-    /// let mut higher = [Coefficient::ZERO; 3];
-    /// let output = Output::lent(&mut wanted, &mut open, &mut higher);
-    /// # let _ = output;
-    /// ```
-    #[must_use]
-    pub fn lent(wanted: &'o mut [Wanted], open: &'o mut [u32], higher: &'o mut [Coefficient]) -> Self {
-        Self { wanted: wanted.into(), open: open.into(), estimate: None, higher: higher.into(), is_cut: false }
-    }
-}
-
-/// What a fill remembers between its rounds, besides the caches.
-#[derive(Debug)]
-#[cfg_attr(feature = "alloc", derive(Default))]
-pub struct Memory<'s> {
-    wanted: List<'s, Wanted>,
-    /// Numbers of the places of a batch without a record; those that still have none after the round's look.
-    open: List<'s, u32>,
-    still_open: List<'s, u32>,
-    /// The places of a round, with how far apart they must be.
-    chosen: List<'s, (u32, f32)>,
-    estimates: List<'s, Estimate>,
-    higher: List<'s, Coefficient>,
-    /// What the records of this fill have learnt, kind by kind.
-    guides: ByKind<List<'s, Guide>>,
-}
-
-impl<'s> Memory<'s> {
-    /// In lent memory, whose size [`room_for`](super::room_for) tells; where that is too small, [`Filling::is_cut`] says so.
-    ///
-    /// ```
-    /// # use fogbow::cache::{Guide, Memory, Slots, Wanted};
-    /// let mut wanted = [Wanted::default(); 1000];
-    /// let [mut open, mut still_open] = [[0; 1000]; 2];
-    /// let mut guides = [[Guide::default(); 10]; 6];
-    /// let memory = Memory::lent(Slots {
-    ///     wanted: &mut wanted,
-    ///     open: [&mut open, &mut still_open],
-    ///     guides: guides.each_mut().map(|guides| &mut guides[..]),
-    ///     ..Slots::default() // and so on
-    /// });
-    /// # let _ = memory;
-    /// ```
-    #[must_use]
-    pub fn lent(slots: Slots<'s>) -> Self {
-        let [open, still_open] = slots.open;
-        Self {
-            wanted: slots.wanted.into(),
-            open: open.into(),
-            still_open: still_open.into(),
-            chosen: slots.chosen.into(),
-            estimates: slots.estimates.into(),
-            higher: slots.higher.into(),
-            guides: ByKind(slots.guides.map(List::from)),
-        }
-    }
-
-    fn clear(&mut self) {
-        self.wanted.clear();
-        self.open.clear();
-        self.still_open.clear();
-        self.chosen.clear();
-        self.estimates.clear();
-        self.higher.clear();
-        self.guides.0.iter_mut().for_each(List::clear);
-    }
-}
 
 /// What the jobs of a round do.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -300,71 +175,7 @@ impl<'s> RadianceCaches<'s> {
     }
 }
 
-impl<F: Fn([f32; 2]) -> Ray> Asked<F> {
-    /// A mark of where eye rays go and how densely places are asked for.
-    fn mark(&self, settings: &Settings) -> u64 {
-        let Settings { rays, margin, pixels, round, seed, ref eye, .. } = *settings;
-        let pixel = if let Self::View { pixel, .. } = self { *pixel } else { 0.0 };
-        let mut crc = Crc::new();
-        let mut add = |numbers: &[f32]| numbers.iter().for_each(|n| crc.add(&n.to_bits().to_le_bytes()));
-        add(&[
-            margin,
-            pixels[0],
-            pixels[1],
-            pixel,
-            eye.density,
-            f32::from(eye.lights_visible),
-            f32::from(eye.indirect),
-        ]);
-        match self {
-            Self::View { ray, .. } => {
-                for at in [[0.5, 0.5], [0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.3, 0.6]] {
-                    let ray = ray(at);
-                    add(&ray.origin.to_array());
-                    add(&ray.direction.to_array());
-                }
-            }
-            Self::Box(bounds) => {
-                add(&bounds.min.to_array());
-                add(&bounds.max.to_array());
-            }
-        }
-        for number in [u64::from(rays), u64::from(round), seed] {
-            crc.add(&number.to_le_bytes());
-        }
-        crc.value()
-    }
-
-    /// Calls `visit(place, distance of the eye)` for the places that ray number `number` asks for.
-    fn visit<M: Medium + ?Sized, S: Scene + ?Sized>(
-        &self,
-        number: u32,
-        world: &World<'_, M, S>,
-        settings: &Settings,
-        mut visit: impl FnMut(Place, f32),
-    ) {
-        // The plane filled evenly by multiples of the plastic number, space by those of its sister (Roberts 2018).
-        let turn = |step: f64| {
-            let x = 0.5 + step * f64::from(number + 1);
-            (x - libm::floor(x)) as f32
-        };
-        let mut rng = Generator::new(mix(settings.seed ^ 0x70_1a_ce) ^ u64::from(number));
-        match self {
-            Self::View { ray, .. } => {
-                let ray = ray([turn(0.754_877_666_246_692_8), turn(0.569_840_290_998_053_3)]);
-                places(&ray, world, &settings.eye, &mut rng, |place| visit(place, place.point.distance(ray.origin)));
-            }
-            Self::Box(bounds) => {
-                let at = [0.819_172_513_396_164_4, 0.671_043_606_703_789_2, 0.549_700_477_901_985_2].map(turn);
-                let point = bounds.min + bounds.size() * Vec3::from(at);
-                let direction = warp::uniform_sphere(uniform2(&mut rng));
-                places_around(point, direction, world, |place| visit(place, f32::INFINITY));
-            }
-        }
-    }
-}
-
-/// The lowest radius of a line that records around a point of it reach, in the mean: `Σ R²/Σ R` (m); none of few.
+/// The radius of the records that reach a point, in the mean over the points of a line: `Σ R²/Σ R` (m); 0 of few records.
 fn usual_radius(records: &[Record]) -> f32 {
     if records.len() < FEW {
         return 0.0;
@@ -611,9 +422,9 @@ impl<'s, F> Filling<'s, F> {
         (self.round, self.jobs, self.taken) = (round, jobs, 0);
     }
 
-    /// Everything was done.
+    /// Everything was done. A view whose memory was too small may miss something, and is filled again when it is asked for.
     fn complete(&mut self) {
-        self.is_cut |= self.caches.views.push(self.view).is_err();
+        self.is_cut |= !self.is_cut && self.caches.views.push(self.view).is_err();
         for kind in Kind::ALL {
             self.caches.settled[kind] = self.caches.slots[kind].len();
         }
@@ -642,7 +453,7 @@ impl<'s, F> Filling<'s, F> {
                     let from = self.before[step.kind].min(slot.len());
                     let count = slot.len() - from;
                     if count > 0 {
-                        // Final records are fewer than those that are covered more than once.
+                        // Half as far again as usual reach those that most pixels see: they alone get all samples.
                         self.usual = 1.5 * usual_radius(slot.records());
                         self.memory.estimates.clear();
                         self.memory.higher.clear();

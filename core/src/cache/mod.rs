@@ -19,7 +19,9 @@
 //! | `caches` | [`RadianceCaches`]: all caches of a world |
 //! | `kind` | [`Kind`]: what caches hold, what lights them, in which order they are made |
 //! | `settings`, `presets` | [`Settings`], [`Effort`]; every tuned number of the method, from an outline of the world |
+//! | `asked` | [`Asked`]: where light is asked for |
 //! | `fill` | [`Filling`]: which places get records, rounds of new ones, better estimates for old ones |
+//! | `memory` | [`Memory`], [`Output`]: what a fill remembers, and what its jobs leave |
 //! | `slot` | a cache of either sort, as filling needs it |
 //! | `readers` | probes, fluence, irradiance, in-scattered light; many at a time |
 //! | `set_bytes` | all caches as bytes |
@@ -38,6 +40,7 @@
 //! | [`bytes`] | caches as bytes, to be saved |
 
 mod aim;
+mod asked;
 pub mod bytes;
 mod caches;
 mod estimate;
@@ -49,6 +52,7 @@ mod guide;
 mod index;
 mod kind;
 mod lookup;
+mod memory;
 mod presets;
 mod radius;
 mod readers;
@@ -59,15 +63,17 @@ mod settings;
 mod slot;
 mod store;
 
+pub use asked::{Asked, Wanted};
 pub use caches::RadianceCaches;
 pub use estimate::Estimator;
 pub use extrapolate::{Blend, Extrapolation, exponent_limit, weight};
 pub use eye::{Caches, EyeSettings, Place, Reader, Seen, places, radiance, radiance_beyond};
-pub use fill::{Asked, Estimate, Filling, Memory, Output, Wanted};
+pub use fill::Filling;
 pub use guide::{Guide, Guided, Looks};
 pub use index::{Block, Index, Node};
 pub use kind::Kind;
 pub use lookup::{Basis, Reading, TURNING_DEGREE, TurningBasis};
+pub use memory::{Estimate, Memory, Output};
 pub use radius::{Limits, clamp_gradient, clearance, log_gradient_radius, neighbour_clamped, valid_radius};
 pub use readers::ScatteredLight;
 pub use record::{Attachment, Facing, Record};

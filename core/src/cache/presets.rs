@@ -62,8 +62,8 @@ const LEFT_OUT: f32 = 2.5e-4;
 const SURFACE_FALL_OFF: f32 = 1.5;
 
 impl Settings {
-    /// What suits a world, at about 2 % of error where fog fills a room; seed 0. See the constants of this module for what each
-    /// number does, and change fields at will.
+    /// What suits a world, at about 2 % of error where fog fills a room; seed 0. What each number does, and what happens when it
+    /// is larger or smaller, stands in `cache/presets.rs`; change fields at will.
     ///
     /// ```
     /// # use fogbow::{cache::Settings, host::Empty, light::{Light, PointLight}, math::{Bounds, Vec3}};

@@ -18,4 +18,4 @@ pub mod uniform;
 pub mod warp;
 
 pub use source::{Independent, Source, independent, pixel_key, pixel_seed};
-pub use uniform::{Generator, uniform, uniform2};
+pub use uniform::{Generator, even2, even3, uniform, uniform2};

@@ -90,6 +90,37 @@ pub fn mix(value: u64) -> u64 {
     z ^ (z >> 31)
 }
 
+/// Point number `number` of a sequence that fills the unit square evenly, however many of its points are taken: multiples of
+/// the powers of the plastic number, wrapped (Roberts 2018, the sequence R₂).
+///
+/// ```
+/// # use fogbow::sampling::even2;
+/// // Of 64 points every quarter has a quarter, give or take one.
+/// let lower_left = (0..64).map(even2).filter(|[x, y]| *x < 0.5 && *y < 0.5).count();
+/// assert!(lower_left.abs_diff(16) <= 1);
+/// ```
+#[must_use]
+pub fn even2(number: u32) -> [f32; 2] {
+    [0.754_877_666_246_692_8, 0.569_840_290_998_053_3].map(|step| wrapped(step, number))
+}
+
+/// As [`even2`] in the unit cube: the sequence R₃.
+///
+/// ```
+/// # use fogbow::sampling::even3;
+/// let low = (0..64).map(even3).filter(|[_, _, z]| *z < 0.5).count();
+/// assert!(low.abs_diff(32) <= 1);
+/// ```
+#[must_use]
+pub fn even3(number: u32) -> [f32; 3] {
+    [0.819_172_513_396_164_4, 0.671_043_606_703_789_2, 0.549_700_477_901_985_2].map(|step| wrapped(step, number))
+}
+
+fn wrapped(step: f64, number: u32) -> f32 {
+    let x = 0.5 + step * f64::from(number);
+    (x - libm::floor(x)) as f32
+}
+
 impl TryRng for Generator {
     type Error = Infallible;
 

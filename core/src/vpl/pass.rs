@@ -13,7 +13,7 @@ use super::settings::Settings;
 use crate::host::{Medium, Scene};
 use crate::math::{Bounds, Ray, float};
 use crate::sampling::uniform::mix;
-use crate::sampling::{Generator, Source, independent, uniform};
+use crate::sampling::{Generator, Source, even2, independent, uniform};
 use crate::storage::List;
 use crate::work::Rounds;
 use crate::world::World;
@@ -78,18 +78,12 @@ pub fn witnesses<M: Medium + ?Sized, S: Scene + ?Sized>(
     eye: impl Fn([f32; 2], &mut Generator) -> Ray,
     mut keep: impl FnMut(Receiver),
 ) {
-    // Steps of the plastic number fill a square evenly (Roberts 2018).
-    const STEPS: [f64; 2] = [0.754_877_666_246_692_8, 0.569_840_290_998_053_3];
     if settings.candidates <= 1 {
         return;
     }
     for i in 0..SCOUTS {
-        let at = STEPS.map(|step| {
-            let x = 0.5 + step * f64::from(i);
-            (x - libm::floor(x)) as f32
-        });
         let mut rng = independent(mix(settings.seed ^ 0x2f6b_11d0_99ac_4e57), u64::from(i), 0);
-        let ray = eye(at, &mut rng);
+        let ray = eye(even2(i), &mut rng);
         receivers(&ray, world, &settings.walk, &mut rng, |receiver, _| keep(*receiver));
     }
 }
