@@ -24,6 +24,9 @@ use crate::world::World;
 /// The kinds of light scattered in a medium.
 const SCATTERED: [Kind; 3] = [Kind::Single, Kind::Surface, Kind::Multiple];
 
+/// Coefficients that are mixed in one visit of the records: all of degree 3, as probes have.
+const BLOCK: usize = 16;
+
 /// √(4π): the coefficient of degree 0 of a function whose mean over directions is 1.
 const MEAN: f32 = 3.544_907_7;
 
@@ -88,19 +91,22 @@ impl VolumeCache<'_> {
             Extrapolation::Exponential => Extrapolation::Linear,
             other => other,
         };
+        let count = coefficients.len().min(self.stride() + 1);
         let mut reaches = false;
-        for (number, sum) in coefficients.iter_mut().enumerate().take(self.stride() + 1) {
-            let coefficient = |record: u32, of: &Record| match number.checked_sub(1) {
+        for (block, sums) in coefficients[..count].chunks_mut(BLOCK).enumerate() {
+            let coefficient = |record: u32, of: &Record, number: usize| match number.checked_sub(1) {
                 None => Coefficient { value: of.value * MEAN, gradient: of.gradient * MEAN },
                 Some(i) => self.attached(record).get(i).copied().unwrap_or(Coefficient::ZERO),
             };
-            let blend = |margin: f32, is_wide: bool| {
-                let mut blend = Blend::new(extrapolation, exponent_limit(reading.tolerance));
+            let mixed = |margin: f32, is_wide: bool| {
+                let mut blends = [Blend::new(extrapolation, exponent_limit(reading.tolerance)); BLOCK];
                 let mut add = |i: u32, record: &Record, share: f32| {
                     let d = 1.0 - share - margin;
                     if d > 0.0 {
-                        let c = coefficient(i, record);
-                        blend.add(weight(d), c.value, &c.gradient, point - record.position);
+                        for (k, blend) in blends.iter_mut().enumerate().take(sums.len()) {
+                            let c = coefficient(i, record, block * BLOCK + k);
+                            blend.add(weight(d), c.value, &c.gradient, point - record.position);
+                        }
                     }
                 };
                 if is_wide {
@@ -108,10 +114,11 @@ impl VolumeCache<'_> {
                 } else {
                     self.visit(point, &mut add)
                 }
-                blend.value()
+                (blends[0].weight() > 0.0).then_some(blends)
             };
-            let Some(value) = blend(reading.margin, false).or_else(|| blend(0.0, true)) else { return false };
-            (*sum, reaches) = (value, true);
+            let Some(blends) = mixed(reading.margin, false).or_else(|| mixed(0.0, true)) else { return false };
+            sums.iter_mut().zip(blends).for_each(|(sum, blend)| *sum = blend.value().unwrap_or_default());
+            reaches = true;
         }
         reaches
     }
