@@ -1,11 +1,72 @@
-//! Files, read and written with care.
+//! Files of caches and grids, read and written with care.
 
+use core::fmt;
 use std::ffi::OsString;
 use std::io;
-use std::path::Path;
+use std::path::{Path, PathBuf};
+
+/// What is wrong with a file.
+#[derive(Debug)]
+pub struct FileError<E> {
+    /// The file.
+    pub path: PathBuf,
+    /// What is wrong.
+    pub problem: Problem<E>,
+}
+
+/// Why a file is not used.
+#[derive(Debug)]
+#[non_exhaustive]
+pub enum Problem<E> {
+    /// The system cannot read or write it.
+    Io(io::Error),
+    /// It is a directory or a device.
+    NoFile,
+    /// Its content.
+    Content(E),
+}
+
+impl<E: fmt::Display> fmt::Display for FileError<E> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}: {}", self.path.display(), self.problem)
+    }
+}
+
+impl<E: fmt::Display> fmt::Display for Problem<E> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Io(error) => error.fmt(f),
+            Self::NoFile => f.write_str("is not a file"),
+            Self::Content(error) => error.fmt(f),
+        }
+    }
+}
+
+impl<E: core::error::Error + 'static> core::error::Error for FileError<E> {
+    fn source(&self) -> Option<&(dyn core::error::Error + 'static)> {
+        match &self.problem {
+            Problem::Io(error) => Some(error),
+            Problem::Content(error) => Some(error),
+            Problem::NoFile => None,
+        }
+    }
+}
+
+/// Reads a file and makes something of its bytes.
+pub(crate) fn load<T, E>(path: &Path, decode: impl FnOnce(&[u8]) -> Result<T, E>) -> Result<T, FileError<E>> {
+    let bytes = read(path).map_err(Problem::Io).and_then(|bytes| bytes.ok_or(Problem::NoFile));
+    bytes
+        .and_then(|bytes| decode(&bytes).map_err(Problem::Content))
+        .map_err(|problem| FileError { path: path.to_owned(), problem })
+}
+
+/// Writes a file; the one that was there is lost only when the new one is complete.
+pub(crate) fn save<E>(path: &Path, bytes: &[u8]) -> Result<(), FileError<E>> {
+    replace(path, bytes).map_err(|error| FileError { path: path.to_owned(), problem: Problem::Io(error) })
+}
 
 /// The bytes of a file; `None` if it is a directory or a device.
-pub(crate) fn read(path: &Path) -> io::Result<Option<Vec<u8>>> {
+fn read(path: &Path) -> io::Result<Option<Vec<u8>>> {
     // Asked before opening: opening a pipe would wait for whoever writes to it.
     if !std::fs::metadata(path)?.is_file() {
         return Ok(None);
@@ -14,7 +75,7 @@ pub(crate) fn read(path: &Path) -> io::Result<Option<Vec<u8>>> {
 }
 
 /// Beside the old file first, so that neither a full disk nor an interruption costs both.
-pub(crate) fn replace(path: &Path, bytes: &[u8]) -> io::Result<()> {
+fn replace(path: &Path, bytes: &[u8]) -> io::Result<()> {
     let is_plain = std::fs::symlink_metadata(path).map_or(true, |meta| meta.is_file());
     if let (true, Some(name)) = (is_plain, path.file_name()) {
         let mut beside = OsString::from(name);

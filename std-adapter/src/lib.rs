@@ -2,6 +2,7 @@
 //!
 //! | module | holds |
 //! |---|---|
+//! | [`files`] | what can be wrong with a file |
 //! | [`film`] | sums of samples per pixel, in named layers; pictures |
 //! | [`seed`] | the random numbers of each pixel and sample: independent, or low-discrepancy |
 //! | [`tiles`] | parallel rendering, the same bits for any number of threads |
@@ -40,7 +41,7 @@
 //! ```
 
 pub mod covariance;
-mod files;
+pub mod files;
 pub mod film;
 pub mod image;
 pub mod image_sampling;

@@ -44,7 +44,7 @@ impl<E> From<RenderError> for ProgressiveError<E> {
 /// Runs work for a pass, on as many threads as its picture.
 #[derive(Debug)]
 pub struct Runner<'a> {
-    threads: Threads,
+    threads: &'a Threads,
     control: &'a Control<'a>,
 }
 
@@ -56,7 +56,7 @@ impl Runner<'_> {
         R: Rounds<W> + Sync,
         R::Output<'static>: Default + Send,
     {
-        run(work, world, &self.threads, self.control, None, |_| {});
+        run(work, world, self.threads, self.control, None, |_| {});
     }
 }
 
@@ -106,15 +106,13 @@ pub fn render<T, E, P, F>(
     integrand: F,
 ) -> Result<Outcome, ProgressiveError<E>>
 where
-    T: Send + Sync,
-    E: Send,
-    P: FnMut(u32, &Runner<'_>) -> Result<T, E> + Send,
+    T: Sync,
+    P: FnMut(u32, &Runner<'_>) -> Result<T, E>,
     F: Fn(&T, &Sample<'_>, &mut SampleRng, &mut [Spectrum]) + Sync,
 {
-    let threads = Threads::new(settings.threads).map_err(RenderError::from)?;
-    let runner = Runner { threads, control };
     let settings = &Settings { samples: whole_passes(settings.samples, passes.length), ..*settings };
-    let prepare = |pass: u32| make(pass, &runner).map_err(ProgressiveError::Method);
+    let prepare =
+        |pass: u32, threads: &Threads| make(pass, &Runner { threads, control }).map_err(ProgressiveError::Method);
     render_prepared(film, settings, control, passes, prepare, integrand)
 }
 

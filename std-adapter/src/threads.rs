@@ -91,15 +91,6 @@ impl Threads {
         1
     }
 
-    /// Does `work` where all threads stand by.
-    pub(crate) fn within<T: Send>(&self, work: impl FnOnce() -> T + Send) -> T {
-        #[cfg(feature = "threads")]
-        if let Some(pool) = &self.pool {
-            return pool.install(work);
-        }
-        work()
-    }
-
     /// Calls `work(index, element)` for every element, on all threads.
     fn each<T: Send>(&self, elements: &mut [T], work: impl Fn(usize, &mut T) + Sync) {
         #[cfg(feature = "threads")]

@@ -169,7 +169,7 @@ pub struct Passes {
 /// let settings = Settings { samples: 6, ..Settings::default() };
 /// let passes = Passes { length: NonZero::new(2).unwrap(), may_break: false };
 /// render_prepared(&mut film, &settings, &Control::default(), passes,
-///     |pass| Ok::<f32, RenderError>(pass as f32),
+///     |pass, _| Ok::<f32, RenderError>(pass as f32),
 ///     |prepared, _, _, layers| layers[0] = Spectrum::splat(*prepared),
 /// ).unwrap();
 /// assert_eq!(film.mean(0).unwrap().pixels[3], Spectrum::ONE);
@@ -183,9 +183,9 @@ pub fn render_prepared<T, E, P, F>(
     integrand: F,
 ) -> Result<Outcome, E>
 where
-    T: Sync + Send,
-    E: From<RenderError> + Send,
-    P: FnMut(u32) -> Result<T, E> + Send,
+    T: Sync,
+    E: From<RenderError>,
+    P: FnMut(u32, &Threads) -> Result<T, E>,
     F: Fn(&T, &Sample<'_>, &mut SampleRng, &mut [Spectrum]) + Sync,
 {
     let settings = &Settings { goal: None, ..*settings };
@@ -319,12 +319,11 @@ impl<'a> Render<'a> {
     fn prepared_passes<T, E, F>(
         &mut self,
         passes: Passes,
-        prepare: &mut (impl FnMut(u32) -> Result<T, E> + Send),
+        prepare: &mut impl FnMut(u32, &Threads) -> Result<T, E>,
         integrand: &F,
     ) -> Result<Reason, E>
     where
-        T: Sync + Send,
-        E: Send,
+        T: Sync,
         F: Fn(&T, &Sample<'_>, &mut SampleRng, &mut [Spectrum]) + Sync,
     {
         let settings = self.settings;
@@ -338,7 +337,7 @@ impl<'a> Render<'a> {
             }
             let before = self.reporter.elapsed();
             let pass = done / passes.length;
-            let prepared = self.threads.within(|| prepare(pass))?;
+            let prepared = prepare(pass, &self.threads)?;
             let integrand = Counted(|sample: &Sample<'_>, rng: &mut SampleRng, layers: &mut [Spectrum]| {
                 integrand(&prepared, sample, rng, layers);
             });
