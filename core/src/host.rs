@@ -158,9 +158,9 @@ pub trait Medium {
     /// marching. A grid answers with its cell.
     ///
     /// ```
-    /// # use fogbow::{host::Medium, math::{Affine3, Vec3}, medium::{Density, Grid, MinMax}, phase::Phase, spectrum::Spectrum};
+    /// # use fogbow::{host::Medium, math::{Affine3, Vec3}, medium::{Density, DensityGrid, MinMax}, phase::Phase, spectrum::Spectrum};
     /// let (mut blocks, smoke, unit) = ([MinMax::default()], Density::F32(&[1.0; 4]), Spectrum::ONE);
-    /// let grid = Grid::new([4, 1, 1], smoke, unit, unit, Phase::ISOTROPIC, Affine3::IDENTITY, &mut blocks)?;
+    /// let grid = DensityGrid::new([4, 1, 1], smoke, unit, unit, Phase::ISOTROPIC, Affine3::IDENTITY, &mut blocks)?;
     /// assert_eq!(grid.resolution(), 0.25);   // its shortest cell
     /// # Ok::<(), fogbow::medium::MediumError>(())
     /// ```

@@ -8,7 +8,7 @@
 //! # fn main() {}
 //! # #[cfg(feature = "alloc")]
 //! # fn main() -> Result<(), Box<dyn core::error::Error>> {
-//! # use fogbow::cache::{Asked, Output, RadianceCaches, Settings};
+//! # use fogbow::cache::{Asked, FilledRecords, RadianceCaches, Settings};
 //! # use fogbow::{host::Empty, light::{Light, PointLight}, math::{Bounds, Ray, Vec3}, phase::Lobe};
 //! # use fogbow::medium::{Homogeneous, Placed, Region};
 //! # use fogbow::{sampling::Generator, spectrum::Spectrum, work, world::{Outline, World}};
@@ -22,7 +22,7 @@
 //! let settings = Settings::for_outline(&outline);
 //! # let settings = Settings { rays: 64, ..settings.with_walks(16) };
 //! let mut filling = RadianceCaches::new(settings).fill(Asked::View { ray, pixel: 0.005 });
-//! work::finish(&mut filling, &world, &mut Output::default()); // Or job by job, or on threads: see `work`.
+//! work::finish(&mut filling, &world, &mut FilledRecords::default()); // Or job by job, or on threads: see `work`.
 //! let caches = filling.finish();
 //!
 //! let mut rng = Generator::new(1);

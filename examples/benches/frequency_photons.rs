@@ -7,7 +7,7 @@
 
 use std::path::PathBuf;
 
-use fogbow::covariance::{Crossing, FrequencyPhotons, Lattice, OccluderCell, Occluders, Voxel};
+use fogbow::covariance::{CellCrossing, FrequencyPhotons, Lattice, OccluderCell, Occluders, Voxel};
 use fogbow::host::Medium;
 use fogbow::path;
 use fogbow::photon::{self, Event};
@@ -42,7 +42,7 @@ impl WithMedium for Job<'_> {
             let mut crossings = 0_u64;
             let energy = walks(&mut |event| {
                 if let Event::Flew { reach, distance, power } = event {
-                    for Crossing { cell, enter, leave } in lattice.cells(&reach.with_length(*distance)) {
+                    for CellCrossing { cell, enter, leave } in lattice.cells(&reach.with_length(*distance)) {
                         plain[cell] += power.mean() * (leave - enter);
                         crossings += 1;
                     }

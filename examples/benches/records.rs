@@ -7,7 +7,7 @@
 
 use std::path::PathBuf;
 
-use fogbow::cache::{Asked, Effort, Estimator, EyeSettings, Limits, Place, RadianceCaches, Settings, places};
+use fogbow::cache::{Asked, Effort, Estimator, Limits, Place, RadianceCaches, RaySettings, Settings, places};
 use fogbow::host::Medium;
 use fogbow::math::{Vec2, Vec3};
 use fogbow::multiple_scatter;
@@ -41,7 +41,7 @@ impl WithMedium for Job<'_> {
         let paths = path::Settings::default();
         let estimator =
             Estimator { world, surfaces: None, scattered: None, walk, paths, light_samples: 16, finest: 0.02 };
-        let eye = EyeSettings { density: 1.0, connections: 4, lights_visible: true, indirect: true };
+        let eye = RaySettings { density: 1.0, connections: 4, lights_visible: true, indirect: true };
         let camera = self.0.camera();
         let mut found: Vec<Place> = Vec::new();
         for i in 0..RAYS {

@@ -8,7 +8,7 @@
 //!
 //! Both need the light in many cells; `fogbow::covariance::hessian_bound` needs it in one.
 
-use fogbow::covariance::{Grid, Lattice};
+use fogbow::covariance::{GridView, Lattice};
 use fogbow::math::Vec3;
 
 /// Cells on each side of the middle one that [`filtered`] takes in: 21 in a row.
@@ -30,7 +30,7 @@ fn cell_of(lattice: &Lattice, point: Vec3) -> Option<Cell> {
 }
 
 /// The fluence (W·m⁻²) of a cell; `None` outside.
-fn fluence(grid: &Grid<'_>, cell: Cell) -> Option<f64> {
+fn fluence(grid: &GridView<'_>, cell: Cell) -> Option<f64> {
     let lattice = grid.lattice();
     let size = lattice.size().map(|n| n as i32);
     if (0..3).any(|i| cell[i] < 0 || cell[i] >= size[i]) {
@@ -49,7 +49,7 @@ fn fluence(grid: &Grid<'_>, cell: Cell) -> Option<f64> {
 ///
 /// `None` outside, and in the outermost cells.
 #[must_use]
-pub fn difference(grid: &Grid<'_>, point: Vec3) -> Option<Upper> {
+pub fn difference(grid: &GridView<'_>, point: Vec3) -> Option<Upper> {
     let middle = cell_of(grid.lattice(), point)?;
     let h = grid.lattice().cell().to_array().map(f64::from);
     let at = |a: usize, da: i32, b: usize, db: i32| {
@@ -76,7 +76,7 @@ const TERMS: [[usize; 3]; 10] =
 /// polynomials are orthogonal under it; near borders fewer cells take part. `None` outside, and where an edge of the
 /// lattice has less than three cells.
 #[must_use]
-pub fn filtered(grid: &Grid<'_>, point: Vec3) -> Option<Upper> {
+pub fn filtered(grid: &GridView<'_>, point: Vec3) -> Option<Upper> {
     let lattice = grid.lattice();
     let middle = cell_of(lattice, point)?;
     let size = lattice.size().map(|n| n as i32);
@@ -181,7 +181,7 @@ mod tests {
         let lattice = lattice([30, 20, 24]);
         let f = |p: Vec3| 5.0 + p.x - 2.0 * p.y + 0.5 * p.x * p.x + 2.0 * p.x * p.y - 0.3 * p.y * p.z + 0.7 * p.z * p.z;
         let voxels = voxels(&lattice, f);
-        let grid = Grid::new(lattice, &voxels, 50).unwrap();
+        let grid = GridView::new(lattice, &voxels, 50).unwrap();
         let due = [1.0, 2.0, 0.0, 0.0, -0.3, 1.4];
         for point in [Vec3::new(0.5, 1.0, 3.0), Vec3::new(-0.85, 0.15, 3.87), Vec3::new(1.73, 1.1, 2.2)] {
             for (name, found) in [("difference", difference(&grid, point)), ("filtered", filtered(&grid, point))] {
@@ -202,7 +202,7 @@ mod tests {
         let lattice = lattice([61, 41, 41]);
         let (centre, w) = (Vec3::new(0.5, 1.0, 3.0), 0.4_f32);
         let voxels = voxels(&lattice, |p| (-0.5 * (p - centre).length_squared() / (w * w)).exp());
-        let grid = Grid::new(lattice, &voxels, 50).unwrap();
+        let grid = GridView::new(lattice, &voxels, 50).unwrap();
         let found = filtered(&grid, centre).unwrap();
         let h = 3.0 / 61.0;
         let (w, s) = (0.4_f64, [h, 2.0 / 41.0, 2.0 / 41.0].map(|h| WIDTH * h));
@@ -216,7 +216,7 @@ mod tests {
     fn flat_lattices_have_no_parabola() {
         let lattice = lattice([5, 2, 5]);
         let voxels = voxels(&lattice, |_| 1.0);
-        let grid = Grid::new(lattice, &voxels, 50).unwrap();
+        let grid = GridView::new(lattice, &voxels, 50).unwrap();
         assert_eq!(filtered(&grid, Vec3::new(0.5, 0.5, 3.0)), None);
         assert_eq!(difference(&grid, Vec3::new(0.5, 0.5, 3.0)), None);
     }

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use fogbow::covariance::CovarianceGrid;
-use fogbow::covariance::bytes::{self, BytesError};
+use fogbow::covariance::bytes::{self, GridBytesError};
 use fogbow::storage::List;
 
 use crate::files::{self, FileError};
@@ -12,7 +12,7 @@ use crate::files::{self, FileError};
 ///
 /// # Errors
 /// What the system says.
-pub fn save(file: impl AsRef<Path>, grid: &CovarianceGrid<'_>, tag: u64) -> Result<(), FileError<BytesError>> {
+pub fn save(file: impl AsRef<Path>, grid: &CovarianceGrid<'_>, tag: u64) -> Result<(), FileError<GridBytesError>> {
     let mut all = Vec::with_capacity(bytes::byte_count(grid.view().lattice()));
     let Ok(()) = bytes::write(&grid.view(), tag, |part| {
         all.extend_from_slice(part);
@@ -38,6 +38,6 @@ pub fn save(file: impl AsRef<Path>, grid: &CovarianceGrid<'_>, tag: u64) -> Resu
 /// # std::fs::remove_file(&file)?;
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-pub fn load(file: impl AsRef<Path>, tag: u64) -> Result<CovarianceGrid<'static>, FileError<BytesError>> {
+pub fn load(file: impl AsRef<Path>, tag: u64) -> Result<CovarianceGrid<'static>, FileError<GridBytesError>> {
     files::load(file.as_ref(), |all| bytes::read(all, tag, List::default()))
 }

@@ -14,11 +14,11 @@ use crate::threads::{self, Threads};
 /// [`Full`] if the image is not of the plan's size.
 ///
 /// ```
-/// use fogbow::covariance::image_sampling::{Outlook, Output, Planning};
+/// use fogbow::covariance::image_sampling::{Outlook, PlanOutput, Planning};
 /// use fogbow::{spectrum::Spectrum, work};
 /// use fogbow_std::{film::Image, image_sampling::filled, threads::Threads};
 /// let mut planning = Planning::new([16, 16], 0.3)?;
-/// work::finish(&mut planning, &[Outlook::default(); 256][..], &mut Output::default());
+/// work::finish(&mut planning, &[Outlook::default(); 256][..], &mut PlanOutput::default());
 /// let image = Image::new(16, 16, Spectrum::ONE).unwrap();
 /// let filled = filled(&planning.finish(), &image, &Threads::new(2)?)?;
 /// assert!(filled.pixels.iter().all(|colour| (colour[0] - 1.0).abs() < 1e-6));

@@ -84,7 +84,7 @@ impl Runner<'_> {
 /// let passes = tiles::Passes { length: NonZero::new(settings.samples).unwrap(), may_break: false };
 /// let outcome = progressive::render(&mut film, &tiles, &Control::default(), passes,
 ///     |pass, runner| {
-///         let mut beams = beams::Pass::new(&settings, pass, |_, pass| pass);
+///         let mut beams = beams::BeamPass::new(&settings, pass, |_, pass| pass);
 ///         runner.run(&mut beams, &world);
 ///         beams.finish()
 ///     },

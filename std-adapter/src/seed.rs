@@ -4,7 +4,7 @@ use core::convert::Infallible;
 
 use fogbow::rand_core::TryRng;
 use fogbow::sampling::uniform::mix;
-use fogbow::sampling::{Generator, Source, pixel_seed};
+use fogbow::sampling::{Generator, GeneratorSource, pixel_seed};
 pub use fogbow::sampling::{independent, pixel_key};
 use sobol_burley::parts::{Int4, hash, hash_int4, owen_scramble_int4_rev, owen_scramble_rev, sobol_int4_rev};
 
@@ -39,7 +39,7 @@ impl Sequence {
     }
 }
 
-impl Source for Sequence {
+impl GeneratorSource for Sequence {
     type Rng = SampleRng;
 
     #[inline]

@@ -4,9 +4,9 @@
 use std::path::{Path, PathBuf};
 
 use fogbow::bytes::Crc;
-use fogbow::cache::bytes::{self, Attachment, BytesError, HEADER_BYTES, Header, Kind, byte_count, read_into};
+use fogbow::cache::bytes::{self, Attachment, BytesError, HEADER_BYTES, Header, RecordKind, byte_count, read_into};
 use fogbow::cache::{
-    Asked, Basis, Block, Cache, CachesError, Effort, Facing, Index, Kind as Caching, Limits, Node, Output,
+    Asked, Basis, Block, Cache, CachesError, Effort, Facing, FilledRecords, Index, IndexNode, Kind, Limits,
     RadianceCaches, Reading, Record, Settings, SurfaceCache, VolumeCache,
 };
 use fogbow::light::{Light, PointLight};
@@ -158,7 +158,7 @@ fn the_layout_is_the_one_documented() {
     assert_eq!(written, [1.0, 2.0, 3.0, 0.5, 7.0, 8.0, 9.0, 0.5, 1.0, 2.0, 0.25, 0.5, 1.0, 0.0, 0.0, 0.0]);
     assert_eq!([0, 1, 2].map(|i| float(104 + 48 * i)), [1.0, 2.0, 3.0]);
     let header = Header::read(&bytes).unwrap();
-    assert_eq!((header.kind, header.stride, header.count, header.tag), (Kind::Volume, 3, 1, TAG));
+    assert_eq!((header.kind, header.stride, header.count, header.tag), (RecordKind::Volume, 3, 1, TAG));
     assert_eq!(header.byte_count(), bytes.len());
 }
 
@@ -204,7 +204,7 @@ fn what_is_wrong_is_said() {
         (&number(12, 3), BytesError::UnknownKind(3), "unknown kind 3"),
         (
             &sealed(number(12, 2)),
-            BytesError::Kind { found: Kind::Surface, due: Kind::Volume },
+            BytesError::Kind { found: RecordKind::Surface, due: RecordKind::Volume },
             "on surfaces where records in a medium",
         ),
         (&number(16, 300), BytesError::Size { stride: 300, count: 4 }, "300 attachments"),
@@ -251,7 +251,7 @@ fn lent_storage_is_filled_or_said_to_be_too_small() {
     let whole = to_bytes(&volume(8, 0, 3));
     for (slots, expected) in [(8, Ok(())), (7, Err(BytesError::Full))] {
         let (mut records, mut none) = (vec![record(&mut random(1)); slots], [Coefficient::ZERO; 0]);
-        let lent = || ([Node::default(); 32], [0_u32; 256], [[0.0_f32; 4]; 8], [Block::default(); 64]);
+        let lent = || ([IndexNode::default(); 32], [0_u32; 256], [[0.0_f32; 4]; 8], [Block::default(); 64]);
         let (mut a, mut b) = (lent(), lent());
         let index = Index::new(&mut a.0[..], &mut a.1[..], &mut a.2[..], &mut a.3[..]);
         let wide = Index::new(&mut b.0[..], &mut b.1[..], &mut b.2[..], &mut b.3[..]);
@@ -315,7 +315,7 @@ fn caches() -> RadianceCaches<'static> {
     let world = World { medium: &fog, scene: &room, lights: &lamps };
     let ray = |at: [f32; 2]| Ray::new(Vec3::ZERO, Vec3::new(at[0], at[1], 1.0).normalize());
     let mut filling = RadianceCaches::new(settings()).fill(Asked::View { ray, pixel: 0.06 });
-    finish(&mut filling, &world, &mut Output::default());
+    finish(&mut filling, &world, &mut FilledRecords::default());
     filling.finish()
 }
 
@@ -337,8 +337,8 @@ fn all_caches_come_back_from_a_file() {
     for _ in 0..2 {
         save(&file, &caches, TAG).unwrap();
         let copy = load(&file, settings(), TAG).unwrap();
-        for kind in Caching::ALL {
-            assert!(kind == Caching::Single || !caches.records(kind).is_empty(), "{kind:?}");
+        for kind in Kind::ALL {
+            assert!(kind == Kind::Single || !caches.records(kind).is_empty(), "{kind:?}");
             assert_eq!(copy.records(kind), caches.records(kind));
         }
         assert_eq!((copy.is_open(), copy.settings()), (false, caches.settings()));

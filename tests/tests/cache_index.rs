@@ -1,6 +1,6 @@
 //! The index of the radiance cache finds the spheres that brute force finds, wherever they lie.
 
-use fogbow::cache::{Block, Index, Node};
+use fogbow::cache::{Block, Index, IndexNode};
 use fogbow::math::Vec3;
 use fogbow::storage::Full;
 use proptest::prelude::*;
@@ -196,7 +196,7 @@ fn building_anew_forgets_what_was_before() {
 fn storage_of_the_sizes_advised_is_enough() {
     for spheres in [even(5000, 53), crowds(5000, 59)] {
         let n = spheres.len();
-        let mut nodes = vec![Node::default(); n];
+        let mut nodes = vec![IndexNode::default(); n];
         let (mut entries, mut copies) = (vec![0; 6 * n], vec![[0.0; 4]; n]);
         let mut blocks = vec![Block::default(); 4 * n + 16];
         let mut index = Index::new(&mut nodes[..], &mut entries[..], &mut copies[..], &mut blocks[..]);
@@ -220,7 +220,7 @@ fn lent_storage_that_is_full_says_so_and_serves_again() {
         (nodes, entries, n, 0),
         (nodes, entries, n, 20),
     ] {
-        let mut nodes = vec![Node::default(); nodes];
+        let mut nodes = vec![IndexNode::default(); nodes];
         let (mut entries, mut copies) = (vec![0; entries], vec![[0.0; 4]; copies]);
         let mut blocks = vec![Block::default(); blocks];
         let room_for_few = blocks.len() >= 2;

@@ -1,7 +1,7 @@
 //! What the radiance cache is filled with, where the light is known.
 
 use fogbow::cache::{
-    Cache, Caches, Estimator, Extrapolation, EyeSettings, Reader, Reading, Record, VolumeCache, clearance, radiance,
+    Cache, Caches, Estimator, Extrapolation, RaySettings, Reader, Reading, Record, VolumeCache, clearance, radiance,
 };
 use fogbow::host::{Empty, Medium, Scene};
 use fogbow::light::{EnvironmentMap, Light, PointLight, Sun};
@@ -133,13 +133,13 @@ fn eye_rays_without_caches_count_the_sky_once() {
     for origin in [Vec3::new(0.1, 0.2, 4.0), Vec3::new(0.9, 0.3, 4.0)] {
         let ray = Ray::new(origin, Vec3::NEG_Z);
         let make = estimator(&medium, &body, &lights);
-        let eye = EyeSettings { density: 8.0, connections: 4, lights_visible: true, indirect: true };
+        let eye = RaySettings { density: 8.0, connections: 4, lights_visible: true, indirect: true };
         let all = estimate(8000, |rng| radiance(&ray, &make, &Caches::default(), &eye, rng).total());
         all.assert_is(SKY, 2e-4, &format!("all light from {origin}"));
 
         let once = path::Settings { max_scatterings: 1, ..path::Settings::default() };
         let make = Estimator { paths: once, ..make };
-        let eye = EyeSettings { indirect: false, ..eye };
+        let eye = RaySettings { indirect: false, ..eye };
         let direct = estimate(20_000, |rng| radiance(&ray, &make, &Caches::default(), &eye, rng).total());
         let traced = estimate(200_000, |rng| path::radiance(&ray, &make.world, &once, rng).total());
         for c in 0..3 {
@@ -339,7 +339,7 @@ fn eye_rays_see_what_the_caches_hold() {
         multiple: Some(Reader { cache: &multiple, reading }),
         ..Caches::default()
     };
-    let eye = EyeSettings { density: 8.0, connections: 4, lights_visible: true, indirect: true };
+    let eye = RaySettings { density: 8.0, connections: 4, lights_visible: true, indirect: true };
     let seen = estimate(4000, |rng| {
         let direction = warp::uniform_sphere(uniform2(rng));
         radiance(&Ray::new(Vec3::ZERO, direction), &make, &caches, &eye, rng).total()

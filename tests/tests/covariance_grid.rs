@@ -4,10 +4,10 @@
 use std::path::PathBuf;
 
 use fogbow::bytes::Crc;
-use fogbow::covariance::bytes::{self, BytesError, HEADER_BYTES, VERSION};
+use fogbow::covariance::bytes::{self, GridBytesError, HEADER_BYTES, VERSION};
 use fogbow::covariance::{
-    CovarianceGrid, Crossing, Fill, FrequencyPhotons, Grid, Lattice, OccluderCell, Occluders, Rule, Settings, Steps,
-    Voxel,
+    AdaptiveSteps, CellCrossing, CovarianceGrid, Fill, FrequencyPhotons, GridView, Lattice, OccluderCell, Occluders,
+    Rule, Settings, Voxel,
 };
 use fogbow::host::{Empty, Hit, Medium, Scene};
 use fogbow::light::{Light, PhongLight, PointLight, Sun};
@@ -132,7 +132,7 @@ fn a_file_gives_the_same_bits_back() {
 
 fn to_bytes(lattice: Lattice, voxels: &[Voxel]) -> Vec<u8> {
     let mut all = Vec::new();
-    let Ok(()) = bytes::write(&Grid::new(lattice, voxels, 1000).unwrap(), TAG, |part| {
+    let Ok(()) = bytes::write(&GridView::new(lattice, voxels, 1000).unwrap(), TAG, |part| {
         all.extend_from_slice(part);
         Ok::<(), core::convert::Infallible>(())
     });
@@ -140,7 +140,7 @@ fn to_bytes(lattice: Lattice, voxels: &[Voxel]) -> Vec<u8> {
     all
 }
 
-fn read(bytes: &[u8]) -> Result<(Lattice, Vec<Voxel>), BytesError> {
+fn read(bytes: &[u8]) -> Result<(Lattice, Vec<Voxel>), GridBytesError> {
     let header = bytes::header(bytes, TAG)?;
     let mut voxels = vec![Voxel::EMPTY; header.lattice.cell_count()];
     bytes::read_into(bytes, TAG, &mut voxels)?;
@@ -174,7 +174,7 @@ fn small() -> Vec<u8> {
 
 #[test]
 fn broken_bytes_are_refused_with_the_reason() {
-    use BytesError::*;
+    use GridBytesError::*;
     let good = small();
     assert!(read(&good).is_ok());
     let word = |at: usize, value: u32| sealed(with(&good, at, &value.to_le_bytes()));
@@ -185,7 +185,7 @@ fn broken_bytes_are_refused_with_the_reason() {
     let mut longer = good.clone();
     longer.push(0);
     let text = String::from_utf8_lossy(&good).replace('\n', "\r\n").into_bytes();
-    let cases: Vec<(&str, Vec<u8>, BytesError)> = vec![
+    let cases: Vec<(&str, Vec<u8>, GridBytesError)> = vec![
         ("empty", Vec::new(), NoHeader { found: 0 }),
         ("a header short of a byte", good[..71].to_vec(), NoHeader { found: 71 }),
         ("a header alone", good[..72].to_vec(), Length { found: 72, due }),
@@ -248,8 +248,8 @@ fn every_truncation_and_every_flipped_bit_is_found() {
     for length in 0..good.len() {
         let error = read(&good[..length]).unwrap_err();
         let expected = match length {
-            0..HEADER_BYTES => BytesError::NoHeader { found: length },
-            _ => BytesError::Length { found: length, due: good.len() },
+            0..HEADER_BYTES => GridBytesError::NoHeader { found: length },
+            _ => GridBytesError::Length { found: length, due: good.len() },
         };
         assert_eq!(error, expected);
     }
@@ -307,7 +307,7 @@ proptest! {
     #[test]
     fn cells_tile_any_ray_without_gaps(lattice in lattices(), ray in rays()) {
         let ray = ray_in(&lattice, ray);
-        let crossings: Vec<Crossing> = lattice.cells(&ray).collect();
+        let crossings: Vec<CellCrossing> = lattice.cells(&ray).collect();
         let due = lattice.bounds().intersect(&ray).map(|(near, far)| (near.max(0.0), far.min(ray.length)));
         let Some((start, end)) = due.filter(|(start, end)| start < end) else {
             prop_assert!(crossings.is_empty());
@@ -390,12 +390,12 @@ proptest! {
         let ray = ray_in(&lattice, ray);
         let ray = ray.with_length(ray.length.min(10.0));
         let voxels = voxels(&lattice, filling, seed);
-        let grid = Grid::new(lattice, &voxels, 1).unwrap();
+        let grid = GridView::new(lattice, &voxels, 1).unwrap();
         let (most, rule) = (least * ratio, count.map_or(Rule::Frequency, |count| Rule::Error { count }));
         // The density of steps, cell by cell, in f64.
-        let crossings: Vec<Crossing> = lattice.cells(&ray).collect();
+        let crossings: Vec<CellCrossing> = lattice.cells(&ray).collect();
         let light: f64 = crossings.iter().map(|c| f64::from(voxels[c.cell].weight) * f64::from(c.leave - c.enter)).sum();
-        let density = |c: &Crossing| {
+        let density = |c: &CellCrossing| {
             let gamma = voxels[c.cell].covariance().map_or(0.0, |g| f64::from(g.along(ray.direction)).max(0.0));
             let n = match rule {
                 Rule::Frequency => 2.0 * gamma.sqrt(),
@@ -416,7 +416,7 @@ proptest! {
             }
             sum + outside / f64::from(most)
         };
-        let mut steps = Steps::new(&grid, &ray, rule, (least, most));
+        let mut steps = AdaptiveSteps::new(&grid, &ray, rule, (least, most));
         let mut at = 0.0_f32;
         let mut taken = 0;
         while at < ray.length {
@@ -438,9 +438,9 @@ proptest! {
         let ray = ray_in(&lattice, ray);
         let ray = ray.with_length(ray.length.min(10.0));
         let voxels = voxels(&lattice, Filling::Extreme, seed);
-        let grid = Grid::new(lattice, &voxels, 1).unwrap();
+        let grid = GridView::new(lattice, &voxels, 1).unwrap();
         let rule = if error { Rule::Error { count: 1e4 } } else { Rule::Frequency };
-        let mut steps = Steps::new(&grid, &ray, rule, (0.01, 1.0));
+        let mut steps = AdaptiveSteps::new(&grid, &ray, rule, (0.01, 1.0));
         let mut at = 0.0;
         while at < ray.length {
             let step = steps.after(at);
@@ -454,10 +454,10 @@ proptest! {
 fn steps_of_an_empty_grid_are_the_longest() {
     let lattice = Lattice::cubic(cube(1.0), 8).unwrap();
     let voxels = vec![Voxel::EMPTY; lattice.cell_count()];
-    let grid = Grid::new(lattice, &voxels, 1).unwrap();
+    let grid = GridView::new(lattice, &voxels, 1).unwrap();
     let ray = Ray::new(Vec3::new(-3.0, 0.1, 0.2), Vec3::X).with_length(6.0);
     for rule in [Rule::Frequency, Rule::Error { count: 16.0 }] {
-        let mut steps = Steps::new(&grid, &ray, rule, (0.01, 0.75));
+        let mut steps = AdaptiveSteps::new(&grid, &ray, rule, (0.01, 0.75));
         assert!((0..8).all(|i| (steps.after(0.75 * i as f32) - 0.75).abs() < 1e-5));
     }
 }
@@ -539,7 +539,7 @@ fn batches(
     lattice: Lattice,
     max_scatterings: u32,
     walks: u32,
-    sum: impl Fn(&Grid<'_>) -> f64,
+    sum: impl Fn(&GridView<'_>) -> f64,
 ) -> (f64, f64) {
     let settings = path::Settings { max_scatterings, ..path::Settings::default() };
     let samples: Vec<f64> = (0..24)
@@ -552,7 +552,7 @@ fn batches(
                     photons.visit(event, &mut voxels);
                 });
             }
-            sum(&Grid::new(lattice, &voxels, walks.into()).unwrap())
+            sum(&GridView::new(lattice, &voxels, walks.into()).unwrap())
         })
         .collect();
     mean_and_error(&samples)
@@ -594,7 +594,7 @@ fn walks_end_where_max_scatterings_says() {
     let lattice = Lattice::cubic(cube(5.0), 6).unwrap();
     let cell = lattice.cell();
     let volume = f64::from(cell.x * cell.y * cell.z);
-    let all = |grid: &Grid<'_>| -> f64 {
+    let all = |grid: &GridView<'_>| -> f64 {
         let cells = (0..lattice.cell_count()).map(|i| f64::from(grid.fluence(lattice.centre(i)).unwrap()));
         cells.sum::<f64>() * volume
     };

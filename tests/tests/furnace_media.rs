@@ -3,7 +3,7 @@
 use fogbow::host::{Empty, Hit, Medium, Scene};
 use fogbow::light::{EnvironmentMap, Light, MeshLight, PointLight, QuadLight, SphereLight, Triangle};
 use fogbow::math::{Affine3, Mat3, Ray, Vec2, Vec3, float::PI};
-use fogbow::medium::{Density, FractalNoise, Grid, Homogeneous, MinMax, Noise, Overlap, Placed, Region};
+use fogbow::medium::{Density, DensityGrid, FractalNoise, Homogeneous, MinMax, Noise, Overlap, Placed, Region};
 use fogbow::path::{self, Settings};
 use fogbow::phase::{Lobe, Phase};
 use fogbow::sampling::{Generator, distance::Equiangular, uniform, uniform2, warp};
@@ -62,18 +62,20 @@ fn every_medium_that_only_scatters_vanishes_under_a_uniform_sky() {
     let bytes: Vec<u8> = values.iter().map(|v| (v * 255.0) as u8).collect();
     let nothing = vec![0.0; values.len()];
     let holes = [Region::sphere(Vec3::new(0.2, 0.1, 0.3), 0.5).unwrap()];
-    let count = Grid::block_count(SIZE);
+    let count = DensityGrid::block_count(SIZE);
     for scattering in [Spectrum::splat(4.0), COLOURED] {
         let phase: Phase = Lobe::HenyeyGreenstein { g: 0.6 }.into();
         for (name, density) in [("f32", Density::F32(&values)), ("u8", Density::U8(&bytes))] {
             let mut blocks = vec![MinMax::default(); count];
-            let grid = Grid::new(SIZE, density, Spectrum::ZERO, scattering, phase, placement(), &mut blocks).unwrap();
+            let grid =
+                DensityGrid::new(SIZE, density, Spectrum::ZERO, scattering, phase, placement(), &mut blocks).unwrap();
             assert_white_furnace(&grid, &format!("grid {name} {scattering:?}"));
             let placed = Placed::new(grid, Region::sphere(Vec3::ZERO, 1.1).unwrap()).with_holes(&holes);
             assert_white_furnace(&placed, &format!("grid {name} with holes {scattering:?}"));
             let mut other = vec![MinMax::default(); count];
             let both =
-                Overlap::new(std::slice::from_ref(&placed), |m: &Placed<'_, Grid<'_>>| m.medium().phase()).unwrap();
+                Overlap::new(std::slice::from_ref(&placed), |m: &Placed<'_, DensityGrid<'_>>| m.medium().phase())
+                    .unwrap();
             assert_white_furnace(&both, "overlap of one");
             let separate = grid_with_absorption(density, &nothing, scattering, &mut other);
             assert_white_furnace(&separate, &format!("grid {name}, absorption of its own, 0"));
@@ -92,9 +94,9 @@ fn grid_with_absorption<'a>(
     absorption: &'a [f32],
     scattering: Spectrum,
     blocks: &'a mut [MinMax],
-) -> Grid<'a> {
+) -> DensityGrid<'a> {
     let more = vec![MinMax::default(); blocks.len()].leak();
-    Grid::new(SIZE, density, Spectrum::ONE, scattering, Phase::ISOTROPIC, placement(), blocks)
+    DensityGrid::new(SIZE, density, Spectrum::ONE, scattering, Phase::ISOTROPIC, placement(), blocks)
         .and_then(|grid| grid.with_absorption_grid(Density::F32(absorption), more))
         .unwrap()
 }
@@ -138,11 +140,11 @@ fn mixtures_have_a_density_that_is_one() {
 #[test]
 fn transmittance_and_flights_agree_with_the_optical_thickness() {
     let values = densities();
-    let count = Grid::block_count(SIZE);
+    let count = DensityGrid::block_count(SIZE);
     let mut blocks = vec![MinMax::default(); count];
     let holes = [Region::sphere(Vec3::new(0.2, 0.1, 0.3), 0.3).unwrap()];
     for colour in [Spectrum::splat(1.5), Spectrum::new(0.0, 0.7, 3.0)] {
-        let grid = Grid::new(
+        let grid = DensityGrid::new(
             SIZE,
             Density::F32(&values),
             colour * 0.25,
@@ -178,9 +180,9 @@ fn transmittance_and_flights_agree_with_the_optical_thickness() {
 #[test]
 fn glowing_media_look_like_emission_over_absorption() {
     let values = vec![1.0; densities().len()];
-    let mut blocks = vec![MinMax::default(); Grid::block_count(SIZE)];
+    let mut blocks = vec![MinMax::default(); DensityGrid::block_count(SIZE)];
     for scattering in [Spectrum::ZERO, Spectrum::splat(40.0), Spectrum::new(10.0, 20.0, 60.0)] {
-        let grid = Grid::new(
+        let grid = DensityGrid::new(
             SIZE,
             Density::F32(&values),
             Spectrum::splat(40.0),
@@ -204,9 +206,11 @@ fn glowing_media_look_like_emission_over_absorption() {
 fn what_glows_without_extinction_is_seen() {
     let values = vec![1.0; densities().len()];
     let nothing = vec![0.0; values.len()];
-    let (mut a, mut b) =
-        (vec![MinMax::default(); Grid::block_count(SIZE)], vec![MinMax::default(); Grid::block_count(SIZE)]);
-    let flame = Grid::new(
+    let (mut a, mut b) = (
+        vec![MinMax::default(); DensityGrid::block_count(SIZE)],
+        vec![MinMax::default(); DensityGrid::block_count(SIZE)],
+    );
+    let flame = DensityGrid::new(
         SIZE,
         Density::F32(&nothing),
         Spectrum::ONE,
@@ -449,8 +453,8 @@ fn connections_and_hits_add_up_to_what_hits_alone_find() {
     let coloured =
         Homogeneous::new(Spectrum::splat(0.05), Spectrum::new(0.2, 0.5, 1.0), Lobe::HenyeyGreenstein { g: 0.4 });
     let values = densities();
-    let mut blocks = vec![MinMax::default(); Grid::block_count(SIZE)];
-    let grid = Grid::new(
+    let mut blocks = vec![MinMax::default(); DensityGrid::block_count(SIZE)];
+    let grid = DensityGrid::new(
         SIZE,
         Density::F32(&values),
         Spectrum::splat(0.2),

@@ -3,7 +3,7 @@
 use fogbow::host::Medium;
 use fogbow::light::{Falloff, Source};
 use fogbow::math::{Affine3, Bounds, Frame, Mat3, Ray, Vec2, Vec3};
-use fogbow::medium::{Density, Grid, Homogeneous, MinMax, Placed, Region};
+use fogbow::medium::{Density, DensityGrid, Homogeneous, MinMax, Placed, Region};
 use fogbow::multiple_scatter::Weight;
 use fogbow::phase::{Deflection, Lobe, Phase, deflection};
 use fogbow::sampling::warp::uniform_sphere;
@@ -317,13 +317,13 @@ proptest! {
     ) {
         prop_assume!(x.distance(far) > 0.5);
         let size = [6, 5, 4];
-        let mut blocks = vec![MinMax::default(); Grid::block_count(size)];
+        let mut blocks = vec![MinMax::default(); DensityGrid::block_count(size)];
         let frame = Frame::around(turn);
         let axes = Mat3::from_cols(frame.u * 2.0, frame.v * 1.6, frame.w * 1.8);
         let place = Affine3::from_mat3_translation(axes, -(frame.u + frame.v * 0.8 + frame.w * 0.9));
         let (soot, fog) = (Spectrum::new(0.2, 0.5, 0.1), Spectrum::new(1.0, 0.3, 0.2));
         let grid =
-            Grid::new(size, Density::F32(&densities), soot, fog, Lobe::Isotropic, place, &mut blocks).unwrap();
+            DensityGrid::new(size, Density::F32(&densities), soot, fog, Lobe::Isotropic, place, &mut blocks).unwrap();
         check_thickness(&Complaining::new(grid), x, far, Marching::midpoints(4000))?;
     }
 }

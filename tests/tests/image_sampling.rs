@@ -1,6 +1,6 @@
 //! Adaptive sampling of images: means stay what they are, borders stay sharp, noise is evened out.
 
-use fogbow::covariance::image_sampling::{Computed, FillingIn, LEAST_PLAN, Outlook, Output, Plan, Planning};
+use fogbow::covariance::image_sampling::{Computed, FillingIn, LEAST_PLAN, Outlook, Plan, PlanOutput, Planning};
 use fogbow::math::Symmetric2;
 use fogbow::sampling::{Generator, uniform};
 use fogbow::spectrum::Spectrum;
@@ -11,7 +11,7 @@ use fogbow_std::threads::{self, Threads};
 
 fn planned(size: u32, share: f32, outlooks: &[Outlook]) -> Plan<'static> {
     let mut planning = Planning::new([size, size], share).unwrap();
-    work::finish(&mut planning, outlooks, &mut Output::default());
+    work::finish(&mut planning, outlooks, &mut PlanOutput::default());
     assert!(!planning.is_cut());
     planning.finish()
 }

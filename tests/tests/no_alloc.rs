@@ -92,13 +92,13 @@ fn hosts_give_the_bits_that_the_program_gives() {
         lent::read_caches(out, &driven(filling, world).finish(), world);
     });
     let beams = folded(|out, world| {
-        let pass = beams::Pass::new(&lent::beam_settings(world), 0, |_, pass| pass);
+        let pass = beams::BeamPass::new(&lent::beam_settings(world), 0, |_, pass| pass);
         lent::gather_beams(out, &driven(pass, world).finish().unwrap(), world);
     });
     let vpl = folded(|out, world| {
         let mut witnesses = Vec::new();
         lent::each_witness(world, |witness| witnesses.push(witness));
-        let pass = vpl::Pass::new(&lent::light_settings(world), 0, Independent, &witnesses);
+        let pass = vpl::VplPass::new(&lent::light_settings(world), 0, Independent, &witnesses);
         lent::see_lights(out, driven(pass, world).finish().unwrap().as_slice(), world);
     });
     assert_eq!([cache, beams, vpl], ["cache", "beams", "vpl"].map(of_kernel));

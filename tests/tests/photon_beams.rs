@@ -2,7 +2,7 @@
 
 use core::num::NonZero;
 
-use fogbow::beams::{Beams, Output, Pass, PassError, Piece, Settings, kernel, pieces, shoot};
+use fogbow::beams::{BeamOutput, BeamPass, BeamPassError, Beams, Piece, Settings, kernel, pieces, shoot};
 use fogbow::host::{Empty, Hit, Medium, Rng, Scene};
 use fogbow::light::{Light, PointLight, QuadLight};
 use fogbow::math::{Bounds, Ray, Vec3, float::PI};
@@ -198,12 +198,12 @@ proptest! {
 #[test]
 fn lent_storage_that_is_too_small_says_so() {
     let all = random_beams(1, 40);
-    let (mut slots, mut nodes) = (vec![Piece::default(); 40], vec![fogbow::beams::Node::default(); 41]);
+    let (mut slots, mut nodes) = (vec![Piece::default(); 40], vec![fogbow::beams::BeamNode::default(); 41]);
     let mut beams = Beams::new(&mut slots[..], &mut nodes[..]);
     all.iter().for_each(|&piece| beams.push(piece).unwrap());
     assert!(beams.push(all[0]).is_err());
     beams.build(1).unwrap();
-    let mut few = [fogbow::beams::Node::default(); 3];
+    let mut few = [fogbow::beams::BeamNode::default(); 3];
     let mut slots = vec![Piece::default(); 40];
     let mut beams = Beams::new(&mut slots[..], &mut few[..]);
     all.iter().for_each(|&piece| beams.push(piece).unwrap());
@@ -333,10 +333,10 @@ fn render(
     tiles: &tiles::Settings,
     settings: &Settings,
     world: &World<'_, impl Medium + Sync, impl Scene + Sync>,
-) -> Result<tiles::Outcome, ProgressiveError<PassError>> {
+) -> Result<tiles::Outcome, ProgressiveError<BeamPassError>> {
     let settings = &Settings { seed: tiles.seed, ..*settings };
     let make = |pass: u32, runner: &progressive::Runner<'_>| {
-        let mut pass = Pass::new(settings, pass, |_, radius| radius);
+        let mut pass = BeamPass::new(settings, pass, |_, radius| radius);
         runner.run(&mut pass, world);
         pass.finish()
     };
@@ -433,8 +433,8 @@ fn wide_beams_are_fewer_and_keep_their_light() {
         let seed = rng.next_u64();
         let [every, some] = [wide, narrow].map(|radius| {
             let settings = Settings { paths: 64, radius, longest: 0.4, seed, ..usual() };
-            let mut pass = Pass::new(&settings, 0, |_, _| wide);
-            work::finish(&mut pass, &world, &mut Output::default());
+            let mut pass = BeamPass::new(&settings, 0, |_, _| wide);
+            work::finish(&mut pass, &world, &mut BeamOutput::default());
             pass.finish().unwrap()
         });
         all += every.pieces().len();
@@ -473,7 +473,7 @@ fn what_beams_cannot_do_is_an_error() {
     // Without lights there is nothing to send: black, and no error.
     assert!(render(&fog(0.1, 1.0, 0.0), good).is_ok());
     let glowing = fog(0.1, 1.0, 0.0).with_emission(Spectrum::ONE).unwrap();
-    assert_eq!(render(&glowing, good).unwrap_err(), ProgressiveError::Method(PassError::Glowing));
+    assert_eq!(render(&glowing, good).unwrap_err(), ProgressiveError::Method(BeamPassError::Glowing));
     for bad in [
         Settings { paths: 0, ..good },
         Settings { radius: 0.0, ..good },
@@ -481,7 +481,7 @@ fn what_beams_cannot_do_is_an_error() {
         Settings { longest: f32::INFINITY, ..good },
         Settings { alpha: 1.5, ..good },
     ] {
-        assert_eq!(render(&fog(0.1, 1.0, 0.0), bad).unwrap_err(), ProgressiveError::Method(PassError::Settings));
+        assert_eq!(render(&fog(0.1, 1.0, 0.0), bad).unwrap_err(), ProgressiveError::Method(BeamPassError::Settings));
     }
 }
 
@@ -491,24 +491,24 @@ fn what_lent_memory_cannot_hold_is_an_error_and_no_part_of_the_light() {
     let world = World { medium: &room, scene: &Room, lights: &lights };
     let settings = Settings { paths: 200, ..usual() };
     let grown = || {
-        let mut pass = Pass::new(&settings, 3, |_, radius| radius);
-        work::finish(&mut pass, &world, &mut Output::default());
+        let mut pass = BeamPass::new(&settings, 3, |_, radius| radius);
+        work::finish(&mut pass, &world, &mut BeamOutput::default());
         pass.finish().unwrap()
     };
     let expected = grown();
     let count = expected.pieces().len();
     let lent = |pieces: usize, nodes: usize, of_job: usize| {
-        let (mut pieces, mut nodes) = (vec![Piece::default(); pieces], vec![fogbow::beams::Node::default(); nodes]);
+        let (mut pieces, mut nodes) = (vec![Piece::default(); pieces], vec![fogbow::beams::BeamNode::default(); nodes]);
         let mut slots = vec![Piece::default(); of_job];
         let beams = Beams::new(&mut pieces[..], &mut nodes[..]);
-        let mut pass = Pass::new_in(beams, &settings, 3, |_, radius| radius);
-        work::finish(&mut pass, &world, &mut Output::new(&mut slots[..]));
+        let mut pass = BeamPass::new_in(beams, &settings, 3, |_, radius| radius);
+        work::finish(&mut pass, &world, &mut BeamOutput::new(&mut slots[..]));
         pass.finish().map(|beams| beams.pieces().to_vec())
     };
     assert_eq!(lent(count, count + 1, count).as_deref(), Ok(expected.pieces()));
-    assert_eq!(lent(count - 1, count + 1, count), Err(PassError::TooMany));
-    assert_eq!(lent(count, 1, count), Err(PassError::TooMany));
-    assert_eq!(lent(count, count + 1, 8), Err(PassError::TooMany));
+    assert_eq!(lent(count - 1, count + 1, count), Err(BeamPassError::TooMany));
+    assert_eq!(lent(count, 1, count), Err(BeamPassError::TooMany));
+    assert_eq!(lent(count, count + 1, 8), Err(BeamPassError::TooMany));
 }
 
 #[test]
@@ -517,12 +517,12 @@ fn a_pass_that_is_stopped_keeps_all_light() {
     let world = World { medium: &room, scene: &Room, lights: &lights };
     // So wide that some beams of a few paths reach any eye ray.
     let settings = Settings { paths: 200, ..usual() };
-    let mut pass = Pass::new(&settings, 0, |_, _| 0.5);
-    work::step(&mut pass, &world, &mut Output::default());
+    let mut pass = BeamPass::new(&settings, 0, |_, _| 0.5);
+    work::step(&mut pass, &world, &mut BeamOutput::default());
     let part = pass.finish().unwrap();
     // The first 64 paths, as many as a job has.
-    let mut pass = Pass::new(&Settings { paths: 64, ..settings }, 0, |_, _| 0.5);
-    work::finish(&mut pass, &world, &mut Output::default());
+    let mut pass = BeamPass::new(&Settings { paths: 64, ..settings }, 0, |_, _| 0.5);
+    work::finish(&mut pass, &world, &mut BeamOutput::default());
     let whole = pass.finish().unwrap();
     assert_eq!(part.pieces(), whole.pieces());
     let [part, whole] =

@@ -3,9 +3,9 @@
 use core::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 use fogbow::cache::{
-    Asked, Block, Effort, Estimate, EyeSettings, Facing, Filling, Guide, Index, IndexRoom, Kind, KindSlots, Limits,
-    Memory, Node, Output, Place, RadianceCaches, Reading, Record, Room as Lengths, Settings, Slots, Wanted, clearance,
-    places, room_for,
+    Asked, Block, Effort, Estimate, Facing, FilledRecords, Filling, FillingMemory, Guide, Index, IndexNode, IndexRoom,
+    Kind, KindSlots, Limits, Place, RadianceCaches, RaySettings, Reading, Record, Room as Lengths, Settings, Slots,
+    Wanted, clearance, places, room_for,
 };
 use fogbow::host::{Gradients, MajorantSegment, Medium, Properties};
 use fogbow::light::{Light, PointLight};
@@ -26,7 +26,7 @@ use fogbow_std::threads::{Ending, Threads, run};
 use fogbow_std::tiles;
 use fogbow_tests::hosts::{Ball, Body, Filled};
 
-const EYE: EyeSettings = EyeSettings { density: 6.0, connections: 4, lights_visible: true, indirect: true };
+const EYE: RaySettings = RaySettings { density: 6.0, connections: 4, lights_visible: true, indirect: true };
 /// About the angle between pixels of an image of 16 × 16 (rad).
 const PIXEL: f32 = 0.06;
 
@@ -169,7 +169,7 @@ fn a_fill_a_few_jobs_at_a_time_in_any_order_has_the_same_bits() {
     let (fog, room, lights) = (fog(), room(), [lamp()]);
     let world = World { medium: &fog, scene: &room, lights: &lights };
     let mut filling = RadianceCaches::new(settings()).fill(VIEW);
-    let mut slots: Vec<Output<'static>> = (0..5).map(|_| Output::default()).collect();
+    let mut slots: Vec<FilledRecords<'static>> = (0..5).map(|_| FilledRecords::default()).collect();
     let mut frame = 0_u32;
     while !jobs(&filling).is_empty() {
         // So many jobs a frame, the last first; of every third frame only the first result is taken, the rest is lost.
@@ -193,7 +193,7 @@ fn jobs(filling: &Filling<'static, Eye>) -> core::ops::Range<u32> {
     Rounds::<Room<'_>>::jobs(filling)
 }
 
-fn take(filling: &mut Filling<'static, Eye>, output: &Output<'static>) {
+fn take(filling: &mut Filling<'static, Eye>, output: &FilledRecords<'static>) {
     Rounds::<Room<'_>>::accept(filling, output);
 }
 
@@ -203,7 +203,7 @@ fn a_box_of_points_has_records_everywhere_in_it() {
     let world = World { medium: &fog, scene: &room, lights: &lights };
     let bounds = Bounds { min: Vec3::splat(-0.8), max: Vec3::splat(0.8) };
     let mut filling = RadianceCaches::new(settings()).fill(Asked::<Eye>::Box(bounds));
-    finish(&mut filling, &world, &mut Output::default());
+    finish(&mut filling, &world, &mut FilledRecords::default());
     let caches = filling.finish();
     let read = caches.volume(Kind::Multiple).unwrap();
     let mut rng = Generator::new(3);
@@ -292,7 +292,7 @@ fn filling_for_another_view_adds_what_is_missing_there() {
     let (room, fog, lights) = (room(), fog(), [lamp()]);
     let world = World { medium: &fog, scene: &room, lights: &lights };
     let mut filling = caches.fill(Asked::View { ray: other, pixel: PIXEL });
-    finish(&mut filling, &world, &mut Output::default());
+    finish(&mut filling, &world, &mut FilledRecords::default());
     for (before, after) in before.into_iter().zip(counts(&filling.finish())) {
         assert!(after >= before && after <= before + before / 4 + 1, "{before} records, then {after}");
     }
@@ -365,7 +365,7 @@ fn a_fill_cancelled_on_its_way_leaves_caches_that_serve_and_goes_on_to_the_same_
         // The fill itself goes on where it was.
         let (fog, room, lights) = (fog(), room(), [lamp()]);
         let world = World { medium: &fog, scene: &room, lights: &lights };
-        finish(&mut filling, &world, &mut Output::default());
+        finish(&mut filling, &world, &mut FilledRecords::default());
         assert!(stored(&filling.finish()) == stored(&whole), "{questions}");
     }
 }
@@ -387,7 +387,7 @@ fn an_estimate_of_nothing_fills_no_radius() {
     let (room, medium) = (room(), fog());
     let world = World { medium: &medium, scene: &room, lights: &[] };
     let mut filling = RadianceCaches::new(settings()).fill(VIEW);
-    finish(&mut filling, &world, &mut Output::default());
+    finish(&mut filling, &world, &mut FilledRecords::default());
     let caches = filling.finish();
     for kind in [Kind::Single, Kind::Surface, Kind::Multiple] {
         let records = caches.records(kind);
@@ -397,7 +397,7 @@ fn an_estimate_of_nothing_fills_no_radius() {
 
 /// What an index lies in.
 struct OfIndex {
-    nodes: Vec<Node>,
+    nodes: Vec<IndexNode>,
     entries: Vec<u32>,
     spheres: Vec<[f32; 4]>,
     blocks: Vec<Block>,
@@ -406,7 +406,7 @@ struct OfIndex {
 impl OfIndex {
     fn new(room: IndexRoom) -> Self {
         Self {
-            nodes: vec![Node::default(); room.nodes],
+            nodes: vec![IndexNode::default(); room.nodes],
             entries: vec![0; room.entries],
             spheres: vec![[0.0; 4]; room.spheres],
             blocks: vec![Block::default(); room.blocks],
@@ -440,7 +440,7 @@ fn filled_in(room: &Lengths) -> (Vec<u8>, bool, [usize; 6]) {
     let mut estimates = vec![Estimate::default(); room.estimates];
     let mut of_estimates = vec![Coefficient::ZERO; room.higher];
     let mut guides = room.guides.map(|count| vec![Guide::default(); count]);
-    let memory = Memory::lent(Slots {
+    let memory = FillingMemory::lent(Slots {
         wanted: &mut wanted,
         open: [&mut open, &mut still_open],
         chosen: &mut chosen,
@@ -452,7 +452,7 @@ fn filled_in(room: &Lengths) -> (Vec<u8>, bool, [usize; 6]) {
     let mut open_of_job = vec![0; room.of_job_open];
     let mut higher_of_job = vec![Coefficient::ZERO; room.of_job_higher];
     let mut filling = caches.fill_in(memory, VIEW);
-    finish(&mut filling, &world, &mut Output::lent(&mut of_job, &mut open_of_job, &mut higher_of_job));
+    finish(&mut filling, &world, &mut FilledRecords::lent(&mut of_job, &mut open_of_job, &mut higher_of_job));
     let is_cut = filling.is_cut();
     let caches = filling.finish();
     // Whatever there is can be read.

@@ -381,8 +381,8 @@ fn ball() -> Ball {
 /// A pass by whatever runs it, with witnesses along a line through the ball.
 fn lights_of_a_pass(
     settings: impl Fn(vpl::Settings) -> vpl::Settings,
-    run: impl Fn(&mut vpl::Pass<'_, Independent>, &World<'_, Ball, Empty>),
-) -> Result<Vec<VirtualLight>, vpl::PassError> {
+    run: impl Fn(&mut vpl::VplPass<'_, Independent>, &World<'_, Ball, Empty>),
+) -> Result<Vec<VirtualLight>, vpl::VplPassError> {
     let ball = ball();
     let lamps = [Light::Point(PointLight::from_flux(Vec3::Z * 0.2, Spectrum::ONE).unwrap())];
     let world = World { medium: &ball, scene: &Empty, lights: &lamps };
@@ -391,7 +391,7 @@ fn lights_of_a_pass(
     let mut witnesses = Vec::new();
     let eye = |[x, y]: [f32; 2], _: &mut Generator| Ray::between(Vec3::NEG_Z * 2.0, Vec3::new(x - 0.5, y - 0.5, 0.0));
     vpl::witnesses(&world, &settings, eye, |witness| witnesses.push(witness));
-    let mut pass = vpl::Pass::new(&settings, 2, Independent, &witnesses);
+    let mut pass = vpl::VplPass::new(&settings, 2, Independent, &witnesses);
     run(&mut pass, &world);
     pass.finish().map(|lights| lights.as_slice().to_vec())
 }
@@ -399,24 +399,24 @@ fn lights_of_a_pass(
 #[test]
 fn a_pass_has_the_same_lights_however_its_jobs_are_run() {
     let serial = |settings: &dyn Fn(vpl::Settings) -> vpl::Settings| {
-        lights_of_a_pass(settings, |pass, world| work::finish(pass, world, &mut vpl::Output::default())).unwrap()
+        lights_of_a_pass(settings, |pass, world| work::finish(pass, world, &mut vpl::VplOutput::default())).unwrap()
     };
     let expected = serial(&|settings| settings);
     assert!(expected.len().abs_diff(150) <= 1, "{} lights kept", expected.len());
     for threads in [2, 5] {
         let threads = Threads::new(threads).unwrap();
-        let run = |pass: &mut vpl::Pass<'_, Independent>, world: &World<'_, Ball, Empty>| {
+        let run = |pass: &mut vpl::VplPass<'_, Independent>, world: &World<'_, Ball, Empty>| {
             threads::run(pass, world, &threads, &Control::default(), None, |_| {});
         };
         assert_eq!(lights_of_a_pass(|settings| settings, run).as_ref(), Ok(&expected));
     }
     // Every job in memory that held another's results, the last first.
-    let backwards = |pass: &mut vpl::Pass<'_, Independent>, world: &World<'_, Ball, Empty>| {
+    let backwards = |pass: &mut vpl::VplPass<'_, Independent>, world: &World<'_, Ball, Empty>| {
         while !Rounds::<World<'_, Ball, Empty>>::jobs(pass).is_empty() {
             let jobs = Rounds::<World<'_, Ball, Empty>>::jobs(pass);
             let end = jobs.end.min(jobs.start + 3);
             let outputs = (jobs.start..end).rev().map(|job| {
-                let mut output = vpl::Output::default();
+                let mut output = vpl::VplOutput::default();
                 pass.run((job + 1).min(jobs.end - 1), world, &mut output);
                 pass.run(job, world, &mut output);
                 output
@@ -436,7 +436,9 @@ fn lights_that_are_kept_shine_for_those_that_are_not() {
     let flux = |lights: &[VirtualLight]| lights.iter().map(|light| f64::from(light.flux.mean())).sum::<f64>();
     let of = |candidates: u32, seed: u64| {
         let change = |settings| vpl::Settings { candidates, seed, ..settings };
-        flux(&lights_of_a_pass(change, |pass, world| work::finish(pass, world, &mut vpl::Output::default())).unwrap())
+        flux(
+            &lights_of_a_pass(change, |pass, world| work::finish(pass, world, &mut vpl::VplOutput::default())).unwrap(),
+        )
     };
     // Of the same paths: their seed is the same.
     let (mut sum, mut squares) = (0.0, 0.0);
@@ -457,7 +459,7 @@ fn a_pass_that_is_stopped_keeps_all_light() {
             |settings| settings,
             |pass, world| {
                 for _ in 0..jobs {
-                    work::step(pass, world, &mut vpl::Output::default());
+                    work::step(pass, world, &mut vpl::VplOutput::default());
                 }
             },
         )
@@ -465,7 +467,7 @@ fn a_pass_that_is_stopped_keeps_all_light() {
     };
     let all = |paths: u32| {
         let change = |settings| vpl::Settings { paths, candidates: 1, ..settings };
-        lights_of_a_pass(change, |pass, world| work::finish(pass, world, &mut vpl::Output::default())).unwrap()
+        lights_of_a_pass(change, |pass, world| work::finish(pass, world, &mut vpl::VplOutput::default())).unwrap()
     };
     // While paths are followed: those so far. 64 of them are a job.
     assert_eq!(part(3), all(3 * 64));
@@ -480,18 +482,18 @@ fn a_pass_that_is_stopped_keeps_all_light() {
 #[test]
 fn what_a_pass_cannot_do_is_an_error() {
     let finish = |settings: &dyn Fn(vpl::Settings) -> vpl::Settings| {
-        lights_of_a_pass(settings, |pass, world| work::finish(pass, world, &mut vpl::Output::default()))
+        lights_of_a_pass(settings, |pass, world| work::finish(pass, world, &mut vpl::VplOutput::default()))
     };
-    assert_eq!(finish(&|settings| vpl::Settings { lights: 0, ..settings }), Err(vpl::PassError::Settings));
-    assert_eq!(finish(&|settings| vpl::Settings { points: 0, ..settings }), Err(vpl::PassError::Settings));
+    assert_eq!(finish(&|settings| vpl::Settings { lights: 0, ..settings }), Err(vpl::VplPassError::Settings));
+    assert_eq!(finish(&|settings| vpl::Settings { points: 0, ..settings }), Err(vpl::VplPassError::Settings));
     let glowing = Homogeneous::new(Spectrum::ONE, Spectrum::ONE, Phase::ISOTROPIC)
         .and_then(|fog| fog.with_emission(Spectrum::ONE))
         .unwrap();
     let world = World { medium: &glowing, scene: &Empty, lights: &[] };
     let settings = vpl::Settings::for_outline(&Outline::of(&world, BOUNDS));
-    let mut pass = vpl::Pass::new(&settings, 0, Independent, &[]);
-    work::finish(&mut pass, &world, &mut vpl::Output::default());
-    assert_eq!(pass.finish().map(|lights| lights.len()), Err(vpl::PassError::Glowing));
+    let mut pass = vpl::VplPass::new(&settings, 0, Independent, &[]);
+    work::finish(&mut pass, &world, &mut vpl::VplOutput::default());
+    assert_eq!(pass.finish().map(|lights| lights.len()), Err(vpl::VplPassError::Glowing));
 }
 
 #[test]
@@ -503,27 +505,27 @@ fn a_pass_in_lent_memory_has_the_same_lights_or_is_an_error() {
     let properties = ball.properties(Vec3::ZERO);
     let witnesses = [Receiver::in_medium(Vec3::X * 0.3, Vec3::NEG_Z, &properties).unwrap()];
     let grown = || {
-        let mut pass = vpl::Pass::new(&settings, 0, Independent, &witnesses);
-        work::finish(&mut pass, &world, &mut vpl::Output::default());
+        let mut pass = vpl::VplPass::new(&settings, 0, Independent, &witnesses);
+        work::finish(&mut pass, &world, &mut vpl::VplOutput::default());
         pass.finish().unwrap().as_slice().to_vec()
     };
     let all = {
-        let mut pass = vpl::Pass::new(&settings, 0, Independent, &[]);
-        work::finish(&mut pass, &world, &mut vpl::Output::default());
+        let mut pass = vpl::VplPass::new(&settings, 0, Independent, &[]);
+        work::finish(&mut pass, &world, &mut vpl::VplOutput::default());
         pass.finish().unwrap().len()
     };
     assert!(all > 50);
     let lent = |lights: usize, others: usize| {
         let dark = VirtualLight::in_medium(Vec3::ZERO, Vec3::Z, Spectrum::ZERO, 1, &Phase::ISOTROPIC);
-        let (mut lights, mut order) = (vec![dark; lights], vec![vpl::Place::default(); others]);
+        let (mut lights, mut order) = (vec![dark; lights], vec![vpl::CurvePlace::default(); others]);
         let (mut importance, mut seen) = (vec![0.0; others], vec![0.0; others]);
         let (mut of_job, mut seen_by_job) = (vec![dark; all], [0.0; 512]);
-        let memory = vpl::Memory::new(&mut lights[..], &mut order[..], &mut importance[..], &mut seen[..]);
-        let mut pass = vpl::Pass::new_in(memory, &settings, 0, Independent, &witnesses);
-        work::finish(&mut pass, &world, &mut vpl::Output::new(&mut of_job[..], &mut seen_by_job[..]));
+        let memory = vpl::VplMemory::new(&mut lights[..], &mut order[..], &mut importance[..], &mut seen[..]);
+        let mut pass = vpl::VplPass::new_in(memory, &settings, 0, Independent, &witnesses);
+        work::finish(&mut pass, &world, &mut vpl::VplOutput::new(&mut of_job[..], &mut seen_by_job[..]));
         pass.finish().map(|lights| lights.as_slice().to_vec())
     };
     assert_eq!(lent(all, all), Ok(grown()));
-    assert_eq!(lent(all - 1, all), Err(vpl::PassError::TooMany));
-    assert_eq!(lent(all, all - 1), Err(vpl::PassError::TooMany));
+    assert_eq!(lent(all - 1, all), Err(vpl::VplPassError::TooMany));
+    assert_eq!(lent(all, all - 1), Err(vpl::VplPassError::TooMany));
 }

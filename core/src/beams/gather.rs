@@ -3,7 +3,7 @@
 use super::kernel;
 use super::thickness::Thickness;
 use super::tree;
-use super::{Node, Piece};
+use super::{BeamNode, Piece};
 use crate::host::{Medium, Rng};
 use crate::math::float::{self, PI};
 use crate::math::{Bounds, Ray};
@@ -26,11 +26,11 @@ const MAX_PARTS: f32 = 32.0;
 /// Photon beams, in storage lent or growing.
 ///
 /// ```
-/// # use fogbow::{beams::{Beams, Node, Piece}, math::*, medium::Homogeneous, phase::Lobe};
+/// # use fogbow::{beams::{Beams, BeamNode, Piece}, math::*, medium::Homogeneous, phase::Lobe};
 /// # use fogbow::{sampling::Generator, spectrum::Spectrum};
 /// // One beam of 1 W along +z in thin fog, seen from the side.
 /// let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::splat(1e-3), Lobe::Isotropic)?;
-/// let (mut pieces, mut nodes) = ([Piece::default(); 1], [Node::default(); 2]);
+/// let (mut pieces, mut nodes) = ([Piece::default(); 1], [BeamNode::default(); 2]);
 /// let mut beams = Beams::new(&mut pieces[..], &mut nodes[..]);
 /// let (power, radius) = (Spectrum::ONE, 0.1);
 /// beams.push(Piece { origin: Vec3::NEG_Z, length: 2.0, direction: Vec3::Z, power, radius, ..Piece::default() })?;
@@ -45,13 +45,13 @@ const MAX_PARTS: f32 = 32.0;
 #[derive(Debug)]
 pub struct Beams<'s> {
     pieces: List<'s, Piece>,
-    nodes: List<'s, Node>,
+    nodes: List<'s, BeamNode>,
     scale: f32,
 }
 
 /// What [`Beams::gather`] found.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Gathered {
+pub struct GatheredBeams {
     /// Radiance (W·m⁻²·sr⁻¹) scattered into the eye ray.
     pub light: InScattered,
     /// Pieces that contributed: what it cost, not what is seen.
@@ -62,13 +62,13 @@ impl<'s> Beams<'s> {
     /// None so far. For `n` pieces lend `n` of `pieces` and `n + 1` of `nodes`, which always suffices.
     ///
     /// ```
-    /// # use fogbow::{beams::{Beams, Node, Piece}, spectrum::Spectrum};
-    /// let (mut pieces, mut nodes) = ([Piece::default(); 1], [Node::default(); 2]);
+    /// # use fogbow::{beams::{Beams, BeamNode, Piece}, spectrum::Spectrum};
+    /// let (mut pieces, mut nodes) = ([Piece::default(); 1], [BeamNode::default(); 2]);
     /// let mut beams = Beams::new(&mut pieces[..], &mut nodes[..]);
     /// let piece = Piece { length: 1.0, radius: 0.1, power: Spectrum::ONE, ..Piece::default() };
     /// assert!(beams.push(piece).is_ok() && beams.push(piece).is_err());
     /// ```
-    pub fn new(pieces: impl Into<List<'s, Piece>>, nodes: impl Into<List<'s, Node>>) -> Self {
+    pub fn new(pieces: impl Into<List<'s, Piece>>, nodes: impl Into<List<'s, BeamNode>>) -> Self {
         Self { pieces: pieces.into(), nodes: nodes.into(), scale: 0.0 }
     }
 
@@ -102,8 +102,8 @@ impl<'s> Beams<'s> {
     /// Forgets all pieces and keeps the memory.
     ///
     /// ```
-    /// # use fogbow::{beams::{Beams, Node, Piece}, math::Bounds, spectrum::Spectrum};
-    /// let (mut pieces, mut nodes) = ([Piece::default(); 1], [Node::default(); 2]);
+    /// # use fogbow::{beams::{Beams, BeamNode, Piece}, math::Bounds, spectrum::Spectrum};
+    /// let (mut pieces, mut nodes) = ([Piece::default(); 1], [BeamNode::default(); 2]);
     /// let mut beams = Beams::new(&mut pieces[..], &mut nodes[..]);
     /// let piece = Piece { length: 1.0, radius: 0.1, power: Spectrum::ONE, ..Piece::default() };
     /// beams.push(piece)?;
@@ -121,8 +121,8 @@ impl<'s> Beams<'s> {
     /// The pieces, in the order of the tree.
     ///
     /// ```
-    /// # use fogbow::{beams::{Beams, Node, Piece}, spectrum::Spectrum};
-    /// let (mut pieces, mut nodes) = ([Piece::default(); 2], [Node::default(); 3]);
+    /// # use fogbow::{beams::{Beams, BeamNode, Piece}, spectrum::Spectrum};
+    /// let (mut pieces, mut nodes) = ([Piece::default(); 2], [BeamNode::default(); 3]);
     /// let mut beams = Beams::new(&mut pieces[..], &mut nodes[..]);
     /// let piece = Piece { length: 1.0, radius: 0.1, power: Spectrum::ONE, ..Piece::default() };
     /// beams.push(piece)?;
@@ -138,8 +138,8 @@ impl<'s> Beams<'s> {
     /// Memory in use (bytes), without what a `Vec` or a lent slice holds in reserve.
     ///
     /// ```
-    /// # use fogbow::{beams::{Beams, Node, Piece}, spectrum::Spectrum};
-    /// let (mut pieces, mut nodes) = ([Piece::default(); 8], [Node::default(); 9]);
+    /// # use fogbow::{beams::{Beams, BeamNode, Piece}, spectrum::Spectrum};
+    /// let (mut pieces, mut nodes) = ([Piece::default(); 8], [BeamNode::default(); 9]);
     /// let mut beams = Beams::new(&mut pieces[..], &mut nodes[..]);
     /// beams.push(Piece { length: 1.0, radius: 0.1, power: Spectrum::ONE, ..Piece::default() })?;
     /// beams.build(1)?;
@@ -165,9 +165,9 @@ impl<'s> Beams<'s> {
         medium: &M,
         most: u32,
         rng: &mut (impl Rng + ?Sized),
-    ) -> Gathered {
+    ) -> GatheredBeams {
         let (nodes, pieces) = (self.nodes.as_slice(), self.pieces.as_slice());
-        let mut found = Gathered::default();
+        let mut found = GatheredBeams::default();
         let mut thickness = None;
         tree::visit(nodes, pieces, ray, |piece| {
             if piece.scatterings >= most {
@@ -191,8 +191,8 @@ impl<'s> Beams<'s> {
     /// The box around all pieces; empty before [`Beams::build`] and without pieces.
     ///
     /// ```
-    /// # use fogbow::{beams::{Beams, Node, Piece}, math::Vec3, spectrum::Spectrum};
-    /// let (mut pieces, mut nodes) = ([Piece::default(); 1], [Node::default(); 2]);
+    /// # use fogbow::{beams::{Beams, BeamNode, Piece}, math::Vec3, spectrum::Spectrum};
+    /// let (mut pieces, mut nodes) = ([Piece::default(); 1], [BeamNode::default(); 2]);
     /// let mut beams = Beams::new(&mut pieces[..], &mut nodes[..]);
     /// beams.push(Piece { length: 2.0, direction: Vec3::Z, radius: 0.5, power: Spectrum::ONE, ..Piece::default() })?;
     /// beams.build(1)?;
@@ -201,7 +201,7 @@ impl<'s> Beams<'s> {
     /// ```
     #[must_use]
     pub fn bounds(&self) -> Bounds {
-        self.nodes.as_slice().first().map_or(Bounds::EMPTY, Node::bounds)
+        self.nodes.as_slice().first().map_or(Bounds::EMPTY, BeamNode::bounds)
     }
 }
 

@@ -13,11 +13,11 @@
 //! |---|---|
 //! | [`piece`] | [`Piece`]: a part of a beam; [`shoot`], [`pieces`]: flights cut into them |
 //! | [`kernel`] | the blur, its integral along a chord, progressive [`radius`](kernel::radius) |
-//! | `tree` | [`Node`]: boxes around pieces |
+//! | `tree` | [`BeamNode`]: boxes around pieces |
 //! | `thickness` | optical thickness along an eye ray |
 //! | [`gather`] | [`Beams`], what they scatter to an eye |
 //! | `settings` | [`Settings`]: every tuned number, from an [`Outline`](crate::world::Outline) |
-//! | `pass` | [`Pass`]: shooting as work in rounds; a sample of a pixel |
+//! | `pass` | [`BeamPass`]: shooting as work in rounds; a sample of a pixel |
 //!
 //! Departures from the paper: the blur is a disc across the *beam*, and its integral along the eye ray is
 //! taken in closed form. So no `1/sin θ` is left: the chord through a beam's cylinder grows as beams become
@@ -38,8 +38,8 @@ mod settings;
 mod thickness;
 mod tree;
 
-pub use gather::{Beams, Gathered};
-pub use pass::{Output, Pass, PassError};
+pub use gather::{Beams, GatheredBeams};
+pub use pass::{BeamOutput, BeamPass, BeamPassError};
 pub use piece::{Piece, pieces, shoot};
 pub use settings::Settings;
-pub use tree::Node;
+pub use tree::BeamNode;

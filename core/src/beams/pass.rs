@@ -21,7 +21,7 @@ const JOB: u32 = 64;
 
 /// Why there are no beams.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum PassError {
+pub enum BeamPassError {
     /// No paths or samples, or a radius, length or `alpha` out of range.
     Settings,
     /// The medium glows; photons leave lights only, so light of the medium that it scatters itself would be missing.
@@ -30,7 +30,7 @@ pub enum PassError {
     TooMany,
 }
 
-impl core::fmt::Display for PassError {
+impl core::fmt::Display for BeamPassError {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         f.write_str(match self {
             Self::Settings => "photon beams need paths, positive lengths, and alpha in (0, 1]",
@@ -40,24 +40,24 @@ impl core::fmt::Display for PassError {
     }
 }
 
-impl core::error::Error for PassError {}
+impl core::error::Error for BeamPassError {}
 
-/// What a job of a [`Pass`] leaves.
+/// What a job of a [`BeamPass`] leaves.
 #[derive(Debug)]
 #[cfg_attr(feature = "alloc", derive(Default))]
-pub struct Output<'o> {
+pub struct BeamOutput<'o> {
     pieces: List<'o, Piece>,
-    error: Option<PassError>,
+    error: Option<BeamPassError>,
 }
 
-impl<'o> Output<'o> {
+impl<'o> BeamOutput<'o> {
     /// In lent memory: for the pieces that 64 paths leave. Where that is too small, the pass ends with
-    /// [`PassError::TooMany`].
+    /// [`BeamPassError::TooMany`].
     ///
     /// ```
-    /// # use fogbow::beams::{Output, Piece};
+    /// # use fogbow::beams::{BeamOutput, Piece};
     /// let mut slots = [Piece::default(); 4096];
-    /// let output = Output::new(&mut slots[..]);
+    /// let output = BeamOutput::new(&mut slots[..]);
     /// # let _ = output;
     /// ```
     pub fn new(pieces: impl Into<List<'o, Piece>>) -> Self {
@@ -70,7 +70,7 @@ impl<'o> Output<'o> {
 /// in a [`World`].
 ///
 /// ```
-/// use fogbow::beams::{Output, Pass, Settings};
+/// use fogbow::beams::{BeamOutput, BeamPass, Settings};
 /// use fogbow::{host::Empty, light::{Light, PointLight}, math::*, medium::Homogeneous, phase::Phase};
 /// use fogbow::{sampling::Generator, spectrum::Spectrum, work, world::{Outline, World}};
 /// let fog = Homogeneous::new(Spectrum::ONE, Spectrum::ONE, Phase::ISOTROPIC)?;
@@ -79,11 +79,11 @@ impl<'o> Output<'o> {
 /// let outline = Outline::of(&world, Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE });
 /// // A pilot tells how many paths leave 20 000 pieces.
 /// let settings = Settings { pieces: 20_000, ..Settings::for_outline(&outline) };
-/// let mut pilot = Pass::pilot(&settings);
-/// work::finish(&mut pilot, &world, &mut Output::default());
+/// let mut pilot = BeamPass::pilot(&settings);
+/// work::finish(&mut pilot, &world, &mut BeamOutput::default());
 /// let settings = pilot.settings_for_pieces();
-/// let mut pass = Pass::new(&settings, 0, |_, pass| pass);
-/// work::finish(&mut pass, &world, &mut Output::default());
+/// let mut pass = BeamPass::new(&settings, 0, |_, pass| pass);
+/// work::finish(&mut pass, &world, &mut BeamOutput::default());
 /// let beams = pass.finish()?;
 /// assert!((18_000..22_000).contains(&beams.pieces().len()));
 /// // A sample of a pixel.
@@ -93,7 +93,7 @@ impl<'o> Output<'o> {
 /// # Ok::<(), Box<dyn core::error::Error>>(())
 /// ```
 #[derive(Debug)]
-pub struct Pass<'s, R> {
+pub struct BeamPass<'s, R> {
     settings: Settings,
     /// Seed of this pass, and its number.
     seed: u64,
@@ -104,21 +104,21 @@ pub struct Pass<'s, R> {
     beams: Beams<'s>,
     /// Jobs whose beams are in.
     taken: u32,
-    error: Option<PassError>,
+    error: Option<BeamPassError>,
 }
 
 /// The number of a pass that is never rendered.
 const PILOT: u32 = u32::MAX;
 
-impl<'s> Pass<'s, fn(Vec3, f32) -> f32> {
-    /// A pass that is never rendered, of 2048 paths: see [`Pass::settings_for_pieces`].
+impl<'s> BeamPass<'s, fn(Vec3, f32) -> f32> {
+    /// A pass that is never rendered, of 2048 paths: see [`BeamPass::settings_for_pieces`].
     #[cfg(feature = "alloc")]
     #[must_use]
     pub fn pilot(settings: &Settings) -> Self {
         Self::pilot_in(Beams::new(alloc::vec::Vec::new(), alloc::vec::Vec::new()), settings)
     }
 
-    /// As [`Pass::pilot`], in the memory of `beams`.
+    /// As [`BeamPass::pilot`], in the memory of `beams`.
     #[must_use]
     pub fn pilot_in(beams: Beams<'s>, settings: &Settings) -> Self {
         Self::new_in(beams, &settings.of_pilot(), PILOT, |_, pass| pass)
@@ -126,19 +126,19 @@ impl<'s> Pass<'s, fn(Vec3, f32) -> f32> {
 }
 
 #[cfg(feature = "alloc")]
-impl<R: Fn(Vec3, f32) -> f32> Pass<'static, R> {
-    /// Pass number `number`; see [`Pass`].
+impl<R: Fn(Vec3, f32) -> f32> BeamPass<'static, R> {
+    /// Pass number `number`; see [`BeamPass`].
     #[must_use]
     pub fn new(settings: &Settings, number: u32, radius: R) -> Self {
         Self::new_in(Beams::new(alloc::vec::Vec::new(), alloc::vec::Vec::new()), settings, number, radius)
     }
 }
 
-impl<'s, R: Fn(Vec3, f32) -> f32> Pass<'s, R> {
-    /// As [`Pass::new`], in the memory of `beams`, which are forgotten. Where that is lent and too small, [`Pass::finish`] says so.
+impl<'s, R: Fn(Vec3, f32) -> f32> BeamPass<'s, R> {
+    /// As [`BeamPass::new`], in the memory of `beams`, which are forgotten. Where that is lent and too small, [`BeamPass::finish`] says so.
     ///
     /// ```
-    /// use fogbow::beams::{Beams, Node, Output, Pass, Piece, Settings};
+    /// use fogbow::beams::{Beams, BeamNode, BeamOutput, BeamPass, Piece, Settings};
     /// # use fogbow::{host::Empty, light::{Light, PointLight}, math::*, medium::Homogeneous, phase::Phase};
     /// # use fogbow::{spectrum::Spectrum, work, world::{Outline, World}};
     /// # let fog = Homogeneous::new(Spectrum::ONE, Spectrum::ONE, Phase::ISOTROPIC)?;
@@ -146,11 +146,11 @@ impl<'s, R: Fn(Vec3, f32) -> f32> Pass<'s, R> {
     /// # let world = World { medium: &fog, scene: &Empty, lights: &lamps };
     /// # let outline = Outline::of(&world, Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE });
     /// let settings = Settings { paths: 16, ..Settings::for_outline(&outline) };
-    /// let (mut pieces, mut nodes) = ([Piece::default(); 2048], [Node::default(); 2049]);
+    /// let (mut pieces, mut nodes) = ([Piece::default(); 2048], [BeamNode::default(); 2049]);
     /// let mut slots = [Piece::default(); 2048];
     /// let beams = Beams::new(&mut pieces[..], &mut nodes[..]);
-    /// let mut pass = Pass::new_in(beams, &settings, 0, |_, pass| pass);
-    /// work::finish(&mut pass, &world, &mut Output::new(&mut slots[..]));
+    /// let mut pass = BeamPass::new_in(beams, &settings, 0, |_, pass| pass);
+    /// work::finish(&mut pass, &world, &mut BeamOutput::new(&mut slots[..]));
     /// assert!(!pass.finish()?.pieces().is_empty());
     /// # Ok::<(), Box<dyn core::error::Error>>(())
     /// ```
@@ -166,28 +166,28 @@ impl<'s, R: Fn(Vec3, f32) -> f32> Pass<'s, R> {
             of_pass: settings.radius_of(number),
             beams,
             taken: 0,
-            error: (!settings.is_valid()).then_some(PassError::Settings),
+            error: (!settings.is_valid()).then_some(BeamPassError::Settings),
         }
     }
 }
 
-impl<'s, R> Pass<'s, R> {
+impl<'s, R> BeamPass<'s, R> {
     /// The beams, with a tree over them. Of a pass that was stopped they are those of the paths so far, and stand for all light all the
     /// same.
     ///
     /// # Errors
-    /// See [`PassError`].
-    pub fn finish(mut self) -> Result<Beams<'s>, PassError> {
+    /// See [`BeamPassError`].
+    pub fn finish(mut self) -> Result<Beams<'s>, BeamPassError> {
         if let Some(error) = self.error {
             return Err(error);
         }
-        self.beams.build(self.paths()).map_err(|_| PassError::TooMany)?;
+        self.beams.build(self.paths()).map_err(|_| BeamPassError::TooMany)?;
         Ok(self.beams)
     }
 
     /// What went wrong so far, if anything: then no jobs are left.
     #[must_use]
-    pub fn error(&self) -> Option<PassError> {
+    pub fn error(&self) -> Option<BeamPassError> {
         self.error
     }
 
@@ -203,25 +203,25 @@ impl<'s, R> Pass<'s, R> {
     }
 }
 
-impl<M, S, R> Rounds<World<'_, M, S>> for Pass<'_, R>
+impl<M, S, R> Rounds<World<'_, M, S>> for BeamPass<'_, R>
 where
     M: Medium + ?Sized,
     S: Scene + ?Sized,
     R: Fn(Vec3, f32) -> f32,
 {
-    type Output<'o> = Output<'o>;
+    type Output<'o> = BeamOutput<'o>;
 
     fn jobs(&self) -> Range<u32> {
         if self.error.is_some() { 0..0 } else { self.taken..self.settings.paths.div_ceil(JOB) }
     }
 
-    fn run(&self, job: u32, world: &World<'_, M, S>, output: &mut Output<'_>) {
+    fn run(&self, job: u32, world: &World<'_, M, S>, output: &mut BeamOutput<'_>) {
         output.pieces.clear();
-        output.error = world.medium.is_emissive().then_some(PassError::Glowing);
+        output.error = world.medium.is_emissive().then_some(BeamPassError::Glowing);
         if output.error.is_some() {
             return;
         }
-        let Output { pieces, error } = output;
+        let BeamOutput { pieces, error } = output;
         let (settings, key) = (&self.settings, u64::from(self.number) << 32 | u64::from(job));
         let width = |point: Vec3| (self.radius)(point, self.of_pass);
         for path in job * JOB..(job * JOB).saturating_add(JOB).min(settings.paths) {
@@ -232,18 +232,18 @@ where
                     if let Some(part) = part.thinned(settings.radius, uniform(&mut thin))
                         && pieces.push(part).is_err()
                     {
-                        *error = Some(PassError::TooMany);
+                        *error = Some(BeamPassError::TooMany);
                     }
                 });
             });
         }
     }
 
-    fn accept(&mut self, output: &Output<'_>) {
+    fn accept(&mut self, output: &BeamOutput<'_>) {
         self.error = self.error.or(output.error);
         for piece in output.pieces.as_slice() {
             if self.beams.push(*piece).is_err() {
-                self.error = self.error.or(Some(PassError::TooMany));
+                self.error = self.error.or(Some(BeamPassError::TooMany));
             }
         }
         self.taken += 1;

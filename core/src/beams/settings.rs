@@ -114,7 +114,7 @@ impl Settings {
         Self { pieces: pieces as u32, ..self }
     }
 
-    /// Those of a pilot ([`Pass::pilot`](super::Pass::pilot)): 2048 paths.
+    /// Those of a pilot ([`BeamPass::pilot`](super::BeamPass::pilot)): 2048 paths.
     #[must_use]
     pub(super) fn of_pilot(self) -> Self {
         Self { paths: PILOT, ..self }

@@ -16,7 +16,7 @@ pub(super) const DEPTH: usize = 33;
 /// A box around pieces and their blur.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Pod, Zeroable)]
 #[repr(C)]
-pub struct Node {
+pub struct BeamNode {
     /// Smallest corner (m).
     min: Vec3,
     /// The second child (the first follows its parent), or the first piece.
@@ -27,19 +27,19 @@ pub struct Node {
     count: u32,
 }
 
-impl Node {
+impl BeamNode {
     pub(super) fn bounds(&self) -> Bounds {
         Bounds { min: self.min, max: self.max }
     }
 }
 
 /// Sorts `pieces` and writes the tree over them, the root first.
-pub(super) fn build(pieces: &mut [Piece], nodes: &mut List<'_, Node>) -> Result<(), Full> {
+pub(super) fn build(pieces: &mut [Piece], nodes: &mut List<'_, BeamNode>) -> Result<(), Full> {
     nodes.clear();
     if pieces.is_empty() { Ok(()) } else { divide(pieces, 0, nodes) }
 }
 
-fn divide(pieces: &mut [Piece], first: usize, nodes: &mut List<'_, Node>) -> Result<(), Full> {
+fn divide(pieces: &mut [Piece], first: usize, nodes: &mut List<'_, BeamNode>) -> Result<(), Full> {
     let (mut min, mut max) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
     let (mut low, mut high) = (min, max);
     for piece in pieces.iter() {
@@ -52,9 +52,9 @@ fn divide(pieces: &mut [Piece], first: usize, nodes: &mut List<'_, Node>) -> Res
     let number = |n: usize| u32::try_from(n).map_err(|_| Full);
     let node = nodes.as_slice().len();
     if pieces.len() <= LEAF {
-        return nodes.push(Node { min, next: number(first)?, max, count: pieces.len() as u32 });
+        return nodes.push(BeamNode { min, next: number(first)?, max, count: pieces.len() as u32 });
     }
-    nodes.push(Node { min, next: 0, max, count: 0 })?;
+    nodes.push(BeamNode { min, next: 0, max, count: 0 })?;
     let spread = high - low;
     let axis = if spread.x >= spread.max_element() {
         0
@@ -75,7 +75,7 @@ fn divide(pieces: &mut [Piece], first: usize, nodes: &mut List<'_, Node>) -> Res
 
 /// Calls `visit` for every piece whose leaf `ray` meets, always in the same order.
 #[inline]
-pub(super) fn visit<'p>(nodes: &[Node], pieces: &'p [Piece], ray: &Ray, mut visit: impl FnMut(&'p Piece)) {
+pub(super) fn visit<'p>(nodes: &[BeamNode], pieces: &'p [Piece], ray: &Ray, mut visit: impl FnMut(&'p Piece)) {
     if nodes.is_empty() {
         return;
     }
@@ -105,7 +105,7 @@ pub(super) fn visit<'p>(nodes: &[Node], pieces: &'p [Piece], ray: &Ray, mut visi
 
 /// Whether the ray comes into the box.
 #[inline]
-fn meets(node: &Node, ray: &Ray, inverse: Vec3) -> bool {
+fn meets(node: &BeamNode, ray: &Ray, inverse: Vec3) -> bool {
     let a = (node.min - ray.origin) * inverse;
     let b = (node.max - ray.origin) * inverse;
     // A ray within a face makes 0·∞ = NaN and may miss the box; but then it is just as far from all

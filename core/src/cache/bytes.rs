@@ -6,7 +6,7 @@
 //! |---|---|---|
 //! | 0 | 8 | [`MAGIC`] |
 //! | 8 | 4 | [`VERSION`] |
-//! | 12 | 4 | [`Kind`]: 1 in a medium, 2 on surfaces |
+//! | 12 | 4 | [`RecordKind`]: 1 in a medium, 2 on surfaces |
 //! | 16 | 4 | stride `s`: attachments per record, `(degree + 1)² − 1` in a medium, 1 on surfaces |
 //! | 20 | 4 | number of records `n` |
 //! | 24 | 8 | tag: what the cache was made for, a number of the host's choice |
@@ -65,14 +65,14 @@ pub const HEADER_BYTES: usize = 40;
 /// Which cache.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u32)]
-pub enum Kind {
+pub enum RecordKind {
     /// [`VolumeCache`](super::VolumeCache).
     Volume = 1,
     /// [`SurfaceCache`](super::SurfaceCache).
     Surface = 2,
 }
 
-impl fmt::Display for Kind {
+impl fmt::Display for RecordKind {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             Self::Volume => "records in a medium",
@@ -115,9 +115,9 @@ pub enum BytesError {
     /// The other kind of cache.
     Kind {
         /// What it is.
-        found: Kind,
+        found: RecordKind,
         /// What was asked for.
-        due: Kind,
+        due: RecordKind,
     },
     /// Another number of attachments: expansions of another degree.
     Stride {
@@ -180,7 +180,7 @@ impl core::error::Error for BytesError {}
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Header {
     /// Which cache.
-    pub kind: Kind,
+    pub kind: RecordKind,
     /// Attachments per record.
     pub stride: u32,
     /// Records.
@@ -213,8 +213,8 @@ impl Header {
             return Err(BytesError::Version(word(8)));
         }
         let kind = match word(12) {
-            1 => Kind::Volume,
-            2 => Kind::Surface,
+            1 => RecordKind::Volume,
+            2 => RecordKind::Surface,
             unknown => return Err(BytesError::UnknownKind(unknown)),
         };
         let header = Self { kind, stride: word(16), count: word(20), tag: long(24), checksum: long(32) };
@@ -228,8 +228,8 @@ impl Header {
     /// Length of all of it, header included (bytes). `usize::MAX` where that is too small.
     ///
     /// ```
-    /// # use fogbow::cache::bytes::{HEADER_BYTES, Header, Kind};
-    /// let header = Header { kind: Kind::Volume, stride: 3, count: 10, tag: 0, checksum: 0 };
+    /// # use fogbow::cache::bytes::{HEADER_BYTES, Header, RecordKind};
+    /// let header = Header { kind: RecordKind::Volume, stride: 3, count: 10, tag: 0, checksum: 0 };
     /// assert_eq!(header.byte_count(), HEADER_BYTES + 10 * (64 + 3 * 48));
     /// ```
     #[must_use]

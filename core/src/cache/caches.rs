@@ -1,6 +1,6 @@
 //! All caches of a world together.
 
-use super::eye::{Caches, Reader, Seen, radiance, radiance_beyond};
+use super::eye::{CachedRadiance, Caches, Reader, radiance, radiance_beyond};
 use super::kind::Kind;
 use super::record::Record;
 use super::room::{KindSlots, stride_of};
@@ -17,7 +17,7 @@ use crate::world::World;
 ///
 /// ```
 /// # #[cfg(feature = "alloc")] {
-/// # use fogbow::cache::{Asked, Kind, Output, RadianceCaches, Seen, Settings};
+/// # use fogbow::cache::{Asked, Kind, FilledRecords, RadianceCaches, CachedRadiance, Settings};
 /// # use fogbow::{host::Empty, light::{Light, PointLight}, math::{Bounds, Ray, Vec3}, medium::{Homogeneous, Placed, Region}};
 /// # use fogbow::{phase::Lobe, sampling::{Generator, Independent}, spectrum::Spectrum, work, world::{Outline, World}};
 /// let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::splat(0.8), Lobe::HenyeyGreenstein { g: 0.3 })?;
@@ -29,7 +29,7 @@ use crate::world::World;
 /// // Anywhere in a box: coarser than usual, so that this example is quick.
 /// let settings = Settings { rays: 200, ..Settings::for_outline(&Outline::of(&world, bounds)).with_walks(64) };
 /// let mut filling = RadianceCaches::new(settings).fill(Asked::<fn([f32; 2]) -> Ray>::Box(bounds));
-/// work::finish(&mut filling, &world, &mut Output::default());
+/// work::finish(&mut filling, &world, &mut FilledRecords::default());
 /// assert!(!filling.is_cut() && filling.computed(Kind::Multiple) > 0);
 /// assert!(!filling.caches().records(Kind::Multiple).is_empty());
 /// let caches = filling.finish();
@@ -41,7 +41,7 @@ use crate::world::World;
 /// let (ray, rng) = (Ray::new(-2.0 * Vec3::Z, Vec3::Z), &mut Generator::new(1));
 /// assert!(caches.radiance(&ray, &world, rng).medium_multiple.mean() > 0.0);
 /// assert_eq!(caches.radiance_beyond(&ray, &world, rng).total(), Spectrum::ZERO);
-/// let mut seen = [Seen::default(); 2];
+/// let mut seen = [CachedRadiance::default(); 2];
 /// caches.radiance_many(&[ray, ray], &mut seen, &world, 0, &Independent);
 /// assert!(seen[1].total().mean() > 0.0);
 ///
@@ -213,7 +213,7 @@ impl RadianceCaches<'_> {
         ray: &Ray,
         world: &World<'_, M, S>,
         rng: &mut (impl Rng + ?Sized),
-    ) -> Seen {
+    ) -> CachedRadiance {
         radiance(ray, &self.estimator(world), &self.reader(), &self.settings.eye, rng)
     }
 
@@ -224,7 +224,7 @@ impl RadianceCaches<'_> {
         ray: &Ray,
         world: &World<'_, M, S>,
         rng: &mut (impl Rng + ?Sized),
-    ) -> Seen {
+    ) -> CachedRadiance {
         radiance_beyond(ray, &self.estimator(world), &self.reader(), &self.settings.eye, rng)
     }
 

@@ -25,7 +25,7 @@ const STEPS: [f32; 3] = [0.618_034, 0.754_877_67, 0.569_840_3];
 
 /// How far rays are followed, and with how many points.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct EyeSettings {
+pub struct RaySettings {
     /// Points per sample on a ray through opaque fog: see [`scattering_points`].
     pub density: f32,
     /// Connections per segment of a ray to lights in whose near field it runs.
@@ -36,7 +36,7 @@ pub struct EyeSettings {
     pub indirect: bool,
 }
 
-impl Default for EyeSettings {
+impl Default for RaySettings {
     /// Eight points where fog is opaque, four connections to near lights, all light. More of both: less noise in each sample, for
     /// more time; fewer, and samples are spent on rays that bring little.
     fn default() -> Self {
@@ -75,7 +75,7 @@ pub struct Caches<'a> {
 
 /// Radiance (W·m⁻²·sr⁻¹) by where it comes from, and what it took.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Seen {
+pub struct CachedRadiance {
     /// Lights, the environment and glowing media.
     pub emitted: Spectrum,
     /// Surfaces lit by the lights; diffuse ones but for a sky ([`Light::is_sky`]), whose light is indirect.
@@ -94,12 +94,12 @@ pub struct Seen {
     pub misses: u32,
 }
 
-impl Seen {
+impl CachedRadiance {
     /// All light together.
     ///
     /// ```
-    /// # use fogbow::{cache::Seen, spectrum::Spectrum};
-    /// let seen = Seen { emitted: Spectrum::ONE, medium_multiple: Spectrum::splat(0.5), lookups: 3, ..Seen::default() };
+    /// # use fogbow::{cache::CachedRadiance, spectrum::Spectrum};
+    /// let seen = CachedRadiance { emitted: Spectrum::ONE, medium_multiple: Spectrum::splat(0.5), lookups: 3, ..CachedRadiance::default() };
     /// assert_eq!(seen.total(), Spectrum::splat(1.5));
     /// ```
     #[must_use]
@@ -129,7 +129,7 @@ trait Sight {
 fn look<M: Medium + ?Sized, S: Scene + ?Sized>(
     ray: &Ray,
     world: &World<'_, M, S>,
-    settings: &EyeSettings,
+    settings: &RaySettings,
     rng: &mut (impl Rng + ?Sized),
     sight: &mut impl Sight,
 ) {
@@ -211,12 +211,12 @@ pub struct Place {
 /// needed. From every one of them it also follows a random direction to a surface, which lights it.
 ///
 /// ```
-/// # use fogbow::{cache::{EyeSettings, places}, host::Empty, math::{Ray, Vec3}, medium::Homogeneous, phase::Phase};
+/// # use fogbow::{cache::{RaySettings, places}, host::Empty, math::{Ray, Vec3}, medium::Homogeneous, phase::Phase};
 /// # use fogbow::{sampling::Generator, spectrum::Spectrum};
 /// # use fogbow::world::World;
 /// let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::ONE, Phase::ISOTROPIC)?;
 /// let world = World { medium: &fog, scene: &Empty, lights: &[] };
-/// let settings = EyeSettings { density: 8.0, connections: 1, lights_visible: true, indirect: true };
+/// let settings = RaySettings { density: 8.0, connections: 1, lights_visible: true, indirect: true };
 /// let (ray, mut found) = (Ray::between(Vec3::ZERO, core::f32::consts::LN_2 * Vec3::X), Vec::new());
 /// places(&ray, &world, &settings, &mut Generator::new(1), |place| found.push(place));
 /// assert_eq!(found.len(), 4);   // half of what is seen is fog
@@ -226,7 +226,7 @@ pub struct Place {
 pub fn places<M: Medium + ?Sized, S: Scene + ?Sized>(
     ray: &Ray,
     world: &World<'_, M, S>,
-    settings: &EyeSettings,
+    settings: &RaySettings,
     rng: &mut (impl Rng + ?Sized),
     visit: impl FnMut(Place),
 ) {
@@ -297,7 +297,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized, F: FnMut(Place)> Sight for Wanted<'_
 /// samples use.
 ///
 /// ```
-/// # use fogbow::{cache::{Basis, Cache, Caches, Estimator, EyeSettings, Reader, Reading, Record, VolumeCache, radiance}};
+/// # use fogbow::{cache::{Basis, Cache, Caches, Estimator, RaySettings, Reader, Reading, Record, VolumeCache, radiance}};
 /// # use fogbow::{host::Empty, math::{Ray, Vec3}, medium::Homogeneous, multiple_scatter, path, phase::Phase};
 /// # use fogbow::{sampling::Generator, spectrum::{Gradient, Spectrum}, transmittance::thickness::Steps};
 /// # use fogbow::world::World;
@@ -312,7 +312,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized, F: FnMut(Place)> Sight for Wanted<'_
 /// let record = Record { position: Vec3::ZERO, radius: 50.0, value: Spectrum::ONE, gradient: Gradient::ZERO };
 /// cache.insert(record, &[])?;
 /// let caches = Caches { single: Some(Reader { cache: &cache, reading: Reading::new(0.5) }), ..Caches::default() };
-/// let settings = EyeSettings { density: 64.0, connections: 1, lights_visible: true, indirect: true };
+/// let settings = RaySettings { density: 64.0, connections: 1, lights_visible: true, indirect: true };
 /// let ray = Ray::new(Vec3::ZERO, Vec3::X);
 /// let seen = radiance(&ray, &estimator, &caches, &settings, &mut Generator::new(1));
 /// assert!((seen.medium_single[0] - 1.0).abs() < 0.02 && seen.misses == 0);   // so opaque fog looks like 1
@@ -323,16 +323,16 @@ pub fn radiance<M: Medium + ?Sized, S: Scene + ?Sized>(
     ray: &Ray,
     estimator: &Estimator<'_, M, S>,
     caches: &Caches<'_>,
-    settings: &EyeSettings,
+    settings: &RaySettings,
     rng: &mut (impl Rng + ?Sized),
-) -> Seen {
+) -> CachedRadiance {
     gathered(ray, estimator, caches, settings, true, rng)
 }
 
 /// As [`radiance`], but for light that the medium scatters: emission, and surfaces seen through the medium.
 ///
 /// ```
-/// # use fogbow::{cache::{Caches, Estimator, EyeSettings, radiance_beyond}, host::Empty, light::Light};
+/// # use fogbow::{cache::{Caches, Estimator, RaySettings, radiance_beyond}, host::Empty, light::Light};
 /// # use fogbow::{math::{Ray, Vec3}, medium::{Homogeneous, Placed, Region}, multiple_scatter, path, phase::Phase};
 /// # use fogbow::{sampling::Generator, spectrum::Spectrum, transmittance::thickness::Steps};
 /// # use fogbow::world::World;
@@ -343,7 +343,7 @@ pub fn radiance<M: Medium + ?Sized, S: Scene + ?Sized>(
 /// # let walk = multiple_scatter::Settings::new(Steps::Length(0.1));
 /// # let (paths, light_samples) = (path::Settings::default(), 1);
 /// # let estimator = Estimator { world, surfaces: None, scattered: None, walk, paths, light_samples, finest: 1e-3 };
-/// let settings = EyeSettings { density: 8.0, connections: 1, lights_visible: true, indirect: true };
+/// let settings = RaySettings { density: 8.0, connections: 1, lights_visible: true, indirect: true };
 /// let ray = Ray::new(-5.0 * Vec3::X, Vec3::X);
 /// let seen = radiance_beyond(&ray, &estimator, &Caches::default(), &settings, &mut Generator::new(1));
 /// assert!((seen.emitted[0] - (-2.0_f32).exp()).abs() < 1e-6);
@@ -354,9 +354,9 @@ pub fn radiance_beyond<M: Medium + ?Sized, S: Scene + ?Sized>(
     ray: &Ray,
     estimator: &Estimator<'_, M, S>,
     caches: &Caches<'_>,
-    settings: &EyeSettings,
+    settings: &RaySettings,
     rng: &mut (impl Rng + ?Sized),
-) -> Seen {
+) -> CachedRadiance {
     gathered(ray, estimator, caches, settings, false, rng)
 }
 
@@ -364,10 +364,10 @@ fn gathered<M: Medium + ?Sized, S: Scene + ?Sized>(
     ray: &Ray,
     estimator: &Estimator<'_, M, S>,
     caches: &Caches<'_>,
-    settings: &EyeSettings,
+    settings: &RaySettings,
     in_scattered: bool,
     rng: &mut (impl Rng + ?Sized),
-) -> Seen {
+) -> CachedRadiance {
     let along = [uniform(rng), uniform(rng)];
     let light = [uniform(rng), uniform(rng), uniform(rng)];
     let surface = (uniform(rng), uniform2(rng));
@@ -376,7 +376,7 @@ fn gathered<M: Medium + ?Sized, S: Scene + ?Sized>(
         caches,
         settings,
         in_scattered,
-        seen: Seen::default(),
+        seen: CachedRadiance::default(),
         along,
         light,
         surface,
@@ -391,10 +391,10 @@ fn gathered<M: Medium + ?Sized, S: Scene + ?Sized>(
 struct Gather<'a, M: ?Sized, S: ?Sized> {
     estimator: &'a Estimator<'a, M, S>,
     caches: &'a Caches<'a>,
-    settings: &'a EyeSettings,
+    settings: &'a RaySettings,
     /// Whether light that the medium scatters counts.
     in_scattered: bool,
-    seen: Seen,
+    seen: CachedRadiance,
     /// Random numbers of the sample: for connections along segments, from points, from surfaces.
     along: [f32; 2],
     light: [f32; 3],

@@ -15,7 +15,7 @@ use super::eye::Place;
 use super::guide::{Guide, Guided, Looks};
 use super::kind::{Kind, Pass, Places, STEPS, Step};
 use super::lookup::Reading;
-use super::memory::{Estimate, Memory, Output};
+use super::memory::{Estimate, FilledRecords, FillingMemory};
 use super::radius::clearance;
 use super::settings::{Effort, Settings};
 use super::slot::{Attached, ByKind, Inserted, learnt_near};
@@ -86,7 +86,7 @@ enum Round {
 ///
 /// ```
 /// # #[cfg(feature = "alloc")] {
-/// # use fogbow::cache::{Asked, Kind, Memory, Output, RadianceCaches, Settings};
+/// # use fogbow::cache::{Asked, Kind, FillingMemory, FilledRecords, RadianceCaches, Settings};
 /// # use fogbow::{host::Empty, math::{Bounds, Ray, Vec3}, medium::Homogeneous, phase::Phase, spectrum::Spectrum};
 /// # use fogbow::{work::step, world::{Outline, World}};
 /// # let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::ONE, Phase::ISOTROPIC)?;
@@ -94,8 +94,8 @@ enum Round {
 /// # let bounds = Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE };
 /// # let settings = Settings { rays: 20, ..Settings::for_outline(&Outline::of(&world, bounds)).with_walks(16) };
 /// # let asked = Asked::<fn([f32; 2]) -> Ray>::Box(bounds);
-/// let mut filling = RadianceCaches::new(settings).fill_in(Memory::default(), asked);
-/// let mut output = Output::default();
+/// let mut filling = RadianceCaches::new(settings).fill_in(FillingMemory::default(), asked);
+/// let mut output = FilledRecords::default();
 /// for _ in 0..10 {
 ///     step(&mut filling, &world, &mut output); // so many jobs a frame
 /// }
@@ -110,7 +110,7 @@ pub struct Filling<'s, F> {
     caches: RadianceCaches<'s>,
     asked: Asked<F>,
     view: u64,
-    memory: Memory<'s>,
+    memory: FillingMemory<'s>,
     round: Round,
     jobs: u32,
     taken: u32,
@@ -137,13 +137,13 @@ impl<'s> RadianceCaches<'s> {
     #[cfg(feature = "alloc")]
     #[must_use]
     pub fn fill<F: Fn([f32; 2]) -> Ray>(self, asked: Asked<F>) -> Filling<'s, F> {
-        self.fill_in(Memory::default(), asked)
+        self.fill_in(FillingMemory::default(), asked)
     }
 
     /// As [`RadianceCaches::fill`], in lent memory. Where that is too small, the rest is left out:
     /// [`Filling::is_cut`].
     #[must_use]
-    pub fn fill_in<F: Fn([f32; 2]) -> Ray>(self, mut memory: Memory<'s>, asked: Asked<F>) -> Filling<'s, F> {
+    pub fn fill_in<F: Fn([f32; 2]) -> Ray>(self, mut memory: FillingMemory<'s>, asked: Asked<F>) -> Filling<'s, F> {
         memory.clear();
         let view = asked.mark(&self.settings);
         let (before, rays) = (self.settled, self.settings.rays);
@@ -263,8 +263,12 @@ impl<'s, F> Filling<'s, F> {
         }
     }
 
-    fn search<M: Medium + ?Sized, S: Scene + ?Sized>(&self, job: u32, world: &World<'_, M, S>, output: &mut Output<'_>)
-    where
+    fn search<M: Medium + ?Sized, S: Scene + ?Sized>(
+        &self,
+        job: u32,
+        world: &World<'_, M, S>,
+        output: &mut FilledRecords<'_>,
+    ) where
         F: Fn([f32; 2]) -> Ray,
     {
         let from = job * RAYS_PER_JOB;
@@ -282,7 +286,7 @@ impl<'s, F> Filling<'s, F> {
         }
     }
 
-    fn look(&self, job: u32, output: &mut Output<'_>) {
+    fn look(&self, job: u32, output: &mut FilledRecords<'_>) {
         let Some(((step, _), open)) =
             self.at_hand().zip(self.memory.open.as_slice().chunks(PLACES_PER_JOB as usize).nth(job as usize))
         else {
@@ -298,7 +302,12 @@ impl<'s, F> Filling<'s, F> {
         }
     }
 
-    fn make<M: Medium + ?Sized, S: Scene + ?Sized>(&self, job: u32, world: &World<'_, M, S>, output: &mut Output<'_>) {
+    fn make<M: Medium + ?Sized, S: Scene + ?Sized>(
+        &self,
+        job: u32,
+        world: &World<'_, M, S>,
+        output: &mut FilledRecords<'_>,
+    ) {
         let (Some((step, effort)), Some(&(wanted, _))) =
             (self.at_hand(), self.memory.chosen.as_slice().get(job as usize))
         else {
@@ -329,7 +338,7 @@ impl<'s, F> Filling<'s, F> {
         from: u32,
         job: u32,
         world: &World<'_, M, S>,
-        output: &mut Output<'_>,
+        output: &mut FilledRecords<'_>,
     ) {
         let Some((step, effort)) = self.at_hand() else { return };
         let Pass::Again { stream, .. } = step.pass else { return };
@@ -355,7 +364,7 @@ impl<'s, F> Filling<'s, F> {
         looks: Looks<'_>,
         estimate: &mut Estimate,
         rng: &mut Generator,
-        output: &mut Output<'_>,
+        output: &mut FilledRecords<'_>,
     ) -> bool {
         let estimator = self.estimator(world, step);
         let looks = Looks { learnt: Some(&mut estimate.learnt), ..looks };
@@ -512,7 +521,7 @@ impl<'s, F> Filling<'s, F> {
     /// The places of one round: the first open ones that are not too close to each other; `false` if none are open.
     fn choose(&mut self) -> bool {
         let Some((step, effort)) = self.at_hand() else { return false };
-        let Memory { wanted, open, chosen, estimates, higher, .. } = &mut self.memory;
+        let FillingMemory { wanted, open, chosen, estimates, higher, .. } = &mut self.memory;
         let settings = &self.caches.settings;
         let slot = &self.caches.slots[step.kind];
         let wanted = wanted.as_slice();
@@ -614,13 +623,13 @@ where
     S: Scene + ?Sized,
     F: Fn([f32; 2]) -> Ray,
 {
-    type Output<'o> = Output<'o>;
+    type Output<'o> = FilledRecords<'o>;
 
     fn jobs(&self) -> Range<u32> {
         self.taken..self.jobs
     }
 
-    fn run(&self, job: u32, world: &World<'_, M, S>, output: &mut Output<'_>) {
+    fn run(&self, job: u32, world: &World<'_, M, S>, output: &mut FilledRecords<'_>) {
         output.wanted.clear();
         output.open.clear();
         output.higher.clear();
@@ -634,7 +643,7 @@ where
         }
     }
 
-    fn accept(&mut self, output: &Output<'_>) {
+    fn accept(&mut self, output: &FilledRecords<'_>) {
         if self.taken >= self.jobs {
             return;
         }

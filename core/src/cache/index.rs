@@ -66,7 +66,7 @@ const NEARLY: f32 = 1e-5;
 /// An inner node of the octree: what lies in its eight octants, x fastest.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Pod, Zeroable)]
 #[repr(C, align(64))]
-pub struct Node {
+pub struct IndexNode {
     octants: [Octant; 8],
 }
 
@@ -147,7 +147,7 @@ impl Block {
 /// ```
 #[derive(Debug)]
 pub struct Index<'s> {
-    nodes: List<'s, Node>,
+    nodes: List<'s, IndexNode>,
     /// A stack of numbers of spheres, with the masks of octants they overlap.
     entries: List<'s, u32>,
     /// Centre and radius (m).
@@ -203,7 +203,7 @@ impl Cell {
 /// Calls `visit(blocks, reach)` for the leaves that come within `reach` (m) of a point, near ones first; `visit` may
 /// lower the reach. The point is given in edges of the root, with the reciprocal of these (m⁻¹).
 fn walk(
-    nodes: &[Node],
+    nodes: &[IndexNode],
     octant: Octant,
     cell: Cell,
     (at, scale): (Vec3, f32),
@@ -252,9 +252,9 @@ impl<'s> Index<'s> {
     /// [`bytes`](Self::bytes) tells. `entries` and `spheres` serve [`rebuild`](Self::rebuild) alone.
     ///
     /// ```
-    /// # use fogbow::cache::{Block, Index, Node};
+    /// # use fogbow::cache::{Block, Index, IndexNode};
     /// # use fogbow::math::Vec3;
-    /// let (mut nodes, mut entries) = ([Node::default(); 8], [0; 48]);
+    /// let (mut nodes, mut entries) = ([IndexNode::default(); 8], [0; 48]);
     /// let (mut spheres, mut blocks) = ([[0.0; 4]; 8], [Block::default(); 48]);
     /// let mut index = Index::new(&mut nodes[..], &mut entries[..], &mut spheres[..], &mut blocks[..]);
     /// assert!(index.rebuild(8, |i| (Vec3::X * i as f32, 1.0)).is_ok());
@@ -262,7 +262,7 @@ impl<'s> Index<'s> {
     /// assert!(index.is_empty());
     /// ```
     pub fn new(
-        nodes: impl Into<List<'s, Node>>,
+        nodes: impl Into<List<'s, IndexNode>>,
         entries: impl Into<List<'s, u32>>,
         spheres: impl Into<List<'s, [f32; 4]>>,
         blocks: impl Into<List<'s, Block>>,
@@ -284,8 +284,8 @@ impl<'s> Index<'s> {
     /// Number of spheres it was built over, those left out included.
     ///
     /// ```
-    /// # use fogbow::{cache::{Block, Index, Node}, math::Vec3};
-    /// let (mut nodes, mut entries) = ([Node::default(); 2], [0; 12]);
+    /// # use fogbow::{cache::{Block, Index, IndexNode}, math::Vec3};
+    /// let (mut nodes, mut entries) = ([IndexNode::default(); 2], [0; 12]);
     /// let (mut spheres, mut blocks) = ([[0.0; 4]; 2], [Block::default(); 24]);
     /// let mut index = Index::new(&mut nodes[..], &mut entries[..], &mut spheres[..], &mut blocks[..]);
     /// index.rebuild(2, |i| (Vec3::ZERO, i as f32))?;   // the first has no radius: no point lies in it
@@ -300,8 +300,8 @@ impl<'s> Index<'s> {
     /// Whether it was built over no spheres.
     ///
     /// ```
-    /// # use fogbow::{cache::{Block, Index, Node}, math::Vec3};
-    /// let (mut nodes, mut entries) = ([Node::default(); 2], [0; 12]);
+    /// # use fogbow::{cache::{Block, Index, IndexNode}, math::Vec3};
+    /// let (mut nodes, mut entries) = ([IndexNode::default(); 2], [0; 12]);
     /// let (mut spheres, mut blocks) = ([[0.0; 4]; 2], [Block::default(); 24]);
     /// let mut index = Index::new(&mut nodes[..], &mut entries[..], &mut spheres[..], &mut blocks[..]);
     /// assert!(index.is_empty());
@@ -317,8 +317,8 @@ impl<'s> Index<'s> {
     /// Memory in use (bytes), without what a `Vec` or a lent slice holds in reserve.
     ///
     /// ```
-    /// # use fogbow::{cache::{Block, Index, Node}, math::Vec3};
-    /// let (mut nodes, mut entries) = ([Node::default(); 2], [0; 12]);
+    /// # use fogbow::{cache::{Block, Index, IndexNode}, math::Vec3};
+    /// let (mut nodes, mut entries) = ([IndexNode::default(); 2], [0; 12]);
     /// let (mut spheres, mut blocks) = ([[0.0; 4]; 2], [Block::default(); 24]);
     /// let mut index = Index::new(&mut nodes[..], &mut entries[..], &mut spheres[..], &mut blocks[..]);
     /// assert_eq!(index.bytes(), 0);   // lent, but not used
@@ -519,7 +519,7 @@ impl<'s> Index<'s> {
         }
         let node = self.nodes.as_slice().len();
         let first = u32::try_from(node).map_err(|_| Full)?;
-        self.nodes.push(Node::default())?;
+        self.nodes.push(IndexNode::default())?;
         for (octant, &inside) in counts.iter().enumerate() {
             // One more, which is written but not kept.
             self.reserve(top + inside + 1)?;

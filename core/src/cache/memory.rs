@@ -28,7 +28,7 @@ pub struct Estimate {
 /// What a job of a [`Filling`](super::Filling) leaves.
 #[derive(Debug)]
 #[cfg_attr(feature = "alloc", derive(Default))]
-pub struct Output<'o> {
+pub struct FilledRecords<'o> {
     pub(super) wanted: List<'o, Wanted>,
     pub(super) open: List<'o, u32>,
     pub(super) estimate: Option<Estimate>,
@@ -36,16 +36,16 @@ pub struct Output<'o> {
     pub(super) is_cut: bool,
 }
 
-impl<'o> Output<'o> {
+impl<'o> FilledRecords<'o> {
     /// In lent memory: for the places that a job finds, the numbers of those it looks up, and the coefficients of the estimate it
     /// makes. [`room_for`](super::room_for) says how many; where that is too small, [`Filling::is_cut`](super::Filling::is_cut) says so.
     ///
     /// ```
-    /// # use fogbow::cache::{Output, Wanted};
+    /// # use fogbow::cache::{FilledRecords, Wanted};
     /// # use fogbow::sh::Coefficient;
     /// let (mut wanted, mut open) = ([Wanted::default(); 256], [0; 256]);
     /// let mut higher = [Coefficient::ZERO; 3];
-    /// let output = Output::lent(&mut wanted, &mut open, &mut higher);
+    /// let output = FilledRecords::lent(&mut wanted, &mut open, &mut higher);
     /// # let _ = output;
     /// ```
     #[must_use]
@@ -57,7 +57,7 @@ impl<'o> Output<'o> {
 /// What a fill remembers between its rounds, besides the caches.
 #[derive(Debug)]
 #[cfg_attr(feature = "alloc", derive(Default))]
-pub struct Memory<'s> {
+pub struct FillingMemory<'s> {
     pub(super) wanted: List<'s, Wanted>,
     /// Numbers of the places of a batch without a record; those that still have none after the round's look.
     pub(super) open: List<'s, u32>,
@@ -70,15 +70,15 @@ pub struct Memory<'s> {
     pub(super) guides: ByKind<List<'s, Guide>>,
 }
 
-impl<'s> Memory<'s> {
+impl<'s> FillingMemory<'s> {
     /// In lent memory, whose size [`room_for`](super::room_for) tells; where that is too small, [`Filling::is_cut`](super::Filling::is_cut) says so.
     ///
     /// ```
-    /// # use fogbow::cache::{Guide, Memory, Slots, Wanted};
+    /// # use fogbow::cache::{Guide, FillingMemory, Slots, Wanted};
     /// let mut wanted = [Wanted::default(); 1000];
     /// let [mut open, mut still_open] = [[0; 1000]; 2];
     /// let mut guides = [[Guide::default(); 10]; 6];
-    /// let memory = Memory::lent(Slots {
+    /// let memory = FillingMemory::lent(Slots {
     ///     wanted: &mut wanted,
     ///     open: [&mut open, &mut still_open],
     ///     guides: guides.each_mut().map(|guides| &mut guides[..]),

@@ -21,7 +21,7 @@
 //! | `settings`, `presets` | [`Settings`], [`Effort`]; every tuned number of the method, from an outline of the world |
 //! | `asked` | [`Asked`]: where light is asked for |
 //! | `fill` | [`Filling`]: which places get records, rounds of new ones, better estimates for old ones |
-//! | `memory` | [`Memory`], [`Output`]: what a fill remembers, and what its jobs leave |
+//! | `memory` | [`FillingMemory`], [`FilledRecords`]: what a fill remembers, and what its jobs leave |
 //! | `slot` | a cache of either sort, as filling needs it |
 //! | `readers` | probes, fluence, irradiance, in-scattered light; many at a time |
 //! | `set_bytes` | all caches as bytes |
@@ -67,13 +67,13 @@ pub use asked::{Asked, Wanted};
 pub use caches::RadianceCaches;
 pub use estimate::Estimator;
 pub use extrapolate::{Blend, Extrapolation, exponent_limit, weight};
-pub use eye::{Caches, EyeSettings, Place, Reader, Seen, places, radiance, radiance_beyond};
+pub use eye::{CachedRadiance, Caches, Place, RaySettings, Reader, places, radiance, radiance_beyond};
 pub use fill::Filling;
 pub use guide::{Guide, Guided, Looks};
-pub use index::{Block, Index, Node};
+pub use index::{Block, Index, IndexNode};
 pub use kind::Kind;
 pub use lookup::{Basis, Reading, TURNING_DEGREE, TurningBasis};
-pub use memory::{Estimate, Memory, Output};
+pub use memory::{Estimate, FilledRecords, FillingMemory};
 pub use radius::{Limits, clamp_gradient, clearance, log_gradient_radius, neighbour_clamped, valid_radius};
 pub use readers::ScatteredLight;
 pub use record::{Attachment, Facing, Record};

@@ -13,10 +13,10 @@ use super::kind::Kind;
 use super::lookup::{Basis, Reading};
 use super::record::Record;
 use super::store::VolumeCache;
-use super::{Seen, radiance};
+use super::{CachedRadiance, radiance};
 use crate::host::{Medium, Rng, Scene};
 use crate::math::{Ray, float::PI};
-use crate::sampling::{Generator, Source};
+use crate::sampling::{Generator, GeneratorSource};
 use crate::sh::Coefficient;
 use crate::spectrum::Spectrum;
 use crate::world::World;
@@ -232,10 +232,10 @@ impl RadianceCaches<'_> {
     pub fn radiance_many<M: Medium + ?Sized, S: Scene + ?Sized>(
         &self,
         rays: &[Ray],
-        seen: &mut [Seen],
+        seen: &mut [CachedRadiance],
         world: &World<'_, M, S>,
         sample: u32,
-        source: &impl Source,
+        source: &impl GeneratorSource,
     ) {
         let (estimator, reader) = (self.estimator(world), self.reader());
         for (number, (ray, slot)) in rays.iter().zip(seen).enumerate() {

@@ -3,7 +3,7 @@
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
-use super::bytes::Kind;
+use super::bytes::RecordKind;
 use super::index;
 use super::radius::{self, Limits};
 use crate::sh::{self, Coefficient};
@@ -104,7 +104,7 @@ mod sealed {
 /// What may be attached to records: a [`Coefficient`] in the medium, a [`Facing`] on surfaces. 12 floats either way.
 pub trait Attachment: Pod + sealed::Sealed {
     /// The kind of cache it makes.
-    const KIND: Kind;
+    const KIND: RecordKind;
     /// Whether it can belong to a record that was computed: what is not valid is neither kept nor read.
     ///
     /// ```
@@ -116,14 +116,14 @@ pub trait Attachment: Pod + sealed::Sealed {
 }
 
 impl Attachment for Coefficient {
-    const KIND: Kind = Kind::Volume;
+    const KIND: RecordKind = RecordKind::Volume;
     fn is_valid(&self) -> bool {
         self.value.is_finite() && self.gradient.is_finite()
     }
 }
 
 impl Attachment for Facing {
-    const KIND: Kind = Kind::Surface;
+    const KIND: RecordKind = RecordKind::Surface;
     fn is_valid(&self) -> bool {
         // Normals of hosts are unit vectors up to rounding; what is far from it is damage.
         (self.normal.length_squared() - 1.0).abs() < 1e-2 && self.turn.is_finite()

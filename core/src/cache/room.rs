@@ -62,7 +62,7 @@ pub struct Room {
     pub higher: usize,
     /// Each of [`Slots::guides`], in the order of [`Kind::ALL`].
     pub guides: [usize; Kind::COUNT],
-    /// Places that a job finds: the first of [`Output::lent`](super::Output::lent).
+    /// Places that a job finds: the first of [`FilledRecords::lent`](super::FilledRecords::lent).
     pub of_job_wanted: usize,
     /// Places that a job looks up: the second.
     pub of_job_open: usize,

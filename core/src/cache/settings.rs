@@ -1,7 +1,7 @@
 //! How caches are filled and read: every number of the method.
 
 use super::extrapolate::Extrapolation;
-use super::eye::EyeSettings;
+use super::eye::RaySettings;
 use super::kind::Kind;
 use super::lookup::Reading;
 use super::radius::Limits;
@@ -71,7 +71,7 @@ pub struct Settings {
     /// Records computed per round at most. Part of the result: larger rounds know less of each other.
     pub round: u32,
     /// How eye rays look at the world.
-    pub eye: EyeSettings,
+    pub eye: RaySettings,
     /// How random walks are made, and light marched to.
     pub walk: multiple_scatter::Settings,
     /// How paths are traced where nothing is cached.
@@ -97,7 +97,7 @@ impl Default for Settings {
             margin: 0.15,
             pixels: [1.5, 64.0],
             round: 64,
-            eye: EyeSettings::default(),
+            eye: RaySettings::default(),
             walk: multiple_scatter::Settings {
                 lengths: multiple_scatter::Lengths::Marched,
                 ..multiple_scatter::Settings::new(Steps::Length(0.03))

@@ -27,9 +27,9 @@ const MAX_RECORDS: usize = 1 << 28;
 /// any number of threads may read.
 ///
 /// ```
-/// # use fogbow::cache::{Block, Cache, Index, Node, Record};
+/// # use fogbow::cache::{Block, Cache, Index, IndexNode, Record};
 /// # use fogbow::{bytemuck::Zeroable, math::Vec3, sh::Coefficient, spectrum::{Gradient, Spectrum}};
-/// # let (mut nodes, mut entries, mut spheres) = ([Node::default(); 1], [0; 6], [[0.0; 4]; 1]);
+/// # let (mut nodes, mut entries, mut spheres) = ([IndexNode::default(); 1], [0; 6], [[0.0; 4]; 1]);
 /// # let (mut wide_nodes, mut wide_entries, mut wide_spheres) = (nodes, entries, spheres);
 /// # let (mut blocks, mut wide_blocks) = ([Block::default(); 20], [Block::default(); 20]);
 /// # let index = Index::new(&mut nodes[..], &mut entries[..], &mut spheres[..], &mut blocks[..]);

@@ -17,7 +17,7 @@ use core::fmt;
 
 use glam::Vec3;
 
-use super::grid::{CovarianceGrid, Grid};
+use super::grid::{CovarianceGrid, GridView};
 use super::lattice::Lattice;
 use super::metrics::Voxel;
 use crate::bytes::{Crc, element, elements};
@@ -36,7 +36,7 @@ pub const HEADER_BYTES: usize = 72;
 /// Why bytes are not the grid asked for, in the order of the checks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
-pub enum BytesError {
+pub enum GridBytesError {
     /// Fewer bytes than a header.
     NoHeader {
         /// How many there are.
@@ -70,7 +70,7 @@ pub enum BytesError {
     Storage,
 }
 
-impl fmt::Display for BytesError {
+impl fmt::Display for GridBytesError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::NoHeader { found } => {
@@ -88,11 +88,11 @@ impl fmt::Display for BytesError {
     }
 }
 
-impl core::error::Error for BytesError {}
+impl core::error::Error for GridBytesError {}
 
 /// What the first bytes of a grid say.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Header {
+pub struct GridHeader {
     /// The cells.
     pub lattice: Lattice,
     /// How many photons filled them.
@@ -118,13 +118,13 @@ pub fn byte_count(lattice: &Lattice) -> usize {
 /// The sink's.
 ///
 /// ```
-/// # use fogbow::covariance::{Grid, Lattice, Voxel, bytes};
+/// # use fogbow::covariance::{GridView, Lattice, Voxel, bytes};
 /// # use fogbow::math::{Bounds, Vec3};
 /// let lattice = Lattice::new(Bounds { min: Vec3::ZERO, max: Vec3::ONE }, [2, 1, 1])?;
 /// let voxels = [Voxel { weight: 1.0, ..Voxel::EMPTY }; 2];
 /// let mut file = [0; 128];
 /// let mut used = 0;
-/// let Ok(()) = bytes::write(&Grid::new(lattice, &voxels, 100)?, 7, |part| {
+/// let Ok(()) = bytes::write(&GridView::new(lattice, &voxels, 100)?, 7, |part| {
 ///     file[used..][..part.len()].copy_from_slice(part);
 ///     used += part.len();
 ///     Ok::<_, core::convert::Infallible>(())
@@ -136,7 +136,7 @@ pub fn byte_count(lattice: &Lattice) -> usize {
 /// assert_eq!(copy, voxels);
 /// # Ok::<(), Box<dyn core::error::Error>>(())
 /// ```
-pub fn write<F>(grid: &Grid<'_>, tag: u64, mut sink: impl FnMut(&[u8]) -> Result<(), F>) -> Result<(), F> {
+pub fn write<F>(grid: &GridView<'_>, tag: u64, mut sink: impl FnMut(&[u8]) -> Result<(), F>) -> Result<(), F> {
     let mut header = [0; HEADER_BYTES];
     let lattice = grid.lattice();
     let corners = [lattice.bounds().min, lattice.bounds().max];
@@ -173,40 +173,40 @@ fn word<const N: usize>(bytes: &[u8], at: usize) -> [u8; N] {
 /// The first check that fails.
 ///
 /// ```
-/// # use fogbow::covariance::bytes::{self, BytesError};
-/// assert_eq!(bytes::header(b"P6", 7), Err(BytesError::NoHeader { found: 2 }));
-/// assert_eq!(bytes::header(&[0; 200], 7), Err(BytesError::Magic));   // long enough, but no grid
+/// # use fogbow::covariance::bytes::{self, GridBytesError};
+/// assert_eq!(bytes::header(b"P6", 7), Err(GridBytesError::NoHeader { found: 2 }));
+/// assert_eq!(bytes::header(&[0; 200], 7), Err(GridBytesError::Magic));   // long enough, but no grid
 /// ```
-pub fn header(bytes: &[u8], tag: u64) -> Result<Header, BytesError> {
+pub fn header(bytes: &[u8], tag: u64) -> Result<GridHeader, GridBytesError> {
     if bytes.len() < HEADER_BYTES {
-        return Err(BytesError::NoHeader { found: bytes.len() });
+        return Err(GridBytesError::NoHeader { found: bytes.len() });
     }
     if bytes[..8] != MAGIC {
-        return Err(BytesError::Magic);
+        return Err(GridBytesError::Magic);
     }
     let version = u32::from_le_bytes(word(bytes, 8));
     if version != VERSION {
-        return Err(BytesError::Version(version));
+        return Err(GridBytesError::Version(version));
     }
     let size = [12, 16, 20].map(|at| u32::from_le_bytes(word(bytes, at)));
     let corner = |at: usize| Vec3::from([0, 4, 8].map(|i| f32::from_le_bytes(word(bytes, at + i))));
     let bounds = Bounds { min: corner(24), max: corner(36) };
-    let lattice = Lattice::new(bounds, size).map_err(|_| BytesError::Lattice)?;
+    let lattice = Lattice::new(bounds, size).map_err(|_| GridBytesError::Lattice)?;
     let due = byte_count(&lattice);
     if bytes.len() != due {
-        return Err(BytesError::Length { found: bytes.len(), due });
+        return Err(GridBytesError::Length { found: bytes.len(), due });
     }
     let mut crc = Crc::new();
     crc.add(&bytes[..64]);
     crc.add(&bytes[HEADER_BYTES..]);
     if crc.value() != u64::from_le_bytes(word(bytes, 64)) {
-        return Err(BytesError::Checksum);
+        return Err(GridBytesError::Checksum);
     }
     let found = u64::from_le_bytes(word(bytes, 48));
     if found != tag {
-        return Err(BytesError::Tag { found, due: tag });
+        return Err(GridBytesError::Tag { found, due: tag });
     }
-    Ok(Header { lattice, paths: u64::from_le_bytes(word(bytes, 56)) })
+    Ok(GridHeader { lattice, paths: u64::from_le_bytes(word(bytes, 56)) })
 }
 
 /// Reads a grid's voxels, one per cell of the lattice that [`header`] names. `voxels` is only changed if all is well.
@@ -215,25 +215,25 @@ pub fn header(bytes: &[u8], tag: u64) -> Result<Header, BytesError> {
 /// The first check that fails.
 ///
 /// ```
-/// # use fogbow::covariance::{Grid, Lattice, Voxel, bytes::{self, BytesError}};
+/// # use fogbow::covariance::{GridView, Lattice, Voxel, bytes::{self, GridBytesError}};
 /// # use fogbow::math::{Bounds, Vec3};
 /// let lattice = Lattice::new(Bounds { min: Vec3::ZERO, max: Vec3::ONE }, [1, 1, 1])?;
 /// let mut file = Vec::new();
-/// let Ok(()) = bytes::write(&Grid::new(lattice, &[Voxel::EMPTY], 1)?, 7, |part| {
+/// let Ok(()) = bytes::write(&GridView::new(lattice, &[Voxel::EMPTY], 1)?, 7, |part| {
 ///     file.extend_from_slice(part);
 ///     Ok::<_, core::convert::Infallible>(())
 /// });
 /// let mut voxels = [Voxel { weight: 1.0, ..Voxel::EMPTY }];
-/// assert_eq!(bytes::read_into(&file, 8, &mut voxels), Err(BytesError::Tag { found: 7, due: 8 }));
+/// assert_eq!(bytes::read_into(&file, 8, &mut voxels), Err(GridBytesError::Tag { found: 7, due: 8 }));
 /// *file.last_mut().unwrap() ^= 1;
-/// assert_eq!(bytes::read_into(&file, 7, &mut voxels), Err(BytesError::Checksum));
+/// assert_eq!(bytes::read_into(&file, 7, &mut voxels), Err(GridBytesError::Checksum));
 /// assert_eq!(voxels[0].weight, 1.0);   // as before
 /// # Ok::<(), fogbow::covariance::LatticeError>(())
 /// ```
-pub fn read_into(bytes: &[u8], tag: u64, voxels: &mut [Voxel]) -> Result<(), BytesError> {
+pub fn read_into(bytes: &[u8], tag: u64, voxels: &mut [Voxel]) -> Result<(), GridBytesError> {
     let lattice = header(bytes, tag)?.lattice;
     if voxels.len() != lattice.cell_count() {
-        return Err(BytesError::Storage);
+        return Err(GridBytesError::Storage);
     }
     let all = || bytes[HEADER_BYTES..].chunks_exact(size_of::<Voxel>()).map(element::<Voxel>);
     let is_valid = |voxel: &Voxel| {
@@ -242,7 +242,7 @@ pub fn read_into(bytes: &[u8], tag: u64, voxels: &mut [Voxel]) -> Result<(), Byt
         sum.to_upper().iter().all(|x| x.is_finite()) && diagonal.iter().all(|&x| x.is_finite() && x >= 0.0)
     };
     if let Some(index) = all().position(|voxel| !is_valid(&voxel)) {
-        return Err(BytesError::Voxel(index));
+        return Err(GridBytesError::Voxel(index));
     }
     for (voxel, read) in voxels.iter_mut().zip(all()) {
         *voxel = read;
@@ -256,12 +256,12 @@ pub fn read_into(bytes: &[u8], tag: u64, voxels: &mut [Voxel]) -> Result<(), Byt
 /// The first check that fails.
 ///
 /// ```
-/// # use fogbow::covariance::{Grid, Lattice, Voxel, bytes};
+/// # use fogbow::covariance::{GridView, Lattice, Voxel, bytes};
 /// # use fogbow::math::{Bounds, Vec3};
 /// # let lattice = Lattice::new(Bounds { min: Vec3::ZERO, max: Vec3::ONE }, [2, 1, 1])?;
 /// # let voxels = [Voxel { weight: 1.0, ..Voxel::EMPTY }; 2];
 /// # let mut file = Vec::new();
-/// # let Ok(()) = bytes::write(&Grid::new(lattice, &voxels, 100)?, 7, |part| {
+/// # let Ok(()) = bytes::write(&GridView::new(lattice, &voxels, 100)?, 7, |part| {
 /// #     file.extend_from_slice(part);
 /// #     Ok::<_, core::convert::Infallible>(())
 /// # });
@@ -270,10 +270,14 @@ pub fn read_into(bytes: &[u8], tag: u64, voxels: &mut [Voxel]) -> Result<(), Byt
 /// assert_eq!((grid.view().voxels(), grid.view().paths()), (&voxels[..], 100));
 /// # Ok::<(), Box<dyn core::error::Error>>(())
 /// ```
-pub fn read<'s>(bytes: &[u8], tag: u64, storage: impl Into<List<'s, Voxel>>) -> Result<CovarianceGrid<'s>, BytesError> {
-    let Header { lattice, paths } = header(bytes, tag)?;
+pub fn read<'s>(
+    bytes: &[u8],
+    tag: u64,
+    storage: impl Into<List<'s, Voxel>>,
+) -> Result<CovarianceGrid<'s>, GridBytesError> {
+    let GridHeader { lattice, paths } = header(bytes, tag)?;
     let mut voxels = storage.into();
-    voxels.reset(lattice.cell_count(), Voxel::EMPTY).map_err(|Full| BytesError::Storage)?;
+    voxels.reset(lattice.cell_count(), Voxel::EMPTY).map_err(|Full| GridBytesError::Storage)?;
     read_into(bytes, tag, voxels.as_mut_slice())?;
     Ok(CovarianceGrid::new(lattice, voxels, paths))
 }

@@ -167,13 +167,13 @@ pub struct SurfacePoint {
 /// What a job of a [`Fill`] leaves.
 #[derive(Debug)]
 #[cfg_attr(feature = "alloc", derive(Default))]
-pub struct Output<'o> {
+pub struct GridOutput<'o> {
     surface: List<'o, SurfacePoint>,
     deposits: List<'o, Deposit>,
     is_cut: bool,
 }
 
-impl<'o> Output<'o> {
+impl<'o> GridOutput<'o> {
     /// In lent memory: for as many surface points as a row of rays meets, and for as many cells as some walks cross. What finds no
     /// room is left out: [`Fill::is_cut`].
     ///
@@ -187,7 +187,7 @@ impl<'o> Output<'o> {
 /// Memory of a [`Fill`].
 #[derive(Debug)]
 #[cfg_attr(feature = "alloc", derive(Default))]
-pub struct Memory<'s> {
+pub struct GridMemory<'s> {
     /// One element per cell: what the grid will be.
     pub voxels: List<'s, Voxel>,
     /// One element per cell: the part that is being summed.
@@ -216,13 +216,13 @@ enum Round {
 /// # use fogbow::{host::Empty, light::{Light, PhongLight}, math::{Bounds, Vec3}, medium::Homogeneous};
 /// # use fogbow::{phase::Lobe, spectrum::Spectrum, work, world::World};
 /// # #[cfg(feature = "alloc")] {
-/// use fogbow::covariance::{Fill, Output, Settings};
+/// use fogbow::covariance::{Fill, GridOutput, Settings};
 /// let fog = Homogeneous::new(Spectrum::splat(0.1), Spectrum::splat(0.1), Lobe::Isotropic)?;
 /// let spot = [Light::Phong(PhongLight::new(Vec3::ZERO, Vec3::Z, 200.0, Spectrum::ONE)?)];
 /// let world = World { medium: &fog, scene: &Empty, lights: &spot };
 /// let bounds = Bounds { min: Vec3::new(-0.5, -0.5, 0.0), max: Vec3::new(0.5, 0.5, 2.0) };
 /// let mut fill = Fill::new(Settings { photons: 2000, edge: 16, ..Settings::new(bounds) })?;
-/// work::finish(&mut fill, &world, &mut Output::default());
+/// work::finish(&mut fill, &world, &mut GridOutput::default());
 /// let grid = fill.finish();
 /// // Across the beam light varies, along it hardly.
 /// let gamma = grid.view().covariance(Vec3::new(0.0, 0.0, 1.0)).unwrap();
@@ -254,7 +254,7 @@ impl<'s> Fill<'s> {
     /// Bounds without extent, no cells or too many, also for the memory; no photons.
     #[cfg(feature = "alloc")]
     pub fn new(settings: Settings) -> Result<Fill<'static>, FillError> {
-        Fill::new_in(Memory::default(), settings)
+        Fill::new_in(GridMemory::default(), settings)
     }
 
     /// In lent memory.
@@ -264,26 +264,26 @@ impl<'s> Fill<'s> {
     ///
     /// ```
     /// # use fogbow::{host::Empty, light::{Light, PointLight}, math::{Bounds, Vec3}, work, world::World};
-    /// use fogbow::covariance::{Deposit, Fill, Memory, OccluderCell, Output, Settings, SurfacePoint, Voxel};
+    /// use fogbow::covariance::{Deposit, Fill, GridMemory, OccluderCell, GridOutput, Settings, SurfacePoint, Voxel};
     /// let (mut all, mut part) = ([Voxel::EMPTY; 64], [Voxel::EMPTY; 64]);
     /// let mut cells = [OccluderCell::default(); 64];
-    /// let memory = Memory { voxels: (&mut all[..]).into(), part: (&mut part[..]).into(), occluders: (&mut cells[..]).into() };
+    /// let memory = GridMemory { voxels: (&mut all[..]).into(), part: (&mut part[..]).into(), occluders: (&mut cells[..]).into() };
     /// let lamps = [Light::Point(PointLight::new(Vec3::splat(0.6), fogbow::spectrum::Spectrum::ONE)?)];
     /// let world = World { medium: &Empty, scene: &Empty, lights: &lamps };
     /// let bounds = Bounds { min: Vec3::ZERO, max: Vec3::ONE };
     /// let mut fill = Fill::new_in(memory, Settings { photons: 100, edge: 4, ..Settings::new(bounds) })?;
     /// let (mut surface, mut deposits) = ([SurfacePoint::default(); 64], [Deposit::default(); 8192]);
-    /// work::finish(&mut fill, &world, &mut Output::lent(&mut surface, &mut deposits));
+    /// work::finish(&mut fill, &world, &mut GridOutput::lent(&mut surface, &mut deposits));
     /// assert!(!fill.is_cut() && fill.sent() == 100);
     /// assert!(fill.finish().view().fluence(Vec3::splat(0.6)).unwrap() > 0.0);
     /// # Ok::<(), Box<dyn core::error::Error>>(())
     /// ```
-    pub fn new_in(memory: Memory<'s>, settings: Settings) -> Result<Self, FillError> {
+    pub fn new_in(memory: GridMemory<'s>, settings: Settings) -> Result<Self, FillError> {
         if settings.photons == 0 {
             return Err(FillError::NoPhotons);
         }
         let lattice = Lattice::cubic(settings.bounds, settings.edge)?;
-        let Memory { mut voxels, mut part, occluders } = memory;
+        let GridMemory { mut voxels, mut part, occluders } = memory;
         for list in [&mut voxels, &mut part] {
             list.reset(lattice.cell_count(), Voxel::EMPTY).map_err(|Full| FillError::Memory)?;
         }
@@ -370,14 +370,14 @@ impl<'s> Fill<'s> {
 }
 
 impl<M: Medium + ?Sized, S: Scene + ?Sized> Rounds<World<'_, M, S>> for Fill<'_> {
-    type Output<'o> = Output<'o>;
+    type Output<'o> = GridOutput<'o>;
 
     fn jobs(&self) -> Range<u32> {
         self.taken..self.jobs
     }
 
-    fn run(&self, job: u32, world: &World<'_, M, S>, output: &mut Output<'_>) {
-        let Output { surface, deposits, is_cut } = output;
+    fn run(&self, job: u32, world: &World<'_, M, S>, output: &mut GridOutput<'_>) {
+        let GridOutput { surface, deposits, is_cut } = output;
         surface.clear();
         deposits.clear();
         *is_cut = false;
@@ -404,7 +404,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Rounds<World<'_, M, S>> for Fill<'_>
         }
     }
 
-    fn accept(&mut self, output: &Output<'_>) {
+    fn accept(&mut self, output: &GridOutput<'_>) {
         if self.taken >= self.jobs {
             return;
         }
@@ -499,7 +499,7 @@ mod tests {
             for photons in [1, 5, 9001] {
                 let settings = Settings { photons, edge: 9, seed: 3, ..Settings::new(BOUNDS) };
                 let mut fill = Fill::new(settings).unwrap();
-                finish(&mut fill, world, &mut Output::default());
+                finish(&mut fill, world, &mut GridOutput::default());
                 assert!(!fill.is_cut() && fill.sent() == photons);
                 let grid = fill.finish();
                 assert!(grid.view().voxels().iter().any(|voxel| voxel.weight > 0.0));
@@ -513,7 +513,7 @@ mod tests {
         with_world(|world| {
             let settings = Settings { photons: 4000, edge: 5, ..Settings::new(BOUNDS) };
             let mut fill = Fill::new(settings).unwrap();
-            let mut output = Output::default();
+            let mut output = GridOutput::default();
             while fill.sent() < 700 {
                 assert!(step(&mut fill, world, &mut output));
             }
@@ -531,7 +531,7 @@ mod tests {
     #[test]
     fn memory_that_is_too_small_is_told() {
         let settings = Settings { edge: 4, ..Settings::new(BOUNDS) };
-        let memory = |voxels, part, occluders| Memory { voxels, part, occluders };
+        let memory = |voxels, part, occluders| GridMemory { voxels, part, occluders };
         let mut few = [Voxel::EMPTY; 63];
         let lent = memory(List::from(&mut few[..]), List::default(), List::default());
         assert_eq!(Fill::new_in(lent, settings).err(), Some(FillError::Memory));
@@ -543,7 +543,7 @@ mod tests {
         with_world(|world| {
             let mut fill = Fill::new(settings).unwrap();
             let (mut surface, mut deposits) = ([SurfacePoint::default(); 64], [Deposit::default(); 3]);
-            finish(&mut fill, world, &mut Output::lent(&mut surface, &mut deposits));
+            finish(&mut fill, world, &mut GridOutput::lent(&mut surface, &mut deposits));
             assert!(fill.is_cut());
         });
     }

@@ -10,12 +10,12 @@ use crate::storage::List;
 /// A filled grid, ready to be asked.
 ///
 /// ```
-/// # use fogbow::{covariance::{Grid, Lattice, Voxel}, math::{Bounds, Symmetric3, Vec3}};
+/// # use fogbow::{covariance::{GridView, Lattice, Voxel}, math::{Bounds, Symmetric3, Vec3}};
 /// // One cell of 8 m³, through which two photons of 3 W flew 2 m each.
 /// let lattice = Lattice::new(Bounds { min: Vec3::ZERO, max: Vec3::splat(2.0) }, [1, 1, 1])?;
 /// let sum = Symmetric3::from_upper([24.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
 /// let voxels = [Voxel { sum, weight: 2.0 * 3.0 * 2.0 }];
-/// let grid = Grid::new(lattice, &voxels, 2)?;
+/// let grid = GridView::new(lattice, &voxels, 2)?;
 /// assert_eq!(grid.fluence(Vec3::ONE), Some(0.75));   // 12 W·m over 8 m³, for one of two
 /// assert_eq!(grid.covariance(Vec3::ONE).unwrap().xx, 2.0);
 /// assert_eq!((grid.voxel(Vec3::ONE), grid.voxel(Vec3::NEG_X)), (Some(voxels[0]), None));
@@ -23,13 +23,13 @@ use crate::storage::List;
 /// # Ok::<(), fogbow::covariance::LatticeError>(())
 /// ```
 #[derive(Debug, Clone, Copy)]
-pub struct Grid<'a> {
+pub struct GridView<'a> {
     lattice: Lattice,
     voxels: &'a [Voxel],
     paths: u64,
 }
 
-impl<'a> Grid<'a> {
+impl<'a> GridView<'a> {
     /// From one voxel per cell of the lattice, filled by `paths` photons.
     ///
     /// # Errors
@@ -104,8 +104,8 @@ impl<'s> CovarianceGrid<'s> {
 
     /// The grid, to be asked.
     #[must_use]
-    pub fn view(&self) -> Grid<'_> {
-        Grid { lattice: self.lattice, voxels: self.voxels.as_slice(), paths: self.paths }
+    pub fn view(&self) -> GridView<'_> {
+        GridView { lattice: self.lattice, voxels: self.voxels.as_slice(), paths: self.paths }
     }
 
     /// Bytes of memory held by voxels.

@@ -1,6 +1,6 @@
 //! The covariance of an image along an eye ray, from a grid: Belcour et al. 2014, § 5.2 and Eq. 17.
 
-use super::grid::Grid;
+use super::grid::GridView;
 use super::metrics::ImageCovariance;
 use crate::host::Medium;
 use crate::math::{Frame, Ray, Symmetric2, float};
@@ -12,13 +12,13 @@ use crate::math::{Frame, Ray, Symmetric2, float};
 /// scattered alike in all directions).
 ///
 /// ```
-/// # use fogbow::{covariance::{Grid, Lattice, Voxel, image_covariance}, math::*, medium::Homogeneous, phase::Lobe};
+/// # use fogbow::{covariance::{GridView, Lattice, Voxel, image_covariance}, math::*, medium::Homogeneous, phase::Lobe};
 /// # use fogbow::spectrum::Spectrum;
 /// let lattice = Lattice::new(Bounds { min: Vec3::new(-1.0, -1.0, 3.9), max: Vec3::new(1.0, 1.0, 4.1) }, [1, 1, 1])?;
 /// let voxels = [Voxel { sum: Symmetric3::from_upper([2.0, 0.0, 0.0, 0.0, 0.0, 0.0]), weight: 1.0 }];
 /// let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::splat(0.1), Lobe::Isotropic)?;
 /// let frame = Frame { u: Vec3::X, v: Vec3::Y, w: Vec3::Z };
-/// let seen = image_covariance(&Ray::new(Vec3::ZERO, Vec3::Z), &frame, &Grid::new(lattice, &voxels, 1)?, &fog).unwrap();
+/// let seen = image_covariance(&Ray::new(Vec3::ZERO, Vec3::Z), &frame, &GridView::new(lattice, &voxels, 1)?, &fog).unwrap();
 /// // What varies by √2 cycles per metre varies by 4√2 cycles per radian from 4 m away.
 /// assert!((seen.xx - 32.0).abs() < 1e-3 && seen.yy == 0.0);
 /// # Ok::<(), Box<dyn core::error::Error>>(())
@@ -27,7 +27,7 @@ use crate::math::{Frame, Ray, Symmetric2, float};
 pub fn image_covariance(
     ray: &Ray,
     frame: &Frame,
-    grid: &Grid<'_>,
+    grid: &GridView<'_>,
     medium: &(impl Medium + ?Sized),
 ) -> Option<Symmetric2> {
     let mut image = ImageCovariance::new(*frame);

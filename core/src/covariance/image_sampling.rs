@@ -19,7 +19,7 @@ use core::ops::Range;
 use bytemuck::{Pod, Zeroable};
 use glam::Vec2;
 
-use super::grid::Grid;
+use super::grid::GridView;
 use super::image::image_covariance;
 use super::metrics::filter_precision;
 use crate::host::{Medium, Scene};
@@ -92,7 +92,7 @@ pub struct Sight<'a, M: ?Sized, S: ?Sized, F> {
     /// The world.
     pub world: World<'a, M, S>,
     /// Covariances of its light.
-    pub grid: Grid<'a>,
+    pub grid: GridView<'a>,
     /// The eye ray of a point of the film, both coordinates in [0, 1].
     pub ray: F,
 }
@@ -139,13 +139,13 @@ pub struct Pixel {
 /// What a job of [`Planning`] leaves.
 #[derive(Debug)]
 #[cfg_attr(feature = "alloc", derive(Default))]
-pub struct Output<'o> {
+pub struct PlanOutput<'o> {
     pixels: List<'o, Pixel>,
     numbers: List<'o, f32>,
     is_cut: bool,
 }
 
-impl<'o> Output<'o> {
+impl<'o> PlanOutput<'o> {
     /// In lent memory: as many elements of both as a picture is wide.
     #[must_use]
     pub fn lent(pixels: &'o mut [Pixel], numbers: &'o mut [f32]) -> Self {
@@ -190,14 +190,14 @@ impl<'s> Planning<'s> {
     /// [`Full`] if there is no memory.
     ///
     /// ```
-    /// use fogbow::covariance::image_sampling::{Outlook, Output, Planning};
+    /// use fogbow::covariance::image_sampling::{Outlook, PlanOutput, Planning};
     /// use fogbow::{math::Symmetric2, work};
     /// # #[cfg(feature = "alloc")] {
     /// let smooth = Outlook { covariance: Some(Symmetric2::diagonal(1e-4, 1e-4)), depth: 1.0 };
     /// let sharp = Outlook { covariance: Some(Symmetric2::diagonal(0.1, 0.1)), depth: 1.0 };
     /// let outlooks: Vec<Outlook> = (0..1024).map(|i| if i % 32 < 16 { smooth } else { sharp }).collect();
     /// let mut planning = Planning::new([32, 32], 0.4)?;
-    /// work::finish(&mut planning, &outlooks[..], &mut Output::default());
+    /// work::finish(&mut planning, &outlooks[..], &mut PlanOutput::default());
     /// let plan = planning.finish();
     /// let count = |left: bool| (0..1024).filter(|i| plan.is_computed(*i) && (i % 32 < 16) == left).count();
     /// assert!(count(true) + count(false) <= 410 && count(false) > 2 * count(true));
@@ -215,12 +215,12 @@ impl<'s> Planning<'s> {
     /// [`Full`] if that is too little.
     ///
     /// ```
-    /// use fogbow::covariance::image_sampling::{Outlook, Output, Pixel, Planning};
+    /// use fogbow::covariance::image_sampling::{Outlook, PlanOutput, Pixel, Planning};
     /// use fogbow::work;
     /// let (mut pixels, mut numbers) = ([Pixel::default(); 64], [0.0; 64]);
     /// let (mut row, mut row_numbers) = ([Pixel::default(); 8], [0.0; 8]);
     /// let mut planning = Planning::new_in((&mut pixels[..]).into(), (&mut numbers[..]).into(), [8, 8], 0.5)?;
-    /// work::finish(&mut planning, &[Outlook::default(); 64][..], &mut Output::lent(&mut row, &mut row_numbers));
+    /// work::finish(&mut planning, &[Outlook::default(); 64][..], &mut PlanOutput::lent(&mut row, &mut row_numbers));
     /// assert!(!planning.is_cut() && planning.finish().share() > 0.4);
     /// # Ok::<(), fogbow::storage::Full>(())
     /// ```
@@ -281,14 +281,14 @@ impl<'s> Planning<'s> {
 }
 
 impl<W: Outlooks + ?Sized> Rounds<W> for Planning<'_> {
-    type Output<'o> = Output<'o>;
+    type Output<'o> = PlanOutput<'o>;
 
     fn jobs(&self) -> Range<u32> {
         self.taken..self.jobs
     }
 
-    fn run(&self, job: u32, outlooks: &W, output: &mut Output<'_>) {
-        let Output { pixels, numbers, is_cut } = output;
+    fn run(&self, job: u32, outlooks: &W, output: &mut PlanOutput<'_>) {
+        let PlanOutput { pixels, numbers, is_cut } = output;
         pixels.clear();
         numbers.clear();
         *is_cut = false;
@@ -318,7 +318,7 @@ impl<W: Outlooks + ?Sized> Rounds<W> for Planning<'_> {
         }
     }
 
-    fn accept(&mut self, output: &Output<'_>) {
+    fn accept(&mut self, output: &PlanOutput<'_>) {
         if self.taken >= self.jobs {
             return;
         }
@@ -560,11 +560,11 @@ pub struct Computed<'a> {
 /// A picture filled in, as [`Rounds`] of jobs, one for each row.
 ///
 /// ```
-/// # use fogbow::covariance::image_sampling::{Computed, FillingIn, Outlook, Output, Planning};
+/// # use fogbow::covariance::image_sampling::{Computed, FillingIn, Outlook, PlanOutput, Planning};
 /// # use fogbow::{spectrum::Spectrum, storage::List, work};
 /// # #[cfg(feature = "alloc")] {
 /// let mut planning = Planning::new([16, 16], 0.3)?;
-/// work::finish(&mut planning, &[Outlook::default(); 256][..], &mut Output::default());
+/// work::finish(&mut planning, &[Outlook::default(); 256][..], &mut PlanOutput::default());
 /// let plan = planning.finish();
 /// let grey = |i| if plan.is_computed(i) { Spectrum::splat(0.5) } else { Spectrum::ZERO };
 /// let image: Vec<Spectrum> = (0..256).map(grey).collect();

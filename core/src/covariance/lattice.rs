@@ -227,7 +227,7 @@ impl Lattice {
 
 /// The part of a ray within a cell.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Crossing {
+pub struct CellCrossing {
     /// Index of the cell.
     pub cell: usize,
     /// Distance (m) at which the ray enters it.
@@ -249,10 +249,10 @@ pub struct Cells {
 }
 
 impl Iterator for Cells {
-    type Item = Crossing;
+    type Item = CellCrossing;
 
     #[inline]
-    fn next(&mut self) -> Option<Crossing> {
+    fn next(&mut self) -> Option<CellCrossing> {
         // Every turn leaves one layer for good, so that the walk ends whatever rounding does.
         while self.at < self.end {
             let [x, y, z] = self.next;
@@ -272,7 +272,7 @@ impl Iterator for Cells {
             self.index += self.stride[axis];
             self.at = self.at.max(leave);
             if leave > enter {
-                return Some(Crossing { cell, enter, leave });
+                return Some(CellCrossing { cell, enter, leave });
             }
         }
         None

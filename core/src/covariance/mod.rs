@@ -18,9 +18,9 @@
 //! | `lattice` | [`Lattice`]: a box of cells and the walk of a ray through them |
 //! | `occluders` | [`Occluders`]: where surfaces lie, and what passing them does |
 //! | `photon` | [`FrequencyPhotons`]: light fields carried along photon walks (Alg. 2) |
-//! | `grid` | [`Grid`]: Γ anywhere in the volume; [`CovarianceGrid`] with its memory |
+//! | `grid` | [`GridView`]: Γ anywhere in the volume; [`CovarianceGrid`] with its memory |
 //! | `fill` | [`Fill`]: grids filled, as work in rounds; [`Settings`] |
-//! | `steps` | [`Steps`] along an eye ray (Alg. 1) |
+//! | `steps` | [`AdaptiveSteps`] along an eye ray (Alg. 1) |
 //! | `radii` | [`Radii`] of kernels anywhere in the volume (Eq. 19) |
 //! | `image` | [`image_covariance`] along an eye ray |
 //! | [`image_sampling`] | which pixels are computed, and filling in the others |
@@ -47,10 +47,10 @@ mod radii;
 mod steps;
 
 pub use emission::emitted;
-pub use fill::{Deposit, Fill, FillError, Memory, Output, Settings, SurfacePoint};
-pub use grid::{CovarianceGrid, Grid, merge};
+pub use fill::{Deposit, Fill, FillError, GridMemory, GridOutput, Settings, SurfacePoint};
+pub use grid::{CovarianceGrid, GridView, merge};
 pub use image::image_covariance;
-pub use lattice::{Cells, Crossing, Lattice, LatticeError, MAX_EDGE};
+pub use lattice::{CellCrossing, Cells, Lattice, LatticeError, MAX_EDGE};
 pub use light_field::{LightField, Patch};
 pub use lobe::{phase_covariance, phase_hessian};
 pub use matrix::{LIMIT, Symmetric4};
@@ -60,4 +60,4 @@ pub use metrics::{
 pub use occluders::{NEAREST, OccluderCell, Occluders};
 pub use photon::FrequencyPhotons;
 pub use radii::Radii;
-pub use steps::{Rule, Steps};
+pub use steps::{AdaptiveSteps, Rule};

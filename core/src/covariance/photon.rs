@@ -10,7 +10,7 @@
 use glam::Vec3;
 
 use super::emission::emitted;
-use super::lattice::{Crossing, Lattice};
+use super::lattice::{CellCrossing, Lattice};
 use super::light_field::{LightField, Patch};
 use super::metrics::{Voxel, divergence};
 use super::occluders::Occluders;
@@ -23,7 +23,7 @@ use crate::world::World;
 /// What frequency photons fly through and where they leave what they carry.
 ///
 /// ```
-/// # use fogbow::{covariance::{FrequencyPhotons, Grid, Lattice, Voxel}, math::{Bounds, Vec3, float::PI}};
+/// # use fogbow::{covariance::{FrequencyPhotons, GridView, Lattice, Voxel}, math::{Bounds, Vec3, float::PI}};
 /// # use fogbow::{host::Empty, light::{Light, PointLight}, path::Settings, photon, sampling::Generator, spectrum::Spectrum};
 /// # use fogbow::world::World;
 /// // A lamp of 4π W in the middle of a vacuum: at 2 m its fluence is 1/4 W·m⁻².
@@ -38,7 +38,7 @@ use crate::world::World;
 ///     });
 /// }
 /// assert!(photons.light_field().is_some());   // of the last one
-/// let grid = Grid::new(lattice, &voxels, 4000)?;
+/// let grid = GridView::new(lattice, &voxels, 4000)?;
 /// assert!((grid.fluence(2.0 * Vec3::X).unwrap() - 0.25).abs() < 0.03);
 /// # Ok::<(), Box<dyn core::error::Error>>(())
 /// ```
@@ -121,7 +121,7 @@ impl<'a, M: Medium + ?Sized, S: Scene + ?Sized> FrequencyPhotons<'a, M, S> {
         // Bounds hold along segments; only where they are not equal is there a Hessian to ask for.
         let (mut even_until, mut even) = (0.0, true);
         let mut at = 0.0;
-        for Crossing { cell, enter, leave } in self.lattice.cells(&ray) {
+        for CellCrossing { cell, enter, leave } in self.lattice.cells(&ray) {
             let middle = 0.5 * (enter + leave);
             let length = leave - enter;
             light = light.travelled(middle - at);

@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use super::grid::Grid;
+use super::grid::GridView;
 use super::lattice::{Lattice, LatticeError};
 use super::metrics::kernel_radius;
 
@@ -29,18 +29,18 @@ impl<'a> Radii<'a> {
     /// Storage of another length.
     ///
     /// ```
-    /// # use fogbow::{covariance::{Grid, Lattice, Radii, Voxel}, math::*};
+    /// # use fogbow::{covariance::{GridView, Lattice, Radii, Voxel}, math::*};
     /// let lattice = Lattice::new(Bounds { min: Vec3::ZERO, max: Vec3::new(3.0, 1.0, 1.0) }, [3, 1, 1])?;
     /// let sharp = Voxel { sum: Symmetric3::from_upper([1e6, 0.0, 0.0, 0.0, 0.0, 0.0]), weight: 1.0 };
     /// let voxels = [sharp, Voxel { weight: 1.0, ..Voxel::EMPTY }, Voxel::EMPTY];
     /// let mut storage = [0.0; 3];
-    /// let radii = Radii::new(&Grid::new(lattice, &voxels, 1)?, 0.02, 0.125, 10.0, &mut storage)?;
+    /// let radii = Radii::new(&GridView::new(lattice, &voxels, 1)?, 0.02, 0.125, 10.0, &mut storage)?;
     /// assert!(radii.at(Vec3::splat(0.5)) < 1e-3);
     /// assert!((radii.at(Vec3::new(2.5, 0.5, 0.5)) - 2.0).abs() < 1e-3);   // two cells away
     /// # Ok::<(), fogbow::covariance::LatticeError>(())
     /// ```
     pub fn new(
-        grid: &Grid<'_>,
+        grid: &GridView<'_>,
         relative_bias: f32,
         moment: f32,
         most: f32,
@@ -61,10 +61,10 @@ impl<'a> Radii<'a> {
     /// The radius (m) at `point`, interpolated; 0 outside.
     ///
     /// ```
-    /// # use fogbow::{covariance::{Grid, Lattice, Radii, Voxel}, math::{Bounds, Vec3}};
+    /// # use fogbow::{covariance::{GridView, Lattice, Radii, Voxel}, math::{Bounds, Vec3}};
     /// let lattice = Lattice::new(Bounds { min: Vec3::ZERO, max: Vec3::ONE }, [2, 1, 1])?;
     /// let mut storage = [0.0; 2];
-    /// let radii = Radii::new(&Grid::new(lattice, &[Voxel::EMPTY; 2], 1)?, 0.02, 0.125, 0.3, &mut storage)?;
+    /// let radii = Radii::new(&GridView::new(lattice, &[Voxel::EMPTY; 2], 1)?, 0.02, 0.125, 0.3, &mut storage)?;
     /// assert_eq!((radii.at(Vec3::splat(0.5)), radii.at(Vec3::NEG_X)), (0.3, 0.0));   // even light: the largest allowed
     /// # Ok::<(), fogbow::covariance::LatticeError>(())
     /// ```
@@ -78,10 +78,10 @@ impl<'a> Radii<'a> {
     /// The radii, one per cell.
     ///
     /// ```
-    /// # use fogbow::{covariance::{Grid, Lattice, Radii, Voxel}, math::{Bounds, Vec3}};
+    /// # use fogbow::{covariance::{GridView, Lattice, Radii, Voxel}, math::{Bounds, Vec3}};
     /// let lattice = Lattice::new(Bounds { min: Vec3::ZERO, max: Vec3::ONE }, [2, 1, 1])?;
     /// let mut storage = [0.0; 2];
-    /// let radii = Radii::new(&Grid::new(lattice, &[Voxel::EMPTY; 2], 1)?, 0.02, 0.125, 0.3, &mut storage)?;
+    /// let radii = Radii::new(&GridView::new(lattice, &[Voxel::EMPTY; 2], 1)?, 0.02, 0.125, 0.3, &mut storage)?;
     /// assert_eq!(radii.values(), [0.3, 0.3]);
     /// # Ok::<(), fogbow::covariance::LatticeError>(())
     /// ```

@@ -1,7 +1,7 @@
 //! Steps along an eye ray that follow the light: adaptive integration, Belcour et al. 2014, § 6.4 and Alg. 1.
 
-use super::grid::Grid;
-use super::lattice::{Cells, Crossing};
+use super::grid::GridView;
+use super::lattice::{CellCrossing, Cells};
 use crate::math::{Ray, Vec3, float};
 
 /// By what rule steps are as long as they are.
@@ -29,20 +29,20 @@ pub enum Rule {
 /// Here a step ends where `∫ n dt = 1`, cell by cell. Where no photon came by, and outside, light counts as even.
 ///
 /// ```
-/// # use fogbow::{covariance::{Grid, Lattice, Rule, Steps, Voxel}, math::*};
+/// # use fogbow::{covariance::{GridView, Lattice, Rule, AdaptiveSteps, Voxel}, math::*};
 /// let lattice = Lattice::new(Bounds { min: Vec3::ZERO, max: Vec3::new(2.0, 1.0, 1.0) }, [2, 1, 1])?;
 /// let sum = Symmetric3::from_upper([25.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
 /// let voxels = [Voxel::EMPTY, Voxel { sum, weight: 1.0 }];
-/// let grid = Grid::new(lattice, &voxels, 1)?;
+/// let grid = GridView::new(lattice, &voxels, 1)?;
 /// let ray = Ray::new(Vec3::new(0.0, 0.5, 0.5), Vec3::X).with_length(2.0);
-/// let mut steps = Steps::new(&grid, &ray, Rule::Frequency, (0.01, 2.0));
+/// let mut steps = AdaptiveSteps::new(&grid, &ray, Rule::Frequency, (0.01, 2.0));
 /// assert!((steps.after(0.0) - 1.05).abs() < 1e-6);    // half in darkness, half in 5 cm of light
 /// assert!((steps.after(1.05) - 0.1).abs() < 1e-6);
 /// # Ok::<(), fogbow::covariance::LatticeError>(())
 /// ```
 #[derive(Debug, Clone)]
-pub struct Steps<'a> {
-    grid: &'a Grid<'a>,
+pub struct AdaptiveSteps<'a> {
+    grid: &'a GridView<'a>,
     direction: Vec3,
     rule: Rule,
     /// Densities of steps (m⁻¹): where light is even, and the greatest.
@@ -51,14 +51,14 @@ pub struct Steps<'a> {
     /// One over `∫ F dt`.
     per_light: f32,
     cells: Cells,
-    current: Option<(Crossing, f32)>,
+    current: Option<(CellCrossing, f32)>,
 }
 
-impl<'a> Steps<'a> {
+impl<'a> AdaptiveSteps<'a> {
     /// Along `ray`, whose length should be finite; steps lie within `limits` (m), the shortest and the longest.
     #[inline]
     #[must_use]
-    pub fn new(grid: &'a Grid<'a>, ray: &Ray, rule: Rule, limits: (f32, f32)) -> Self {
+    pub fn new(grid: &'a GridView<'a>, ray: &Ray, rule: Rule, limits: (f32, f32)) -> Self {
         let per_light = match rule {
             Rule::Frequency => 0.0,
             Rule::Error { .. } => {

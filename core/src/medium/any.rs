@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use super::{Grid, Homogeneous, Noise};
+use super::{DensityGrid, Homogeneous, Noise};
 use crate::host::{Face, Gradients, MajorantSegment, Medium, Properties};
 use crate::math::Ray;
 use crate::phase::Phase;
@@ -23,7 +23,7 @@ pub enum AnyMedium<'a> {
     /// The same everywhere.
     Homogeneous(Homogeneous),
     /// A voxel grid.
-    Grid(Grid<'a>),
+    Grid(DensityGrid<'a>),
     /// Fractal noise.
     Noise(Noise),
 }
@@ -97,8 +97,8 @@ impl From<Homogeneous> for AnyMedium<'_> {
     }
 }
 
-impl<'a> From<Grid<'a>> for AnyMedium<'a> {
-    fn from(medium: Grid<'a>) -> Self {
+impl<'a> From<DensityGrid<'a>> for AnyMedium<'a> {
+    fn from(medium: DensityGrid<'a>) -> Self {
         Self::Grid(medium)
     }
 }

@@ -15,7 +15,7 @@ pub enum MediumError {
     Placement,
     /// A size of zero, or values that do not fill it.
     Size,
-    /// Room lent for block bounds that is not of [`Grid::block_count`](super::Grid::block_count).
+    /// Room lent for block bounds that is not of [`DensityGrid::block_count`](super::DensityGrid::block_count).
     Blocks,
     /// Room lent for means that is not of [`Pyramid::cell_count`](super::Pyramid::cell_count).
     Means,
@@ -35,7 +35,7 @@ impl core::fmt::Display for MediumError {
             Self::Phase(error) => return error.fmt(f),
             Self::Placement => "the placement must be finite and invertible",
             Self::Size => "the grid's size is zero or its values do not fill it",
-            Self::Blocks => "the room lent for block bounds is not of the size `Grid::block_count` states",
+            Self::Blocks => "the room lent for block bounds is not of the size `DensityGrid::block_count` states",
             Self::Means => "the room lent for means is not of the size `Pyramid::cell_count` states",
             Self::Density => "densities must be finite and not negative",
             Self::Noise => "a parameter of the noise is out of range",

@@ -27,12 +27,12 @@ use crate::spectrum::{Gradient, Hessian, Spectrum};
 /// ```
 /// # use fogbow::host::Medium;
 /// # use fogbow::math::{Affine3, Vec3};
-/// # use fogbow::medium::{Density, Grid, MinMax};
+/// # use fogbow::medium::{Density, DensityGrid, MinMax};
 /// # use fogbow::{phase::Phase, spectrum::Spectrum};
 /// let values = [0.0, 1.0];
 /// let mut blocks = [MinMax::default(); 1];
-/// assert_eq!(blocks.len(), Grid::block_count([2, 1, 1]));
-/// let grid = Grid::new(
+/// assert_eq!(blocks.len(), DensityGrid::block_count([2, 1, 1]));
+/// let grid = DensityGrid::new(
 ///     [2, 1, 1],
 ///     Density::F32(&values),
 ///     Spectrum::splat(0.1),
@@ -47,7 +47,7 @@ use crate::spectrum::{Gradient, Hessian, Spectrum};
 /// assert_eq!(grid.extinction(Vec3::new(0.9, 0.2, 0.9))[0], 1.0);
 /// ```
 #[derive(Debug, Clone, Copy)]
-pub struct Grid<'a> {
+pub struct DensityGrid<'a> {
     pub(super) size: [u32; 3],
     /// From the world to `p·n + 1/2`.
     pub(super) shifted_from_world: Affine3,
@@ -67,15 +67,15 @@ pub struct Grid<'a> {
     pub(super) region: BoxRegion,
 }
 
-impl<'a> Grid<'a> {
+impl<'a> DensityGrid<'a> {
     /// Number of blocks whose bounds the host lends room for; 0 for a size no grid can have.
     ///
     /// A size from a file ought to be compared with the number of densities first.
     ///
     /// ```
-    /// # use fogbow::medium::{BLOCK, Grid};
-    /// assert_eq!(Grid::block_count([BLOCK, BLOCK + 1, 1]), 2);
-    /// assert_eq!(Grid::block_count([0, 5, 5]), 0);
+    /// # use fogbow::medium::{BLOCK, DensityGrid};
+    /// assert_eq!(DensityGrid::block_count([BLOCK, BLOCK + 1, 1]), 2);
+    /// assert_eq!(DensityGrid::block_count([0, 5, 5]), 0);
     /// ```
     #[must_use]
     pub fn block_count(size: [u32; 3]) -> usize {
@@ -141,13 +141,13 @@ impl<'a> Grid<'a> {
     /// `absorption` times this one, and the first scatters only.
     ///
     /// # Errors
-    /// As in [`Grid::new`].
+    /// As in [`DensityGrid::new`].
     ///
     /// ```
-    /// # use fogbow::{host::Medium, math::{Affine3, Vec3}, medium::{Density, Grid, MinMax}, phase::Phase, spectrum::Spectrum};
+    /// # use fogbow::{host::Medium, math::{Affine3, Vec3}, medium::{Density, DensityGrid, MinMax}, phase::Phase, spectrum::Spectrum};
     /// let (mut blocks, mut more) = ([MinMax::default()], [MinMax::default()]);
     /// let (steam, unit) = (Density::F32(&[2.0]), Spectrum::ONE);
-    /// let grid = Grid::new([1; 3], steam, unit, unit, Phase::ISOTROPIC, Affine3::IDENTITY, &mut blocks)?
+    /// let grid = DensityGrid::new([1; 3], steam, unit, unit, Phase::ISOTROPIC, Affine3::IDENTITY, &mut blocks)?
     ///     .with_absorption_grid(Density::F32(&[0.5]), &mut more)?;
     /// let inside = grid.properties(Vec3::splat(0.5));
     /// assert_eq!((inside.scattering[0], inside.absorption[0]), (2.0, 0.5));
@@ -165,10 +165,10 @@ impl<'a> Grid<'a> {
     /// Emission that is negative or not finite.
     ///
     /// ```
-    /// # use fogbow::{host::Medium, math::{Affine3, Vec3}, medium::{Density, Grid, MinMax}, phase::Phase, spectrum::Spectrum};
+    /// # use fogbow::{host::Medium, math::{Affine3, Vec3}, medium::{Density, DensityGrid, MinMax}, phase::Phase, spectrum::Spectrum};
     /// let mut blocks = [MinMax::default()];
     /// let (fire, unit) = (Density::F32(&[2.0]), Spectrum::ONE);
-    /// let grid = Grid::new([1; 3], fire, unit, unit, Phase::ISOTROPIC, Affine3::IDENTITY, &mut blocks)?
+    /// let grid = DensityGrid::new([1; 3], fire, unit, unit, Phase::ISOTROPIC, Affine3::IDENTITY, &mut blocks)?
     ///     .with_emission(Spectrum::splat(10.0))?;
     /// assert!(grid.is_emissive());
     /// assert_eq!(grid.properties(Vec3::splat(0.5)).emission[0], 20.0);   // where there is twice as much, twice as bright
@@ -183,13 +183,13 @@ impl<'a> Grid<'a> {
     /// (W·m⁻³·sr⁻¹) where that is 1.
     ///
     /// # Errors
-    /// As in [`Grid::new`]; emission that is negative or not finite.
+    /// As in [`DensityGrid::new`]; emission that is negative or not finite.
     ///
     /// ```
-    /// # use fogbow::{host::Medium, math::{Affine3, Vec3}, medium::{Density, Grid, MinMax}, phase::Phase, spectrum::Spectrum};
+    /// # use fogbow::{host::Medium, math::{Affine3, Vec3}, medium::{Density, DensityGrid, MinMax}, phase::Phase, spectrum::Spectrum};
     /// let (mut blocks, mut more) = ([MinMax::default()], [MinMax::default()]);
     /// let (soot, unit) = (Density::F32(&[2.0]), Spectrum::ONE);
-    /// let grid = Grid::new([1; 3], soot, unit, unit, Phase::ISOTROPIC, Affine3::IDENTITY, &mut blocks)?
+    /// let grid = DensityGrid::new([1; 3], soot, unit, unit, Phase::ISOTROPIC, Affine3::IDENTITY, &mut blocks)?
     ///     .with_emission_grid(Density::F32(&[0.5]), Spectrum::splat(10.0), &mut more)?;
     /// assert_eq!(grid.properties(Vec3::splat(0.5)).emission[0], 5.0);   // whatever the density of what absorbs
     /// # Ok::<(), fogbow::medium::MediumError>(())
@@ -217,9 +217,9 @@ impl<'a> Grid<'a> {
     /// Angular law of scattering; the same everywhere.
     ///
     /// ```
-    /// # use fogbow::{math::Affine3, medium::{Density, Grid, MinMax}, phase::{Lobe, Phase}, spectrum::Spectrum};
+    /// # use fogbow::{math::Affine3, medium::{Density, DensityGrid, MinMax}, phase::{Lobe, Phase}, spectrum::Spectrum};
     /// let (mut blocks, smoke, unit) = ([MinMax::default()], Density::F32(&[1.0]), Spectrum::ONE);
-    /// let grid = Grid::new([1; 3], smoke, unit, unit, Lobe::Rayleigh, Affine3::IDENTITY, &mut blocks)?;
+    /// let grid = DensityGrid::new([1; 3], smoke, unit, unit, Lobe::Rayleigh, Affine3::IDENTITY, &mut blocks)?;
     /// assert_eq!(grid.phase(), Phase::from(Lobe::Rayleigh));
     /// # Ok::<(), fogbow::medium::MediumError>(())
     /// ```
@@ -232,10 +232,10 @@ impl<'a> Grid<'a> {
     /// The unit cube's place in the world.
     ///
     /// ```
-    /// # use fogbow::{math::{Affine3, Vec3}, medium::{Density, Grid, MinMax, Region}, phase::Phase, spectrum::Spectrum};
+    /// # use fogbow::{math::{Affine3, Vec3}, medium::{Density, DensityGrid, MinMax, Region}, phase::Phase, spectrum::Spectrum};
     /// let (mut blocks, smoke, unit) = ([MinMax::default()], Density::F32(&[1.0]), Spectrum::ONE);
     /// let place = Affine3::from_translation(5.0 * Vec3::X);
-    /// let grid = Grid::new([1; 3], smoke, unit, unit, Phase::ISOTROPIC, place, &mut blocks)?;
+    /// let grid = DensityGrid::new([1; 3], smoke, unit, unit, Phase::ISOTROPIC, place, &mut blocks)?;
     /// let region = Region::Box(grid.region());
     /// assert!(region.contains(Vec3::new(5.5, 0.5, 0.5)) && !region.contains(Vec3::splat(0.5)));
     /// # Ok::<(), fogbow::medium::MediumError>(())
@@ -248,9 +248,9 @@ impl<'a> Grid<'a> {
     /// Number of cells along each axis.
     ///
     /// ```
-    /// # use fogbow::{math::Affine3, medium::{Density, Grid, MinMax}, phase::Phase, spectrum::Spectrum};
+    /// # use fogbow::{math::Affine3, medium::{Density, DensityGrid, MinMax}, phase::Phase, spectrum::Spectrum};
     /// let (mut blocks, smoke, unit) = ([MinMax::default()], Density::F32(&[1.0; 6]), Spectrum::ONE);
-    /// let grid = Grid::new([3, 2, 1], smoke, unit, unit, Phase::ISOTROPIC, Affine3::IDENTITY, &mut blocks)?;
+    /// let grid = DensityGrid::new([3, 2, 1], smoke, unit, unit, Phase::ISOTROPIC, Affine3::IDENTITY, &mut blocks)?;
     /// assert_eq!(grid.size(), [3, 2, 1]);
     /// # Ok::<(), fogbow::medium::MediumError>(())
     /// ```
@@ -291,7 +291,7 @@ impl<'a> Grid<'a> {
     }
 }
 
-impl Medium for Grid<'_> {
+impl Medium for DensityGrid<'_> {
     #[inline]
     fn properties(&self, point: Vec3) -> Properties {
         let Some(cell) = self.cell(point) else { return Properties::VACUUM };

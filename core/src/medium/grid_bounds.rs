@@ -1,6 +1,6 @@
 //! Bounds of a voxel grid along a ray.
 
-use super::Grid;
+use super::DensityGrid;
 use super::majorant::{Entry, Field, MinMax, Walk};
 use super::region::LocalLine;
 use crate::host::MajorantSegment;
@@ -56,7 +56,7 @@ impl FieldBounds {
     }
 }
 
-impl Grid<'_> {
+impl DensityGrid<'_> {
     /// See [`Medium::majorant_segment`](crate::host::Medium::majorant_segment) and
     /// [`Medium::marching_segment`](crate::host::Medium::marching_segment) of a grid.
     #[inline]

@@ -4,7 +4,7 @@ use bytemuck::{Pod, Zeroable};
 use glam::{Affine3, Vec3};
 
 use super::region::{LocalLine, lesser};
-use super::{Density, Grid, MediumError};
+use super::{Density, DensityGrid, MediumError};
 
 /// Cells along the edge of a block.
 ///
@@ -89,7 +89,7 @@ pub(super) struct Field<'a> {
 impl<'a> Field<'a> {
     pub(super) fn new(density: Density<'a>, size: [u32; 3], blocks: &'a mut [MinMax]) -> Result<Self, MediumError> {
         density.check(size)?;
-        if blocks.len() != Grid::block_count(size) {
+        if blocks.len() != DensityGrid::block_count(size) {
             return Err(MediumError::Blocks);
         }
         let whole = fill(blocks, &density, size);

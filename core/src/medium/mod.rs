@@ -44,7 +44,7 @@ pub mod region;
 pub use any::AnyMedium;
 pub use density::Density;
 pub use error::MediumError;
-pub use grid::Grid;
+pub use grid::DensityGrid;
 pub use homogeneous::Homogeneous;
 pub use majorant::{BLOCK, MinMax};
 pub use noise::{FractalNoise, MAX_OCTAVES, Noise};

@@ -147,7 +147,7 @@ impl<'a, M: Medium> Pyramid<'a, M> {
     /// [`Pyramid::cell_count`], is filled here.
     ///
     /// A cell's mean is taken over 2³ to 8³ points, two for each [`Medium::resolution`] along an axis: exact for a
-    /// [`Grid`](super::Grid) of the same cells. Cubic cells as long as the medium's own serve best.
+    /// [`DensityGrid`](super::DensityGrid) of the same cells. Cubic cells as long as the medium's own serve best.
     ///
     /// Error there, against dense sums, for radii of half a cell to half the box, relative to the largest extinction:
     /// 0.23 % in the mean and 2.2 % at the 99th percentile for a plume of smoke (0.35 % and 3.4 % with cells twice as

@@ -1,7 +1,7 @@
 //! Layer 7: pictures, sample by sample, as work in rounds.
 //!
 //! A round is a pass: some more samples of every pixel. Tiles that have little enough noise are left out. What a
-//! sample is, the host says with an [`Integrand`]; where random numbers come from, with a [`Source`](crate::sampling::Source).
+//! sample is, the host says with an [`Integrand`]; where random numbers come from, with a [`GeneratorSource`](crate::sampling::GeneratorSource).
 //!
 //! | file | holds |
 //! |---|---|
@@ -12,4 +12,4 @@ mod noise;
 mod tiles;
 
 pub use noise::Goal;
-pub use tiles::{Counts, Integrand, Output, Sample, Settings, Tally, Tiles, accumulate};
+pub use tiles::{Counts, Integrand, Sample, Settings, Tally, TileOutput, Tiles, accumulate};

@@ -3,7 +3,7 @@
 use core::ops::Range;
 
 use super::noise::{Goal, Noise, Part};
-use crate::sampling::{Source, pixel_key};
+use crate::sampling::{GeneratorSource, pixel_key};
 use crate::spectrum::Spectrum;
 use crate::storage::List;
 use crate::work::Rounds;
@@ -84,7 +84,7 @@ pub struct Counts {
 /// What a job leaves: the new sums of some pixels.
 #[derive(Debug)]
 #[cfg_attr(feature = "alloc", derive(Default))]
-pub struct Output<'o, T> {
+pub struct TileOutput<'o, T> {
     sums: List<'o, [f64; 3]>,
     colours: List<'o, Spectrum>,
     counts: Counts,
@@ -102,14 +102,14 @@ const SAMPLES_PER_JOB: u32 = 64;
 ///
 /// ```
 /// # #[cfg(feature = "alloc")] {
-/// use fogbow::picture::{Output, Sample, Settings, Tiles};
+/// use fogbow::picture::{TileOutput, Sample, Settings, Tiles};
 /// use fogbow::{sampling::{Generator, Independent, uniform}, spectrum::Spectrum, work};
 /// let settings = Settings { size: [4, 3], layers: 1, samples: 64, goal: None, seed: 0, tile: 8 };
 /// let mut tiles = Tiles::new(settings, Independent);
 /// let ramp = |sample: &Sample<'_, ()>, rng: &mut Generator, layers: &mut [Spectrum]| {
 ///     layers[0] = Spectrum::splat((sample.x as f32 + uniform(rng)) / 4.0);
 /// };
-/// work::finish(&mut tiles, &ramp, &mut Output::default());
+/// work::finish(&mut tiles, &ramp, &mut TileOutput::default());
 /// assert_eq!((tiles.count(1, 0), tiles.counts().samples), (64, 64 * 12));
 /// assert!((tiles.mean(1, 0, 0).mean() - 1.5 / 4.0).abs() < 0.05);
 /// # }
@@ -344,16 +344,16 @@ fn each_tile(
 
 impl<I, Q> Rounds<I> for Tiles<'_, Q, <I::Tally as Tally>::Total>
 where
-    Q: Source,
+    Q: GeneratorSource,
     I: Integrand<Q::Rng> + ?Sized,
 {
-    type Output<'o> = Output<'o, I::Tally>;
+    type Output<'o> = TileOutput<'o, I::Tally>;
 
     fn jobs(&self) -> Range<u32> {
         if self.is_enough { 0..0 } else { self.taken..self.job_count() }
     }
 
-    fn run(&self, job: u32, integrand: &I, output: &mut Output<'_, I::Tally>) {
+    fn run(&self, job: u32, integrand: &I, output: &mut TileOutput<'_, I::Tally>) {
         output.sums.clear();
         output.colours.clear();
         (output.counts, output.tally) = (Counts::default(), I::Tally::default());
@@ -361,7 +361,7 @@ where
         for _ in 0..layers {
             let _ = output.colours.push(Spectrum::ZERO);
         }
-        let Output { sums: new, colours, counts, tally } = output;
+        let TileOutput { sums: new, colours, counts, tally } = output;
         for pixel in self.pixels_of(job) {
             let (x, y) = (pixel % self.settings.size[0], pixel / self.settings.size[0]);
             let from = pixel as usize * layers;
@@ -385,7 +385,7 @@ where
         }
     }
 
-    fn accept(&mut self, output: &Output<'_, I::Tally>) {
+    fn accept(&mut self, output: &TileOutput<'_, I::Tally>) {
         if !self.is_running() {
             return;
         }

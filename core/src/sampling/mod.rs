@@ -8,7 +8,7 @@
 //! | [`distance`] | exponential, truncated exponential, equiangular distances |
 //! | [`discrete`] | choices by weight, in one and two dimensions |
 //! | [`mis`] | multiple importance sampling weights |
-//! | [`source`] | [`Source`]: where the random numbers of a pixel or a path start |
+//! | [`source`] | [`GeneratorSource`]: where the random numbers of a pixel or a path start |
 
 pub mod discrete;
 pub mod distance;
@@ -17,5 +17,5 @@ pub mod source;
 pub mod uniform;
 pub mod warp;
 
-pub use source::{Independent, Source, independent, pixel_key, pixel_seed};
+pub use source::{GeneratorSource, Independent, independent, pixel_key, pixel_seed};
 pub use uniform::{Generator, even2, even3, uniform, uniform2};

@@ -8,7 +8,7 @@ use super::uniform::mix;
 /// A source of random numbers: a generator for every sample of everything that has a key.
 ///
 /// A host that brings a low-discrepancy sequence implements this for it: the samples of one key are the points of a sequence.
-pub trait Source {
+pub trait GeneratorSource {
     /// The generator of one sample.
     type Rng: Rng;
 
@@ -20,7 +20,7 @@ pub trait Source {
 /// Every number independent of all others: [`independent`].
 ///
 /// ```
-/// use fogbow::sampling::{Independent, Source, pixel_key, uniform};
+/// use fogbow::sampling::{Independent, GeneratorSource, pixel_key, uniform};
 /// let first = |x, y| uniform(&mut Independent.start(1, pixel_key(x, y), 0));
 /// assert_eq!(first(3, 4), first(3, 4));
 /// assert_ne!(first(3, 4), first(4, 3));
@@ -28,7 +28,7 @@ pub trait Source {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Independent;
 
-impl Source for Independent {
+impl GeneratorSource for Independent {
     type Rng = Generator;
 
     #[inline]

@@ -1,6 +1,6 @@
 //! Eye rays: where virtual lights are gathered.
 
-use super::gather::{Gathered, Gatherer, LEVELS};
+use super::gather::{GatheredVpls, Gatherer, LEVELS};
 use super::light::VirtualLight;
 use super::scatterer::Receiver;
 use crate::host::{Hit, Medium, Rng, Scene};
@@ -48,7 +48,7 @@ impl EyeSettings {
 
 /// What an eye ray sees.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Seen {
+pub struct VplRadiance {
     /// Radiance by what the eye sees first.
     pub radiance: Radiance,
     /// Of that, light of virtual lights, clamped.
@@ -89,10 +89,10 @@ pub fn radiance<M: Medium + ?Sized, S: Scene + ?Sized>(
     share: f32,
     settings: &EyeSettings,
     rng: &mut (impl Rng + ?Sized),
-) -> Seen {
-    let mut eye = Eye { gatherer, lights, share, settings, sum: Gathered::default() };
+) -> VplRadiance {
+    let mut eye = Eye { gatherer, lights, share, settings, sum: GatheredVpls::default() };
     let radiance = path::radiance_beyond(ray, &gatherer.world, &settings.paths, rng, &mut eye);
-    Seen { radiance, clamped: eye.sum.clamped, compensated: eye.sum.compensated, straight: eye.sum.straight }
+    VplRadiance { radiance, clamped: eye.sum.clamped, compensated: eye.sum.compensated, straight: eye.sum.straight }
 }
 
 /// Calls `visit(receiver, weight)` for a point of the medium and the surface that an eye ray would gather at; `weight` is
@@ -162,7 +162,7 @@ struct Eye<'a, M: ?Sized, S: ?Sized> {
     lights: &'a [VirtualLight],
     share: f32,
     settings: &'a EyeSettings,
-    sum: Gathered,
+    sum: GatheredVpls,
 }
 
 type Points = heapless::Vec<(Receiver, Spectrum), POINTS>;
@@ -215,7 +215,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Eye<'_, M, S> {
         sum * (1.0 / count as f32)
     }
 
-    fn add(&mut self, gathered: &Gathered, throughput: Spectrum, weight: Spectrum) -> Spectrum {
+    fn add(&mut self, gathered: &GatheredVpls, throughput: Spectrum, weight: Spectrum) -> Spectrum {
         self.sum.add(gathered, throughput * weight);
         gathered.total() * weight
     }

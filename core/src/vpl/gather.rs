@@ -24,17 +24,17 @@ const MAX_STEPS: u32 = 1000;
 /// What is gathered, by how it was found; in a medium per metre, W·m⁻³·sr⁻¹, else W·m⁻²·sr⁻¹.
 ///
 /// ```
-/// # use fogbow::{spectrum::Spectrum, vpl::Gathered};
+/// # use fogbow::{spectrum::Spectrum, vpl::GatheredVpls};
 /// let one = Spectrum::ONE;
-/// let found = Gathered { clamped: one, compensated: [one * 0.5, one * 0.25, one * 0.0, one * 0.0], ..Gathered::default() };
+/// let found = GatheredVpls { clamped: one, compensated: [one * 0.5, one * 0.25, one * 0.0, one * 0.0], ..GatheredVpls::default() };
 /// assert_eq!(found.total(), one * 1.75);
-/// let mut mean = Gathered::default();
+/// let mut mean = GatheredVpls::default();
 /// mean.add(&found, one * 0.5);
-/// mean.add(&Gathered::default(), one * 0.5);
+/// mean.add(&GatheredVpls::default(), one * 0.5);
 /// assert_eq!(mean.total(), one * 0.875);   // over both samples
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Gathered {
+pub struct GatheredVpls {
     /// Of the virtual lights, clamped.
     pub clamped: Spectrum,
     /// What each step of compensation adds.
@@ -45,7 +45,7 @@ pub struct Gathered {
     pub mirrored: Spectrum,
 }
 
-impl Gathered {
+impl GatheredVpls {
     /// All of it.
     #[inline]
     #[must_use]
@@ -171,8 +171,8 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Gatherer<'_, M, S> {
     /// ```text
     /// Q_k(y) = K_B [E_k + Q_k]
     /// ```
-    pub fn gather(&self, receiver: &Receiver, lights: &[VirtualLight], most: u32, rng: &mut Generator) -> Gathered {
-        let mut gathered = Gathered { clamped: self.sum(receiver, lights, most, rng), ..Gathered::default() };
+    pub fn gather(&self, receiver: &Receiver, lights: &[VirtualLight], most: u32, rng: &mut Generator) -> GatheredVpls {
+        let mut gathered = GatheredVpls { clamped: self.sum(receiver, lights, most, rng), ..GatheredVpls::default() };
         let Some(compensation) = self.compensation else { return gathered };
         for group in lights.chunks(compensation.lights_per_path.max(1) as usize) {
             // No vertex sees light that has been scattered before.
@@ -191,8 +191,8 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Gatherer<'_, M, S> {
     /// ```text
     /// P(y) = K_B [D + P]
     /// ```
-    pub fn of_the_lights(&self, receiver: &Receiver, most: u32, rng: &mut Generator) -> Gathered {
-        let mut gathered = Gathered { mirrored: self.mirrored(receiver, most, rng), ..Gathered::default() };
+    pub fn of_the_lights(&self, receiver: &Receiver, most: u32, rng: &mut Generator) -> GatheredVpls {
+        let mut gathered = GatheredVpls { mirrored: self.mirrored(receiver, most, rng), ..GatheredVpls::default() };
         self.compensate(receiver, most, rng, |step, vertex, weight, rng| {
             let light = self.direct(vertex, rng) + self.mirrored(vertex, most - step, rng);
             gathered.straight += weight * light;

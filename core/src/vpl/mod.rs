@@ -21,7 +21,7 @@
 //! | [`gather`] | [`Gatherer`]: clamped light and compensation at a point |
 //! | [`eye`] | [`radiance`]: eye rays |
 //! | `settings` | [`Settings`]: every tuned number, from an [`Outline`](crate::world::Outline) |
-//! | `pass` | [`Pass`]: the lights of a pass, as work in rounds; [`witnesses`] of what matters |
+//! | `pass` | [`VplPass`]: the lights of a pass, as work in rounds; [`witnesses`] of what matters |
 
 pub mod bound;
 mod compensate;
@@ -35,10 +35,10 @@ mod settings;
 
 pub use bound::{Bound, NoBound, contraction, geometry, radius_for, usual_bound};
 pub use compensate::{Compensation, Flights, next_vertex};
-pub use eye::{EyeSettings, Seen, radiance, receivers};
-pub use gather::{Gathered, Gatherer, LEVELS};
+pub use eye::{EyeSettings, VplRadiance, radiance, receivers};
+pub use gather::{GatheredVpls, Gatherer, LEVELS};
 pub use generate::{select, shoot};
 pub use light::{Connection, VirtualLight};
-pub use pass::{Memory, Output, Pass, PassError, Place, witnesses};
+pub use pass::{CurvePlace, VplMemory, VplOutput, VplPass, VplPassError, witnesses};
 pub use scatterer::{Receiver, Scatterer};
 pub use settings::Settings;

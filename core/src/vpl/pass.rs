@@ -13,7 +13,7 @@ use super::settings::Settings;
 use crate::host::{Medium, Scene};
 use crate::math::{Bounds, Ray, float};
 use crate::sampling::uniform::mix;
-use crate::sampling::{Generator, Source, even2, independent, uniform};
+use crate::sampling::{Generator, GeneratorSource, even2, independent, uniform};
 use crate::storage::List;
 use crate::work::Rounds;
 use crate::world::World;
@@ -34,7 +34,7 @@ const DEFENSIVE: f32 = 0.3;
 
 /// Why there are no lights.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum PassError {
+pub enum VplPassError {
     /// No lights, candidates, points, paths or samples.
     Settings,
     /// The medium glows; paths leave lights only, so light of the medium that it scatters itself would be missing.
@@ -43,7 +43,7 @@ pub enum PassError {
     TooMany,
 }
 
-impl core::fmt::Display for PassError {
+impl core::fmt::Display for VplPassError {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         f.write_str(match self {
             Self::Settings => "there must be at least one virtual light, candidate and point",
@@ -53,7 +53,7 @@ impl core::fmt::Display for PassError {
     }
 }
 
-impl core::error::Error for PassError {}
+impl core::error::Error for VplPassError {}
 
 /// Calls `keep` for points of 64 eye rays, spread over the picture: by what they see it is told which lights matter. None if
 /// there are no candidates to choose from.
@@ -88,24 +88,24 @@ pub fn witnesses<M: Medium + ?Sized, S: Scene + ?Sized>(
     }
 }
 
-/// What a job of a [`Pass`] leaves.
+/// What a job of a [`VplPass`] leaves.
 #[derive(Debug)]
 #[cfg_attr(feature = "alloc", derive(Default))]
-pub struct Output<'o> {
+pub struct VplOutput<'o> {
     lights: List<'o, VirtualLight>,
     seen: List<'o, f32>,
-    error: Option<PassError>,
+    error: Option<VplPassError>,
 }
 
-impl<'o> Output<'o> {
+impl<'o> VplOutput<'o> {
     /// In lent memory: for the lights that 64 paths leave, and 512 numbers. Where that is too small, the pass ends with
-    /// [`PassError::TooMany`].
+    /// [`VplPassError::TooMany`].
     ///
     /// ```
-    /// # use fogbow::{math::Vec3, phase::Phase, spectrum::Spectrum, vpl::{Output, VirtualLight}};
+    /// # use fogbow::{math::Vec3, phase::Phase, spectrum::Spectrum, vpl::{VplOutput, VirtualLight}};
     /// let light = VirtualLight::in_medium(Vec3::ZERO, Vec3::Z, Spectrum::ONE, 1, &Phase::ISOTROPIC);
     /// let (mut lights, mut seen) = ([light; 1024], [0.0; 512]);
-    /// let output = Output::new(&mut lights[..], &mut seen[..]);
+    /// let output = VplOutput::new(&mut lights[..], &mut seen[..]);
     /// # let _ = output;
     /// ```
     pub fn new(lights: impl Into<List<'o, VirtualLight>>, seen: impl Into<List<'o, f32>>) -> Self {
@@ -115,37 +115,37 @@ impl<'o> Output<'o> {
 
 /// Place of a light along a curve, and its number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
-pub struct Place {
+pub struct CurvePlace {
     key: u64,
     number: u32,
 }
 
-/// Memory of a [`Pass`].
+/// Memory of a [`VplPass`].
 #[derive(Debug)]
 #[cfg_attr(feature = "alloc", derive(Default))]
-pub struct Memory<'s> {
+pub struct VplMemory<'s> {
     lights: List<'s, VirtualLight>,
-    order: List<'s, Place>,
+    order: List<'s, CurvePlace>,
     importance: List<'s, f32>,
     seen: List<'s, f32>,
 }
 
-impl<'s> Memory<'s> {
+impl<'s> VplMemory<'s> {
     /// Lent: room for all candidates of a pass in `lights`, and for as many in each of the others, or for none if there are no
     /// witnesses.
     ///
     /// ```
-    /// # use fogbow::{math::Vec3, phase::Phase, spectrum::Spectrum, vpl::{Memory, Place, VirtualLight}};
+    /// # use fogbow::{math::Vec3, phase::Phase, spectrum::Spectrum, vpl::{VplMemory, CurvePlace, VirtualLight}};
     /// let light = VirtualLight::in_medium(Vec3::ZERO, Vec3::Z, Spectrum::ONE, 1, &Phase::ISOTROPIC);
-    /// let (mut lights, mut order) = ([light; 100], [Place::default(); 100]);
+    /// let (mut lights, mut order) = ([light; 100], [CurvePlace::default(); 100]);
     /// let mut numbers = [[0.0_f32; 100]; 2];
     /// let [importance, seen] = &mut numbers;
-    /// let memory = Memory::new(&mut lights[..], &mut order[..], &mut importance[..], &mut seen[..]);
+    /// let memory = VplMemory::new(&mut lights[..], &mut order[..], &mut importance[..], &mut seen[..]);
     /// # let _ = memory;
     /// ```
     pub fn new(
         lights: impl Into<List<'s, VirtualLight>>,
-        order: impl Into<List<'s, Place>>,
+        order: impl Into<List<'s, CurvePlace>>,
         importance: impl Into<List<'s, f32>>,
         seen: impl Into<List<'s, f32>>,
     ) -> Self {
@@ -177,10 +177,10 @@ enum Round {
 /// light's share of all flux, is its importance ([`select`]). Lights kept with such probabilities make errors small everywhere,
 /// dark corners included.
 ///
-/// Paths draw from a [`Source`]; a low-discrepancy one makes lights even.
+/// Paths draw from a [`GeneratorSource`]; a low-discrepancy one makes lights even.
 ///
 /// ```
-/// use fogbow::vpl::{self, Output, Pass, Settings};
+/// use fogbow::vpl::{self, VplOutput, VplPass, Settings};
 /// use fogbow::{host::Empty, light::{Light, PointLight}, math::*, medium::Homogeneous, phase::Phase};
 /// use fogbow::sampling::{Generator, Independent};
 /// use fogbow::{spectrum::Spectrum, work, world::{Outline, World}};
@@ -190,15 +190,15 @@ enum Round {
 /// let outline = Outline::of(&world, Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE });
 /// // A pilot tells how many paths leave as many candidates.
 /// let settings = Settings { lights: 100, candidates: 4, ..Settings::for_outline(&outline) };
-/// let mut pilot = Pass::pilot(&settings, Independent);
-/// work::finish(&mut pilot, &world, &mut Output::default());
+/// let mut pilot = VplPass::pilot(&settings, Independent);
+/// work::finish(&mut pilot, &world, &mut VplOutput::default());
 /// let settings = pilot.settings_for_lights();
 /// // Points of the picture tell which matter.
 /// let eye = |[x, y]: [f32; 2], _: &mut Generator| Ray::between(Vec3::NEG_Z * 2.0, Vec3::new(x, y, 0.0));
 /// let mut witnesses = Vec::new();
 /// vpl::witnesses(&world, &settings, eye, |witness| witnesses.push(witness));
-/// let mut pass = Pass::new(&settings, 0, Independent, &witnesses);
-/// work::finish(&mut pass, &world, &mut Output::default());
+/// let mut pass = VplPass::new(&settings, 0, Independent, &witnesses);
+/// work::finish(&mut pass, &world, &mut VplOutput::default());
 /// let lights = pass.finish()?;
 /// assert!((99..=101).contains(&lights.len()));
 /// // A sample of a pixel.
@@ -210,13 +210,13 @@ enum Round {
 /// # Ok::<(), Box<dyn core::error::Error>>(())
 /// ```
 #[derive(Debug)]
-pub struct Pass<'s, Q> {
+pub struct VplPass<'s, Q> {
     settings: Settings,
     /// The pass's number.
     number: u32,
     source: Q,
     witnesses: &'s [Receiver],
-    memory: Memory<'s>,
+    memory: VplMemory<'s>,
     /// Of selection and order.
     rng: Generator,
     round: Round,
@@ -224,37 +224,37 @@ pub struct Pass<'s, Q> {
     taken: u32,
     /// Lights that paths left.
     traced: usize,
-    error: Option<PassError>,
+    error: Option<VplPassError>,
 }
 
 /// The number of a pass that is never rendered.
 const PILOT: u32 = u32::MAX;
 
-impl<'s, Q: Source> Pass<'s, Q> {
-    /// A pass that is never rendered, of 2048 paths: see [`Pass::settings_for_lights`].
+impl<'s, Q: GeneratorSource> VplPass<'s, Q> {
+    /// A pass that is never rendered, of 2048 paths: see [`VplPass::settings_for_lights`].
     #[cfg(feature = "alloc")]
     #[must_use]
     pub fn pilot(settings: &Settings, source: Q) -> Self {
-        Self::pilot_in(Memory::default(), settings, source)
+        Self::pilot_in(VplMemory::default(), settings, source)
     }
 
-    /// As [`Pass::pilot`], in lent memory.
+    /// As [`VplPass::pilot`], in lent memory.
     #[must_use]
-    pub fn pilot_in(memory: Memory<'s>, settings: &Settings, source: Q) -> Self {
+    pub fn pilot_in(memory: VplMemory<'s>, settings: &Settings, source: Q) -> Self {
         Self::new_in(memory, &settings.of_pilot(), PILOT, source, &[])
     }
 
-    /// Pass number `number`, of what `source` draws; see [`Pass`].
+    /// Pass number `number`, of what `source` draws; see [`VplPass`].
     #[cfg(feature = "alloc")]
     #[must_use]
     pub fn new(settings: &Settings, number: u32, source: Q, witnesses: &'s [Receiver]) -> Self {
-        Self::new_in(Memory::default(), settings, number, source, witnesses)
+        Self::new_in(VplMemory::default(), settings, number, source, witnesses)
     }
 
-    /// As [`Pass::new`], in lent memory. Where that is too small, [`Pass::finish`] says so.
+    /// As [`VplPass::new`], in lent memory. Where that is too small, [`VplPass::finish`] says so.
     #[must_use]
     pub fn new_in(
-        mut memory: Memory<'s>,
+        mut memory: VplMemory<'s>,
         settings: &Settings,
         number: u32,
         source: Q,
@@ -272,17 +272,17 @@ impl<'s, Q: Source> Pass<'s, Q> {
             jobs: settings.paths.div_ceil(PATHS_PER_JOB),
             taken: 0,
             traced: 0,
-            error: (!settings.is_valid()).then_some(PassError::Settings),
+            error: (!settings.is_valid()).then_some(VplPassError::Settings),
         }
     }
 }
 
-impl<'s, Q> Pass<'s, Q> {
+impl<'s, Q> VplPass<'s, Q> {
     /// The lights. Of a pass that was stopped they are all of those of the paths so far, and stand for all light all the same.
     ///
     /// # Errors
-    /// See [`PassError`].
-    pub fn finish(mut self) -> Result<List<'s, VirtualLight>, PassError> {
+    /// See [`VplPassError`].
+    pub fn finish(mut self) -> Result<List<'s, VirtualLight>, VplPassError> {
         if let Some(error) = self.error {
             return Err(error);
         }
@@ -299,7 +299,7 @@ impl<'s, Q> Pass<'s, Q> {
 
     /// What went wrong so far, if anything: then no jobs are left.
     #[must_use]
-    pub fn error(&self) -> Option<PassError> {
+    pub fn error(&self) -> Option<VplPassError> {
         self.error
     }
 
@@ -332,33 +332,33 @@ impl<'s, Q> Pass<'s, Q> {
     }
 
     /// After the last path.
-    fn traced(&mut self) -> Result<(), PassError> {
+    fn traced(&mut self) -> Result<(), VplPassError> {
         self.share_out();
         self.round = Round::Done;
         let count = self.memory.lights.len();
         if self.witnesses.is_empty() || count <= self.settings.lights as usize {
             return Ok(());
         }
-        u32::try_from(count).map_err(|_| PassError::TooMany)?;
+        u32::try_from(count).map_err(|_| VplPassError::TooMany)?;
         // Systematic sampling keeps as many of every stretch of the list as it should: near lights belong together.
         self.sort()?;
         for _ in 0..count {
-            self.memory.importance.push(0.0).map_err(|_| PassError::TooMany)?;
+            self.memory.importance.push(0.0).map_err(|_| VplPassError::TooMany)?;
         }
-        let witnesses = u32::try_from(self.witnesses.len()).map_err(|_| PassError::TooMany)?;
-        self.jobs = self.blocks().checked_mul(witnesses).ok_or(PassError::TooMany)?;
+        let witnesses = u32::try_from(self.witnesses.len()).map_err(|_| VplPassError::TooMany)?;
+        self.jobs = self.blocks().checked_mul(witnesses).ok_or(VplPassError::TooMany)?;
         (self.round, self.taken) = (Round::Weigh, 0);
         Ok(())
     }
 
     /// Sorts the lights along a curve that fills space, those of the medium first.
-    fn sort(&mut self) -> Result<(), PassError> {
-        let Memory { lights, order, .. } = &mut self.memory;
+    fn sort(&mut self) -> Result<(), VplPassError> {
+        let VplMemory { lights, order, .. } = &mut self.memory;
         let lights = lights.as_mut_slice();
         let bounds = Bounds::of(lights.iter().map(|light| light.position));
         for (number, light) in lights.iter().enumerate() {
             let key = u64::from(light.is_on_surface()) << 63 | curve(light.position, &bounds);
-            order.push(Place { key, number: number as u32 }).map_err(|_| PassError::TooMany)?;
+            order.push(CurvePlace { key, number: number as u32 }).map_err(|_| VplPassError::TooMany)?;
         }
         let order = order.as_mut_slice();
         // Of equal keys the first comes first.
@@ -377,7 +377,7 @@ impl<'s, Q> Pass<'s, Q> {
 
     /// One witness has seen all lights.
     fn witnessed(&mut self) {
-        let Memory { importance, seen, .. } = &mut self.memory;
+        let VplMemory { importance, seen, .. } = &mut self.memory;
         let total: f64 = seen.as_slice().iter().copied().map(f64::from).sum();
         if total > 0.0 {
             for (square, seen) in importance.as_mut_slice().iter_mut().zip(seen.as_slice()) {
@@ -390,7 +390,7 @@ impl<'s, Q> Pass<'s, Q> {
 
     /// After the last witness.
     fn weighed(&mut self) {
-        let Memory { lights, importance, .. } = &mut self.memory;
+        let VplMemory { lights, importance, .. } = &mut self.memory;
         let flux: f64 = lights.as_slice().iter().map(|light| f64::from(light.flux.mean())).sum();
         let of_flux =
             |light: &VirtualLight| if flux > 0.0 { (f64::from(light.flux.mean()) / flux) as f32 } else { 1.0 };
@@ -405,30 +405,30 @@ impl<'s, Q> Pass<'s, Q> {
     }
 }
 
-impl<M, S, Q> Rounds<World<'_, M, S>> for Pass<'_, Q>
+impl<M, S, Q> Rounds<World<'_, M, S>> for VplPass<'_, Q>
 where
     M: Medium + ?Sized,
     S: Scene + ?Sized,
-    Q: Source,
+    Q: GeneratorSource,
 {
-    type Output<'o> = Output<'o>;
+    type Output<'o> = VplOutput<'o>;
 
     fn jobs(&self) -> Range<u32> {
         if self.error.is_some() || self.round == Round::Done { 0..0 } else { self.taken..self.jobs }
     }
 
-    fn run(&self, job: u32, world: &World<'_, M, S>, output: &mut Output<'_>) {
+    fn run(&self, job: u32, world: &World<'_, M, S>, output: &mut VplOutput<'_>) {
         output.lights.clear();
         output.seen.clear();
-        output.error = world.medium.is_emissive().then_some(PassError::Glowing);
+        output.error = world.medium.is_emissive().then_some(VplPassError::Glowing);
         if output.error.is_some() {
             return;
         }
-        let Output { lights, seen, error } = output;
+        let VplOutput { lights, seen, error } = output;
         let settings = &self.settings;
         let mut note = |pushed: Result<(), _>| {
             if pushed.is_err() {
-                *error = Some(PassError::TooMany);
+                *error = Some(VplPassError::TooMany);
             }
         };
         if self.round == Round::Trace {
@@ -452,13 +452,13 @@ where
         }
     }
 
-    fn accept(&mut self, output: &Output<'_>) {
+    fn accept(&mut self, output: &VplOutput<'_>) {
         self.error = self.error.or(output.error);
-        let Memory { lights, seen, .. } = &mut self.memory;
+        let VplMemory { lights, seen, .. } = &mut self.memory;
         let kept = lights
             .extend_from_slice(output.lights.as_slice())
             .and_then(|()| seen.extend_from_slice(output.seen.as_slice()))
-            .map_err(|_| PassError::TooMany);
+            .map_err(|_| VplPassError::TooMany);
         self.error = self.error.or(kept.err());
         self.taken += 1;
         if self.error.is_some() {

@@ -45,7 +45,7 @@ pub struct Settings {
     pub bounds: Bounds,
     /// How long paths may grow, from the eye and from the lights.
     pub walk: path::Settings,
-    /// Paths sent from the lights in each pass: see [`Pass::settings_for_lights`](super::Pass::settings_for_lights).
+    /// Paths sent from the lights in each pass: see [`VplPass::settings_for_lights`](super::VplPass::settings_for_lights).
     pub paths: u32,
     /// Virtual lights of each pass, about.
     pub lights: u32,

@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use fogbow::bytes::Crc;
-use fogbow::covariance::bytes::BytesError;
-use fogbow::covariance::{CovarianceGrid, Fill, Grid, Rule, Settings, Steps};
+use fogbow::covariance::bytes::GridBytesError;
+use fogbow::covariance::{AdaptiveSteps, CovarianceGrid, Fill, GridView, Rule, Settings};
 use fogbow::host::Medium;
 use fogbow::light::Light;
 use fogbow::math::Ray;
@@ -110,7 +110,7 @@ impl WithMedium for GridJob<'_> {
         let tag = arguments.tag(self.scene, &self.paths)?;
         let grid = if let Some(file) = &arguments.grid_in {
             statistics.time("read grid", || load(file, tag)).map_err(|error| match error.problem {
-                Problem::Content(BytesError::Tag { .. }) => {
+                Problem::Content(GridBytesError::Tag { .. }) => {
                     format!("{}: was made for another scene, or with another --max-depth", file.display())
                 }
                 _ => error.to_string(),
@@ -170,7 +170,7 @@ impl CovarianceArguments {
 
 impl MarchArguments {
     /// Steps in a world of this diagonal, along rays through `grid` if there is one.
-    pub(super) fn stride<'a>(&self, size: f32, grid: Option<&'a Grid<'a>>) -> Stride<'a> {
+    pub(super) fn stride<'a>(&self, size: f32, grid: Option<&'a GridView<'a>>) -> Stride<'a> {
         let given = |length: Option<f64>| length.map(|l| l as f32);
         let grid = grid.filter(|_| self.step != Step::Uniform);
         let longest = given(self.step_length).unwrap_or(if grid.is_some() { size / 8.0 } else { size / 32.0 });
@@ -188,7 +188,7 @@ impl MarchArguments {
 /// How long steps along eye rays are.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Stride<'a> {
-    along: Option<(&'a Grid<'a>, Rule)>,
+    along: Option<(&'a GridView<'a>, Rule)>,
     limits: (f32, f32),
 }
 
@@ -196,7 +196,7 @@ impl<'a> Stride<'a> {
     /// Lengths (m) of the steps along `ray` by where they start (m), asked in order.
     pub(super) fn steps(&self, ray: &Ray) -> impl FnMut(f32) -> f32 + use<'a> {
         let longest = self.limits.1;
-        let mut steps = self.along.map(|(grid, rule)| Steps::new(grid, ray, rule, self.limits));
+        let mut steps = self.along.map(|(grid, rule)| AdaptiveSteps::new(grid, ray, rule, self.limits));
         move |from| steps.as_mut().map_or(longest, |steps| steps.after(from))
     }
 }

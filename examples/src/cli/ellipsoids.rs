@@ -1,6 +1,6 @@
 //! A picture of a covariance grid: ellipsoids of how far light stays alike.
 
-use fogbow::covariance::{Grid, Voxel};
+use fogbow::covariance::{GridView, Voxel};
 use fogbow::host::Scene;
 use fogbow::math::{Ray, Symmetric3, Vec2, Vec3};
 use fogbow::spectrum::Spectrum;
@@ -39,7 +39,7 @@ struct Picture {
 }
 
 impl Picture {
-    fn new(grid: &Grid<'_>) -> Self {
+    fn new(grid: &GridView<'_>) -> Self {
         let lattice = grid.lattice();
         let size = lattice.size();
         let stride = size.into_iter().max().unwrap_or(1).div_ceil(ALONG).max(1);
@@ -109,7 +109,7 @@ fn sorted(mut values: [f32; 3]) -> [f32; 3] {
 
 /// The film with a layer of ellipsoids in front of what is not hidden by surfaces. Their axes are those of the covariances,
 /// the longest where light varies least; all are drawn with one longest axis, and their colour tells how fast light varies.
-pub(super) fn drawn(film: &Film, grid: &Grid<'_>, camera: &Camera, world: &World<'_>) -> Result<Film, Failure> {
+pub(super) fn drawn(film: &Film, grid: &GridView<'_>, camera: &Camera, world: &World<'_>) -> Result<Film, Failure> {
     let names: Vec<&str> = film.layers().iter().map(String::as_str).chain([LAYER]).collect();
     let mut out = Film::new(film.width(), film.height(), &names)?;
     let layers: Vec<_> = (0..film.layers().len()).filter_map(|i| film.mean(i)).collect();
@@ -145,7 +145,7 @@ mod tests {
         let mut voxel = Voxel::EMPTY;
         voxel.add_covariance(&Symmetric3::from_upper([100.0, 0.0, 0.0, 4.0, 0.0, 1.0]), 2.0);
         let voxels = [voxel];
-        let picture = Picture::new(&Grid::new(lattice, &voxels, 1).unwrap());
+        let picture = Picture::new(&GridView::new(lattice, &voxels, 1).unwrap());
         let [ellipsoid] = &picture.ellipsoids[..] else { panic!("one ellipsoid") };
         assert_eq!(ellipsoid.centre, Vec3::ZERO);
         let half_axis = |axis: Vec3| 1.0 / ellipsoid.form.along(axis).sqrt();

@@ -2,7 +2,7 @@
 
 use clap::{Args, ValueEnum};
 use fogbow::covariance::image_sampling::{self, LEAST_PLAN, Plan, Planning, USUAL_SHARE};
-use fogbow::covariance::{Grid, filter_precision};
+use fogbow::covariance::{GridView, filter_precision};
 use fogbow::host::Medium;
 use fogbow::light::Light;
 use fogbow::math::{Ray, Vec2};
@@ -77,7 +77,7 @@ pub(super) struct Sight<'a> {
     pub(super) world: &'a World<'a>,
     pub(super) lights: &'a [Light<'a>],
     pub(super) camera: Camera,
-    pub(super) grid: Grid<'a>,
+    pub(super) grid: GridView<'a>,
 }
 
 struct PlanJob<'a> {

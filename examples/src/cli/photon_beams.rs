@@ -97,7 +97,7 @@ impl WithMedium for BeamJob<'_> {
         let pixels = u64::from(width) * u64::from(height);
         let mut settings = self.arguments.settings(&shot.world.outline(&world), pixels, &shot);
         if self.arguments.beams.is_none() {
-            let mut pilot = beams::Pass::pilot(&settings);
+            let mut pilot = beams::BeamPass::pilot(&settings);
             let threads = Threads::new(shot.settings.threads)?;
             threads::run(&mut pilot, &world, &threads, shot.control, None, |_| {});
             settings = pilot.settings_for_pieces();
@@ -116,7 +116,7 @@ impl WithMedium for BeamJob<'_> {
             shot.control,
             Passes { length, may_break: false },
             |pass, runner| {
-                let mut pass = beams::Pass::new(&settings, pass, radius);
+                let mut pass = beams::BeamPass::new(&settings, pass, radius);
                 runner.run(&mut pass, &world);
                 pass.finish()
             },

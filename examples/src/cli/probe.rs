@@ -4,7 +4,7 @@ use core::fmt::Write;
 use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
-use fogbow::covariance::{Grid, hessian_bound};
+use fogbow::covariance::{GridView, hessian_bound};
 use fogbow::host::Medium;
 use fogbow::math::{Bounds, Symmetric3, Vec3};
 use fogbow_std::progress::Control;
@@ -168,7 +168,7 @@ impl WithMedium for Glows {
 }
 
 /// The points asked for, all of them within the grid.
-fn points(arguments: &HessianArguments, grid: &Grid<'_>) -> Result<Vec<Vec3>, String> {
+fn points(arguments: &HessianArguments, grid: &GridView<'_>) -> Result<Vec<Vec3>, String> {
     let bounds = grid.lattice().bounds();
     let mut points = arguments.at.clone();
     if let Some([from, to]) = arguments.line {
@@ -205,7 +205,7 @@ fn centres(bounds: &Bounds, [nx, ny, nz]: [u32; 3]) -> impl Iterator<Item = Vec3
 /// Names of a matrix's entries.
 const ENTRIES: [&str; 6] = ["xx", "xy", "xz", "yy", "yz", "zz"];
 
-fn table(grid: &Grid<'_>, points: &[Vec3]) -> String {
+fn table(grid: &GridView<'_>, points: &[Vec3]) -> String {
     let mut text = "x,y,z,fluence".to_owned();
     let names = |what: &'static str| ENTRIES.iter().map(move |entry| format!("{what}_{entry}"));
     let eigenvalues = (1..=3).map(|i| format!("bound_{i}"));

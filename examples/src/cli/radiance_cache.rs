@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use fogbow::bytes::Crc;
-use fogbow::cache::{self, Asked, CachesError, Extrapolation, EyeSettings, RadianceCaches, Seen};
+use fogbow::cache::{self, Asked, CachedRadiance, CachesError, Extrapolation, RadianceCaches, RaySettings};
 use fogbow::covariance::image_sampling::Plan;
 use fogbow::host::Medium;
 use fogbow::light::Light;
@@ -234,7 +234,7 @@ impl CacheJob<'_> {
             multiple: settings.multiple.filter(|_| kept(Kind::Multiple)),
             irradiance: settings.irradiance.filter(|_| kept(Kind::Irradiance)),
             extrapolation: arguments.extrapolation.map_or(settings.extrapolation, Into::into),
-            eye: EyeSettings { lights_visible: self.paths.lights_visible, indirect: scatters_on, ..settings.eye },
+            eye: RaySettings { lights_visible: self.paths.lights_visible, indirect: scatters_on, ..settings.eye },
             paths: self.paths,
             seed: self.settings.seed,
             ..settings
@@ -275,7 +275,10 @@ impl WithMedium for CacheJob<'_> {
             let film = Vec2::new((sample.x as f32 + jitter.x) / width, (sample.y as f32 + jitter.y) / height);
             let ray = self.camera.ray(film);
             let seen = if self.paths.max_scatterings == 0 {
-                Seen { emitted: path::radiance(&ray, &world, &self.paths, rng).emitted, ..Seen::default() }
+                CachedRadiance {
+                    emitted: path::radiance(&ray, &world, &self.paths, rng).emitted,
+                    ..CachedRadiance::default()
+                }
             } else if is_computed(self.plan, sample, width as u32) {
                 caches.radiance(&ray, &world, rng)
             } else {

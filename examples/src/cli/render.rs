@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 use fogbow::cache::{Kind, RadianceCaches};
 use fogbow::covariance::image_sampling::Plan;
-use fogbow::covariance::{CovarianceGrid, Grid};
+use fogbow::covariance::{CovarianceGrid, GridView};
 use fogbow::host::Medium;
 use fogbow::light::Light;
 use fogbow::math::{Ray, Vec2};
@@ -447,7 +447,7 @@ pub(super) struct Shot<'a> {
     pub(super) paths: path::Settings,
     pub(super) settings: &'a tiles::Settings,
     pub(super) control: &'a Control<'a>,
-    pub(super) grid: Option<&'a Grid<'a>>,
+    pub(super) grid: Option<&'a GridView<'a>>,
     pub(super) plan: Option<&'a Plan<'a>>,
 }
 

@@ -9,7 +9,7 @@ use fogbow::math::{Ray, Vec2};
 use fogbow::medium::Pyramid;
 use fogbow::sampling::{Generator, uniform2};
 use fogbow::spectrum::Spectrum;
-use fogbow::vpl::{self, Bound, Compensation, EyeSettings, LEVELS, Seen, Settings};
+use fogbow::vpl::{self, Bound, Compensation, EyeSettings, LEVELS, Settings, VplRadiance};
 use fogbow::world::{Outline, World as LitWorld};
 use fogbow_std::film::Film;
 use fogbow_std::progressive;
@@ -211,11 +211,11 @@ impl WithMedium for VplJob<'_> {
             Passes { length, may_break: true },
             |pass, runner| {
                 let settings = *piloted.get_or_insert_with(|| {
-                    let mut pilot = vpl::Pass::pilot(&usual, Sequence::LowDiscrepancy);
+                    let mut pilot = vpl::VplPass::pilot(&usual, Sequence::LowDiscrepancy);
                     runner.run(&mut pilot, &world);
                     pilot.settings_for_lights()
                 });
-                let mut pass = vpl::Pass::new(&settings, pass, Sequence::LowDiscrepancy, &witnesses);
+                let mut pass = vpl::VplPass::new(&settings, pass, Sequence::LowDiscrepancy, &witnesses);
                 runner.run(&mut pass, &world);
                 pass.finish()
             },
@@ -244,7 +244,7 @@ fn scout(shot: &Shot<'_>, at: [f32; 2], (width, height): (u32, u32), rng: &mut G
     shot.camera.ray(at / Vec2::new(width as f32, height as f32))
 }
 
-fn write(seen: &Seen, layers: &mut [Spectrum]) {
+fn write(seen: &VplRadiance, layers: &mut [Spectrum]) {
     write_layers(&seen.radiance, layers);
     let own = core::iter::once(seen.clamped).chain(seen.compensated).chain([seen.straight]);
     for (layer, part) in layers.iter_mut().skip(LAYERS.len()).zip(own) {

@@ -13,7 +13,7 @@ use core::sync::atomic::{AtomicUsize, Ordering};
 use std::fmt::Write;
 use std::sync::Mutex;
 
-use fogbow::covariance::{FrequencyPhotons, Grid, Lattice, Voxel, hessian_bound};
+use fogbow::covariance::{FrequencyPhotons, GridView, Lattice, Voxel, hessian_bound};
 use fogbow::host::Empty;
 use fogbow::light::{Light, PhongLight, PointLight};
 use fogbow::math::{Bounds, Vec3};
@@ -116,7 +116,7 @@ fn laplacian_across(r: f64, z: f64) -> f64 {
 }
 
 /// Sends photons from `lights` and calls `look` with the grid after each number of paths in `stops`.
-fn fill(lights: &[Light<'_>], scatterings: u32, seed: u64, stops: &[u64], mut look: impl FnMut(&Grid<'_>)) {
+fn fill(lights: &[Light<'_>], scatterings: u32, seed: u64, stops: &[u64], mut look: impl FnMut(&GridView<'_>)) {
     let (lattice, fog) = (lattice(), fog());
     let world = World { medium: &fog, scene: &Empty, lights };
     let settings = Settings { max_scatterings: scatterings, ..Settings::default() };
@@ -131,14 +131,14 @@ fn fill(lights: &[Light<'_>], scatterings: u32, seed: u64, stops: &[u64], mut lo
             });
             sent += 1;
         }
-        if let Ok(grid) = Grid::new(lattice, &voxels, sent) {
+        if let Ok(grid) = GridView::new(lattice, &voxels, sent) {
             look(&grid);
         }
     }
 }
 
 /// Both second derivatives across the beam by each of [`ESTIMATES`], relative to the truth.
-fn asked(grid: &Grid<'_>, point: Vec3, truth: f64) -> [[f64; 2]; 3] {
+fn asked(grid: &GridView<'_>, point: Vec3, truth: f64) -> [[f64; 2]; 3] {
     let across = |upper: [f64; 6]| [upper[0] / truth, upper[3] / truth];
     let ours = grid.fluence(point).zip(grid.covariance(point)).map_or([0.0; 6], |(fluence, gamma)| {
         // On the axis the light has its maximum: the bound's sign is known.

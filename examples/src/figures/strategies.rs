@@ -74,9 +74,9 @@ impl WithMedium for Job<'_> {
             ..Settings::for_outline(&Outline::of(&lit, bounds))
         };
         let threads = Threads::new(0)?;
-        let mut pilot = vpl::Pass::pilot(&settings, Sequence::LowDiscrepancy);
+        let mut pilot = vpl::VplPass::pilot(&settings, Sequence::LowDiscrepancy);
         threads::run(&mut pilot, &lit, &threads, &Control::default(), None, |_| {});
-        let mut pass = vpl::Pass::new(&pilot.settings_for_lights(), 0, Sequence::LowDiscrepancy, &[]);
+        let mut pass = vpl::VplPass::new(&pilot.settings_for_lights(), 0, Sequence::LowDiscrepancy, &[]);
         threads::run(&mut pass, &lit, &threads, &Control::default(), None, |_| {});
         let lights = pass.finish()?;
         // The lamps are off: what comes straight from them is the same for all strategies.

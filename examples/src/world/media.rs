@@ -2,7 +2,7 @@
 
 use fogbow::host::{Empty, Medium};
 use fogbow::math::Affine3;
-use fogbow::medium::{AnyMedium, Density, Grid, Homogeneous, MediumError, MinMax, Overlap, Placed, Region};
+use fogbow::medium::{AnyMedium, Density, DensityGrid, Homogeneous, MediumError, MinMax, Overlap, Placed, Region};
 
 use fogbow::phase::Phase;
 
@@ -30,7 +30,7 @@ pub(super) fn tables(scene: &SceneFile) -> Vec<MediumTable> {
     let table = |medium: &MediumDescription| match &medium.matter {
         Matter::Homogeneous { .. } => MediumTable::default(),
         Matter::Grid { volume, .. } => {
-            MediumTable { blocks: vec![MinMax::default(); Grid::block_count(volume.size)], holes: Vec::new() }
+            MediumTable { blocks: vec![MinMax::default(); DensityGrid::block_count(volume.size)], holes: Vec::new() }
         }
     };
     scene.media.iter().map(table).collect()
@@ -45,7 +45,7 @@ pub enum Media<'a> {
     /// One that is the same everywhere inside its container.
     Homogeneous(Placed<'a, Homogeneous>),
     /// One grid.
-    Grid(Placed<'a, Grid<'a>>),
+    Grid(Placed<'a, DensityGrid<'a>>),
     /// Several.
     Several(Vec<Placed<'a, AnyMedium<'a>>>),
 }
@@ -147,7 +147,15 @@ fn place<'a>(medium: &'a MediumDescription, table: &'a mut MediumTable) -> Resul
                 Values::U8(values) => Density::U8(values),
             };
             let placement = to_world.to_affine();
-            AnyMedium::from(Grid::new(volume.size, density, *absorption, *scattering, *phase, placement, blocks)?)
+            AnyMedium::from(DensityGrid::new(
+                volume.size,
+                density,
+                *absorption,
+                *scattering,
+                *phase,
+                placement,
+                blocks,
+            )?)
         }
     };
     for place in &medium.places {

@@ -4,8 +4,8 @@
 
 use fogbow::beams::{self, Beams};
 use fogbow::cache::{
-    self, Asked, Block, Effort, Estimate, Facing, Guide, Index, Kind, KindSlots, Limits, Memory, Node, Place,
-    RadianceCaches, Record, Slots, TurningBasis, Wanted,
+    self, Asked, Block, Effort, Estimate, Facing, FillingMemory, Guide, Index, IndexNode, Kind, KindSlots, Limits,
+    Place, RadianceCaches, Record, Slots, TurningBasis, Wanted,
 };
 use fogbow::host::{Hit, Scene};
 use fogbow::light::{Light, PointLight, SphereLight};
@@ -99,7 +99,7 @@ pub fn cache_settings() -> cache::Settings {
         rays: 16,
         round: ROUND as u32,
         light_samples: 1,
-        eye: cache::EyeSettings { density: 3.0, ..cache::EyeSettings::default() },
+        eye: cache::RaySettings { density: 3.0, ..cache::RaySettings::default() },
         seed: 17,
         ..cache::Settings::default()
     }
@@ -110,7 +110,7 @@ pub const ASKED: Asked = Asked::View { ray: eye_ray, pixel: 0.05 };
 
 /// Room for an index.
 struct IndexSlots {
-    nodes: [Node; 3 * RECORDS + 16],
+    nodes: [IndexNode; 3 * RECORDS + 16],
     entries: [u32; 18 * RECORDS + 16],
     spheres: [[f32; 4]; RECORDS],
     blocks: [Block; 4 * RECORDS + 16],
@@ -119,7 +119,7 @@ struct IndexSlots {
 impl IndexSlots {
     fn new() -> Self {
         Self {
-            nodes: [Node::default(); 3 * RECORDS + 16],
+            nodes: [IndexNode::default(); 3 * RECORDS + 16],
             entries: [0; 18 * RECORDS + 16],
             spheres: [[0.0; 4]; RECORDS],
             blocks: [Block::default(); 4 * RECORDS + 16],
@@ -169,7 +169,7 @@ fn filled(world: &Foggy<'_>, read: impl FnOnce(&RadianceCaches<'_>, bool)) {
     let (mut higher, mut of_job) = ([Coefficient::ZERO; STRIDE * RECORDS], [Coefficient::ZERO; STRIDE]);
     let mut guides = [[Guide::default(); RECORDS]; Kind::COUNT];
     let ([wanted, found], [open, still_open, looked_up]) = (&mut wanted, &mut open);
-    let memory = Memory::lent(Slots {
+    let memory = FillingMemory::lent(Slots {
         wanted,
         open: [open, still_open],
         chosen: &mut chosen,
@@ -178,7 +178,7 @@ fn filled(world: &Foggy<'_>, read: impl FnOnce(&RadianceCaches<'_>, bool)) {
         guides: guides.each_mut().map(|guides| &mut guides[..]),
     });
     let mut filling = caches.fill_in(memory, ASKED);
-    work::finish(&mut filling, world, &mut cache::Output::lent(found, looked_up, &mut of_job));
+    work::finish(&mut filling, world, &mut cache::FilledRecords::lent(found, looked_up, &mut of_job));
     let is_cut = filling.is_cut();
     read(&filling.finish(), is_cut);
 }
@@ -256,12 +256,12 @@ pub fn beam_settings(world: &Foggy<'_>) -> beams::Settings {
 }
 
 /// Shoots beams in lent memory.
-fn shot(world: &Foggy<'_>, gather: impl FnOnce(Result<Beams<'_>, beams::PassError>)) {
-    let (mut pieces, mut nodes) = ([[beams::Piece::default(); PIECES]; 2], [beams::Node::default(); PIECES + 1]);
+fn shot(world: &Foggy<'_>, gather: impl FnOnce(Result<Beams<'_>, beams::BeamPassError>)) {
+    let (mut pieces, mut nodes) = ([[beams::Piece::default(); PIECES]; 2], [beams::BeamNode::default(); PIECES + 1]);
     let [pieces, of_job] = &mut pieces;
     let memory = Beams::new(&mut pieces[..], &mut nodes[..]);
-    let mut pass = beams::Pass::new_in(memory, &beam_settings(world), 0, |_, pass| pass);
-    work::finish(&mut pass, world, &mut beams::Output::new(&mut of_job[..]));
+    let mut pass = beams::BeamPass::new_in(memory, &beam_settings(world), 0, |_, pass| pass);
+    work::finish(&mut pass, world, &mut beams::BeamOutput::new(&mut of_job[..]));
     gather(pass.finish());
 }
 
@@ -326,7 +326,7 @@ pub fn each_witness(world: &Foggy<'_>, mut keep: impl FnMut(Receiver)) {
 }
 
 /// Makes lights in lent memory.
-fn made(world: &Foggy<'_>, see: impl FnOnce(Result<&[VirtualLight], vpl::PassError>)) {
+fn made(world: &Foggy<'_>, see: impl FnOnce(Result<&[VirtualLight], vpl::VplPassError>)) {
     let light = VirtualLight::in_medium(Vec3::ZERO, Vec3::Z, Spectrum::ZERO, 1, &Phase::ISOTROPIC);
     let nothing = vpl::Scatterer::Medium { scattering: Spectrum::ZERO, phase: Phase::ISOTROPIC };
     let mut witnesses = [Receiver { point: Vec3::ZERO, to_eye: Vec3::Z, scatterer: nothing }; WITNESSES];
@@ -338,12 +338,12 @@ fn made(world: &Foggy<'_>, see: impl FnOnce(Result<&[VirtualLight], vpl::PassErr
         }
     });
 
-    let (mut lights, mut order) = ([[light; CANDIDATES]; 2], [vpl::Place::default(); CANDIDATES]);
+    let (mut lights, mut order) = ([[light; CANDIDATES]; 2], [vpl::CurvePlace::default(); CANDIDATES]);
     let mut numbers = [[0.0; CANDIDATES]; 3];
     let ([lights, of_job], [importance, seen, seen_of_job]) = (&mut lights, &mut numbers);
-    let memory = vpl::Memory::new(&mut lights[..], &mut order[..], &mut importance[..], &mut seen[..]);
-    let mut pass = vpl::Pass::new_in(memory, &light_settings(world), 0, Independent, &witnesses[..count]);
-    work::finish(&mut pass, world, &mut vpl::Output::new(&mut of_job[..], &mut seen_of_job[..]));
+    let memory = vpl::VplMemory::new(&mut lights[..], &mut order[..], &mut importance[..], &mut seen[..]);
+    let mut pass = vpl::VplPass::new_in(memory, &light_settings(world), 0, Independent, &witnesses[..count]);
+    work::finish(&mut pass, world, &mut vpl::VplOutput::new(&mut of_job[..], &mut seen_of_job[..]));
     see(pass.finish().as_ref().map(List::as_slice).map_err(|error| *error));
 }
 

@@ -2,7 +2,9 @@
 
 use fogbow::host::Medium;
 use fogbow::math::{Affine3, Mat3, Ray, Vec3};
-use fogbow::medium::{Density, FractalNoise, Grid, Homogeneous, MediumError, MinMax, Noise, Overlap, Placed, Region};
+use fogbow::medium::{
+    Density, DensityGrid, FractalNoise, Homogeneous, MediumError, MinMax, Noise, Overlap, Placed, Region,
+};
 use fogbow::phase::{Lobe, Phase};
 use fogbow::sampling::uniform::mix;
 use fogbow::sampling::{Generator, uniform};
@@ -45,7 +47,7 @@ pub(crate) fn each(mut question: impl FnMut(&dyn Medium)) -> Result<(), MediumEr
     let [first, second, third] = &mut blocks;
     let grid = |density, blocks| {
         let scattering = Spectrum::new(0.5, 0.6, 0.7);
-        Grid::new(SIZE, density, Spectrum::splat(0.2), scattering, Lobe::Schlick { k: 0.5 }, turned, blocks)
+        DensityGrid::new(SIZE, density, Spectrum::splat(0.2), scattering, Lobe::Schlick { k: 0.5 }, turned, blocks)
     };
     let plume = grid(Density::F32(&floats), first)?.with_emission(Spectrum::splat(0.3))?;
     question(&plume);

@@ -2,7 +2,7 @@
 
 use fogbow::host::{MajorantSegment, Medium};
 use fogbow::math::{Affine3, Mat3, Ray, Vec3, float};
-use fogbow::medium::{Density, Grid, MediumError, MinMax};
+use fogbow::medium::{Density, DensityGrid, MediumError, MinMax};
 use fogbow::phase::Phase;
 use fogbow::sampling::{Generator, uniform, uniform2, warp};
 use fogbow::spectrum::{Gradient, Spectrum};
@@ -22,17 +22,17 @@ pub(crate) struct Voxels {
 impl Voxels {
     pub(crate) fn new(size: [u32; 3], placement: Affine3, values: impl FnMut(usize) -> f32) -> Self {
         let count = size.iter().map(|&n| n as usize).product();
-        let blocks = vec![MinMax::default(); Grid::block_count(size)];
+        let blocks = vec![MinMax::default(); DensityGrid::block_count(size)];
         Self { size, values: (0..count).map(values).collect(), blocks, placement }
     }
 
-    pub(crate) fn grid(&mut self) -> Grid<'_> {
+    pub(crate) fn grid(&mut self) -> DensityGrid<'_> {
         self.try_grid().expect("valid grid")
     }
 
-    pub(crate) fn try_grid(&mut self) -> Result<Grid<'_>, MediumError> {
+    pub(crate) fn try_grid(&mut self) -> Result<DensityGrid<'_>, MediumError> {
         let density = Density::F32(&self.values);
-        Grid::new(self.size, density, ABSORPTION, SCATTERING, Phase::ISOTROPIC, self.placement, &mut self.blocks)
+        DensityGrid::new(self.size, density, ABSORPTION, SCATTERING, Phase::ISOTROPIC, self.placement, &mut self.blocks)
     }
 }
 

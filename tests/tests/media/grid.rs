@@ -2,7 +2,7 @@
 
 use fogbow::host::{MajorantSegment, Medium};
 use fogbow::math::{Affine3, Mat3, Ray, Vec3};
-use fogbow::medium::{BLOCK, Density, Grid, MinMax};
+use fogbow::medium::{BLOCK, Density, DensityGrid, MinMax};
 use fogbow::phase::Phase;
 use fogbow::sampling::{Generator, uniform};
 use fogbow::spectrum::Spectrum;
@@ -164,9 +164,10 @@ fn bytes_agree_with_floats() {
     let mut voxels = Voxels::new([6, 5, 4], placement(&mut rng, 1.0), |i| f32::from(bytes[i]) / 255.0);
     let placement = voxels.placement;
     let floats = voxels.grid();
-    let mut blocks = vec![MinMax::default(); Grid::block_count([6, 5, 4])];
+    let mut blocks = vec![MinMax::default(); DensityGrid::block_count([6, 5, 4])];
     let density = Density::U8(&bytes);
-    let grid = Grid::new([6, 5, 4], density, ABSORPTION, SCATTERING, Phase::ISOTROPIC, placement, &mut blocks).unwrap();
+    let grid =
+        DensityGrid::new([6, 5, 4], density, ABSORPTION, SCATTERING, Phase::ISOTROPIC, placement, &mut blocks).unwrap();
     for _ in 0..2000 {
         let p = placement.transform_point3(Vec3::splat(0.5) + point(&mut rng, 0.6));
         assert_near(grid.extinction(p)[2], floats.extinction(p)[2], 1e-6, "value");
@@ -249,11 +250,11 @@ fn a_second_grid_absorbs_and_a_third_emits() {
     let smooth: Vec<f32> = (0..count).map(islands(&mut rng)).collect();
     let soot: Vec<u8> = (0..count).map(islands(&mut rng)).map(|v| (200.0 * v) as u8).collect();
     let fire: Vec<f32> = (0..count).map(islands(&mut rng)).collect();
-    let mut blocks = vec![MinMax::default(); 3 * Grid::block_count([10, 9, 8])];
-    let (a, rest) = blocks.split_at_mut(Grid::block_count([10, 9, 8]));
+    let mut blocks = vec![MinMax::default(); 3 * DensityGrid::block_count([10, 9, 8])];
+    let (a, rest) = blocks.split_at_mut(DensityGrid::block_count([10, 9, 8]));
     let (b, c) = rest.split_at_mut(a.len());
     let density = Density::F32(&smooth);
-    let grid = Grid::new([10, 9, 8], density, Spectrum::ONE, SCATTERING, Phase::ISOTROPIC, place, a)
+    let grid = DensityGrid::new([10, 9, 8], density, Spectrum::ONE, SCATTERING, Phase::ISOTROPIC, place, a)
         .and_then(|g| g.with_absorption_grid(Density::U8(&soot), b))
         .and_then(|g| g.with_emission_grid(Density::F32(&fire), Spectrum::new(9.0, 3.0, 1.0), c))
         .unwrap();

@@ -3,7 +3,7 @@
 
 use std::cell::Cell;
 
-use fogbow::beams::{Beams, Node, Piece, pieces};
+use fogbow::beams::{BeamNode, Beams, Piece, pieces};
 use fogbow::host::{MajorantSegment, Medium, Properties};
 use fogbow::march::{eye_ray, scattering_points};
 use fogbow::math::{Ray, Vec3};
@@ -174,7 +174,7 @@ fn beams_past_mistaken_bounds_are_whole() {
 /// A beam seen through a metre of medium.
 #[test]
 fn beams_are_gathered_through_mistaken_bounds() {
-    let (mut all, mut nodes) = ([Piece::default(); 1], [Node::default(); 2]);
+    let (mut all, mut nodes) = ([Piece::default(); 1], [BeamNode::default(); 2]);
     let mut beams = Beams::new(&mut all[..], &mut nodes[..]);
     let (origin, power, radius) = (Vec3::new(1.0, 0.0, -1.0), Spectrum::ONE, 0.01);
     beams.push(Piece { origin, length: 2.0, direction: Vec3::Z, power, radius, ..Piece::default() }).unwrap();

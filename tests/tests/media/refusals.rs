@@ -1,7 +1,7 @@
 //! What constructors refuse.
 
 use fogbow::math::{Affine3, Bounds, Mat3, Vec3};
-use fogbow::medium::{Density, FractalNoise, Grid, MediumError, MinMax, Noise, Region};
+use fogbow::medium::{Density, DensityGrid, FractalNoise, MediumError, MinMax, Noise, Region};
 use fogbow::phase::Phase;
 use fogbow::spectrum::Spectrum;
 
@@ -10,7 +10,7 @@ use super::common::*;
 #[test]
 fn constructors_name_what_they_refuse() {
     let refused = |size: [u32; 3], values: Vec<f32>, placement: Affine3| {
-        let blocks = vec![MinMax::default(); Grid::block_count(size)];
+        let blocks = vec![MinMax::default(); DensityGrid::block_count(size)];
         Voxels { size, values, blocks, placement }.try_grid().err()
     };
     let unit = Affine3::IDENTITY;
@@ -31,7 +31,7 @@ fn constructors_name_what_they_refuse() {
     assert_eq!(refused([1, 1, 1], vec![1.0], nowhere), Some(MediumError::Placement));
     let grid = |coefficient: f32, blocks: &mut [MinMax]| {
         let sigma = Spectrum::splat(coefficient);
-        Grid::new([1, 1, 1], Density::U8(&[9]), sigma, sigma, Phase::ISOTROPIC, unit, blocks).err()
+        DensityGrid::new([1, 1, 1], Density::U8(&[9]), sigma, sigma, Phase::ISOTROPIC, unit, blocks).err()
     };
     assert_eq!(grid(f32::NAN, &mut [MinMax::default()]), Some(MediumError::Coefficients));
     assert_eq!(grid(1.0, &mut []), Some(MediumError::Blocks));
