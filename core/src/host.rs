@@ -158,9 +158,9 @@ pub trait Medium {
     /// marching. A grid answers with its cell.
     ///
     /// ```
-    /// # use fogbow::{host::Medium, math::{Affine3, Vec3}, medium::{Density, DensityGrid, MinMax}, phase::Phase, spectrum::Spectrum};
-    /// let (mut blocks, smoke, unit) = ([MinMax::default()], Density::F32(&[1.0; 4]), Spectrum::ONE);
-    /// let grid = DensityGrid::new([4, 1, 1], smoke, unit, unit, Phase::ISOTROPIC, Affine3::IDENTITY, &mut blocks)?;
+    /// # use fogbow::{host::{Medium, Properties}, math::Affine3, medium::{Density, DensityGrid, MinMax}};
+    /// let (mut blocks, smoke) = ([MinMax::default()], Density::F32(&[1.0; 4]));
+    /// let grid = DensityGrid::new([4, 1, 1], smoke, &Properties::VACUUM, Affine3::IDENTITY, &mut blocks)?;
     /// assert_eq!(grid.resolution(), 0.25);   // its shortest cell
     /// # Ok::<(), fogbow::medium::MediumError>(())
     /// ```

@@ -32,9 +32,6 @@ const MISSING: &[(&str, usize)] = &[
     ("world/near.rs", 1),
 ];
 
-/// Functions of more than six arguments. Only to be made shorter.
-const ABOVE_SIX: &[&str] = &["beams/piece.rs: pieces", "medium/grid.rs: DensityGrid::new"];
-
 // ---------------------------------------------------------------------------------------------
 // The reader
 
@@ -368,7 +365,7 @@ fn no_public_function_takes_more_than_six_arguments() {
         .filter(|(_, function)| function.arguments > 6)
         .map(|(file, function)| format!("{file}: {}", function.title()))
         .collect();
-    assert_eq!(found, ABOVE_SIX, "functions above six arguments (left), the list `ABOVE_SIX` (right)");
+    assert!(found.is_empty(), "functions above six arguments: {found:#?}");
 }
 
 // ---------------------------------------------------------------------------------------------

@@ -1,6 +1,6 @@
 //! Known answers times the media of the core, and the path tracer against one that never connects.
 
-use fogbow::host::{Empty, Hit, Medium, Scene};
+use fogbow::host::{Empty, Hit, Medium, Properties, Scene};
 use fogbow::light::{EnvironmentMap, Light, MeshLight, PointLight, QuadLight, SphereLight, Triangle};
 use fogbow::math::{Affine3, Mat3, Ray, Vec2, Vec3, float::PI};
 use fogbow::medium::{Density, DensityGrid, FractalNoise, Homogeneous, MinMax, Noise, Overlap, Placed, Region};
@@ -67,8 +67,8 @@ fn every_medium_that_only_scatters_vanishes_under_a_uniform_sky() {
         let phase: Phase = Lobe::HenyeyGreenstein { g: 0.6 }.into();
         for (name, density) in [("f32", Density::F32(&values)), ("u8", Density::U8(&bytes))] {
             let mut blocks = vec![MinMax::default(); count];
-            let grid =
-                DensityGrid::new(SIZE, density, Spectrum::ZERO, scattering, phase, placement(), &mut blocks).unwrap();
+            let white = Properties { scattering, phase, ..Properties::VACUUM };
+            let grid = DensityGrid::new(SIZE, density, &white, placement(), &mut blocks).unwrap();
             assert_white_furnace(&grid, &format!("grid {name} {scattering:?}"));
             let placed = Placed::new(grid, Region::sphere(Vec3::ZERO, 1.1).unwrap()).with_holes(&holes);
             assert_white_furnace(&placed, &format!("grid {name} with holes {scattering:?}"));
@@ -96,7 +96,8 @@ fn grid_with_absorption<'a>(
     blocks: &'a mut [MinMax],
 ) -> DensityGrid<'a> {
     let more = vec![MinMax::default(); blocks.len()].leak();
-    DensityGrid::new(SIZE, density, Spectrum::ONE, scattering, Phase::ISOTROPIC, placement(), blocks)
+    let smoke = Properties { absorption: Spectrum::ONE, scattering, ..Properties::VACUUM };
+    DensityGrid::new(SIZE, density, &smoke, placement(), blocks)
         .and_then(|grid| grid.with_absorption_grid(Density::F32(absorption), more))
         .unwrap()
 }
@@ -144,16 +145,8 @@ fn transmittance_and_flights_agree_with_the_optical_thickness() {
     let mut blocks = vec![MinMax::default(); count];
     let holes = [Region::sphere(Vec3::new(0.2, 0.1, 0.3), 0.3).unwrap()];
     for colour in [Spectrum::splat(1.5), Spectrum::new(0.0, 0.7, 3.0)] {
-        let grid = DensityGrid::new(
-            SIZE,
-            Density::F32(&values),
-            colour * 0.25,
-            colour * 0.75,
-            Phase::ISOTROPIC,
-            placement(),
-            &mut blocks,
-        )
-        .unwrap();
+        let smoke = Properties { absorption: colour * 0.25, scattering: colour * 0.75, ..Properties::VACUUM };
+        let grid = DensityGrid::new(SIZE, Density::F32(&values), &smoke, placement(), &mut blocks).unwrap();
         let noise = Noise::new(shape(0.2), colour * 0.5, colour * 0.5, Phase::ISOTROPIC).unwrap();
         let region = Region::sphere(Vec3::ZERO, 1.2).unwrap();
         let (grid, noise) = (Placed::new(grid, region), Placed::new(noise, region));
@@ -182,17 +175,9 @@ fn glowing_media_look_like_emission_over_absorption() {
     let values = vec![1.0; densities().len()];
     let mut blocks = vec![MinMax::default(); DensityGrid::block_count(SIZE)];
     for scattering in [Spectrum::ZERO, Spectrum::splat(40.0), Spectrum::new(10.0, 20.0, 60.0)] {
-        let grid = DensityGrid::new(
-            SIZE,
-            Density::F32(&values),
-            Spectrum::splat(40.0),
-            scattering,
-            Phase::ISOTROPIC,
-            placement(),
-            &mut blocks,
-        )
-        .and_then(|grid| grid.with_emission(Spectrum::new(40.0, 80.0, 120.0)))
-        .unwrap();
+        let (absorption, emission) = (Spectrum::splat(40.0), Spectrum::new(40.0, 80.0, 120.0));
+        let fire = Properties { absorption, scattering, emission, phase: Phase::ISOTROPIC };
+        let grid = DensityGrid::new(SIZE, Density::F32(&values), &fire, placement(), &mut blocks).unwrap();
         // Kirchhoff: under a sky of the same radiance a glowing body of any thickness vanishes.
         let sky = [Light::Constant(Spectrum::new(1.0, 2.0, 3.0))];
         let world = World { medium: &grid, scene: &Empty, lights: &sky };
@@ -210,17 +195,11 @@ fn what_glows_without_extinction_is_seen() {
         vec![MinMax::default(); DensityGrid::block_count(SIZE)],
         vec![MinMax::default(); DensityGrid::block_count(SIZE)],
     );
-    let flame = DensityGrid::new(
-        SIZE,
-        Density::F32(&nothing),
-        Spectrum::ONE,
-        Spectrum::ONE,
-        Phase::ISOTROPIC,
-        Affine3::from_translation(Vec3::splat(-0.5)),
-        &mut a,
-    )
-    .and_then(|grid| grid.with_emission_grid(Density::F32(&values), Spectrum::new(1.0, 2.0, 3.0), &mut b))
-    .unwrap();
+    let smoke = Properties { absorption: Spectrum::ONE, scattering: Spectrum::ONE, ..Properties::VACUUM };
+    let place = Affine3::from_translation(Vec3::splat(-0.5));
+    let flame = DensityGrid::new(SIZE, Density::F32(&nothing), &smoke, place, &mut a)
+        .and_then(|grid| grid.with_emission_grid(Density::F32(&values), Spectrum::new(1.0, 2.0, 3.0), &mut b))
+        .unwrap();
     let emission = Spectrum::new(1.0, 2.0, 3.0);
     let cube = Region::unit_cube(Affine3::from_translation(Vec3::splat(-0.5))).unwrap();
     let fog = |absorption| Homogeneous::new(absorption, Spectrum::ZERO, Phase::ISOTROPIC).unwrap();
@@ -454,16 +433,13 @@ fn connections_and_hits_add_up_to_what_hits_alone_find() {
         Homogeneous::new(Spectrum::splat(0.05), Spectrum::new(0.2, 0.5, 1.0), Lobe::HenyeyGreenstein { g: 0.4 });
     let values = densities();
     let mut blocks = vec![MinMax::default(); DensityGrid::block_count(SIZE)];
-    let grid = DensityGrid::new(
-        SIZE,
-        Density::F32(&values),
-        Spectrum::splat(0.2),
-        COLOURED * 0.3,
-        Lobe::HenyeyGreenstein { g: -0.3 },
-        placement(),
-        &mut blocks,
-    )
-    .unwrap();
+    let smoke = Properties {
+        absorption: Spectrum::splat(0.2),
+        scattering: COLOURED * 0.3,
+        emission: Spectrum::ZERO,
+        phase: Lobe::HenyeyGreenstein { g: -0.3 }.into(),
+    };
+    let grid = DensityGrid::new(SIZE, Density::F32(&values), &smoke, placement(), &mut blocks).unwrap();
     let (grey, coloured) = (Placed::new(grey.unwrap(), region), Placed::new(coloured.unwrap(), region));
     let media: [(&str, &dyn Medium); 4] =
         [("vacuum", &Empty), ("grey", &grey), ("coloured", &coloured), ("grid", &grid)];

@@ -1,6 +1,6 @@
 //! Every analytic gradient against central differences, over random configurations.
 
-use fogbow::host::Medium;
+use fogbow::host::{Medium, Properties};
 use fogbow::light::{Falloff, Source};
 use fogbow::math::{Affine3, Bounds, Frame, Mat3, Ray, Vec2, Vec3};
 use fogbow::medium::{Density, DensityGrid, Homogeneous, MinMax, Placed, Region};
@@ -321,9 +321,9 @@ proptest! {
         let frame = Frame::around(turn);
         let axes = Mat3::from_cols(frame.u * 2.0, frame.v * 1.6, frame.w * 1.8);
         let place = Affine3::from_mat3_translation(axes, -(frame.u + frame.v * 0.8 + frame.w * 0.9));
-        let (soot, fog) = (Spectrum::new(0.2, 0.5, 0.1), Spectrum::new(1.0, 0.3, 0.2));
-        let grid =
-            DensityGrid::new(size, Density::F32(&densities), soot, fog, Lobe::Isotropic, place, &mut blocks).unwrap();
+        let (absorption, scattering) = (Spectrum::new(0.2, 0.5, 0.1), Spectrum::new(1.0, 0.3, 0.2));
+        let smoke = Properties { absorption, scattering, ..Properties::VACUUM };
+        let grid = DensityGrid::new(size, Density::F32(&densities), &smoke, place, &mut blocks).unwrap();
         check_thickness(&Complaining::new(grid), x, far, Marching::midpoints(4000))?;
     }
 }

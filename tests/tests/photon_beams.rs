@@ -227,7 +227,7 @@ fn pieces_carry_the_transmittance_on_average() {
     for to in [0.3_f32, 1.0, 2.9] {
         let found = estimate(40_000, |rng| {
             let mut power = Spectrum::ZERO;
-            pieces(&medium, &reach, Spectrum::ONE, 0, 0.25, rng, &mut |piece| {
+            pieces(&medium, &reach, Spectrum::ONE, 0.25, rng, &mut |piece| {
                 let along = to - piece.origin.z;
                 if along >= 0.0 && along < piece.length {
                     power += piece.power * (piece.rate * along).transmitted();

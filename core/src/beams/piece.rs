@@ -120,13 +120,14 @@ impl Piece {
 /// Residual ratio tracking (Novák et al. 2014) with the minorant as control: pieces follow the minorant's
 /// exponential and end at tentative collisions, where power is multiplied by `1 − (σₜ − σ_min)/(σ_max − σ_min)`.
 /// The expected power at every point is the exact one; in constant media every power is. Pieces longer than
-/// `longest` (m) are cut, so that boxes around them fit; what is weak ends by roulette.
+/// `longest` (m) are cut, so that boxes around them fit; what is weak ends by roulette. [`Piece::scatterings`] is left
+/// at 0, for the caller to fill in.
 ///
 /// ```
 /// # use fogbow::{beams, math::*, medium::Homogeneous, phase::Lobe, sampling::Generator, spectrum::Spectrum};
 /// let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::splat(0.5), Lobe::Isotropic)?;
 /// let (reach, mut found) = (Ray::between(Vec3::ZERO, Vec3::Z), Vec::new());
-/// beams::pieces(&fog, &reach, Spectrum::ONE, 0, 0.75, &mut Generator::new(1), &mut |piece| found.push(piece));
+/// beams::pieces(&fog, &reach, Spectrum::ONE, 0.75, &mut Generator::new(1), &mut |piece| found.push(piece));
 /// assert_eq!((found.len(), found[0].length, found[1].length), (2, 0.75, 0.25));
 /// assert!((found[1].power[0] - (-0.375f32).exp()).abs() < 1e-6);
 /// # Ok::<(), fogbow::medium::MediumError>(())
@@ -135,7 +136,6 @@ pub fn pieces(
     medium: &(impl Medium + ?Sized),
     reach: &Ray,
     power: Spectrum,
-    scatterings: u32,
     longest: f32,
     rng: &mut Generator,
     keep: &mut impl FnMut(Piece),
@@ -161,7 +161,7 @@ pub fn pieces(
                 let length = until - t;
                 if length > 0.0 {
                     let (origin, direction) = (reach.at(t), reach.direction);
-                    keep(Piece { origin, length, direction, scatterings, power, rate: low, ..Piece::default() });
+                    keep(Piece { origin, length, direction, power, rate: low, ..Piece::default() });
                     power *= (low * length).transmitted();
                 }
                 left = left.saturating_sub(1);
@@ -223,7 +223,7 @@ pub fn shoot<M: Medium + ?Sized, S: Scene + ?Sized>(
     photon::trace(world, bounds, settings, rng, &mut |event| match *event {
         Event::Emitted { .. } => scatterings = 0,
         Event::Flew { reach, power, .. } => {
-            pieces(world.medium, reach, power, scatterings, longest, &mut child, keep);
+            pieces(world.medium, reach, power, longest, &mut child, &mut |piece| keep(Piece { scatterings, ..piece }));
         }
         Event::Collided { .. } | Event::Met { .. } => scatterings += 1,
     });

@@ -15,7 +15,7 @@ use crate::spectrum::{Gradient, Hessian, Spectrum};
 /// A voxel grid: densities in lent memory, trilinear between cell centres, placed anywhere.
 ///
 /// ```text
-/// σₛ(x) = d(p) · scattering,   σₐ(x) = d(p) · absorption,   p = local(x) in [0, 1]³
+/// σₛ(x) = d(p) · scattering,   σₐ(x) = d(p) · absorption,   ε(x) = d(p) · emission,   p = local(x) in [0, 1]³
 /// ```
 ///
 /// With `q = p·n − 1/2`, density is interpolated between cells `⌊q⌋` and `⌊q⌋ + 1`, clamped to the
@@ -25,26 +25,20 @@ use crate::spectrum::{Gradient, Hessian, Spectrum};
 /// Bounds along a ray come from blocks of [`BLOCK`](super::BLOCK)³ cells.
 ///
 /// ```
-/// # use fogbow::host::Medium;
+/// # use fogbow::host::{Medium, Properties};
 /// # use fogbow::math::{Affine3, Vec3};
 /// # use fogbow::medium::{Density, DensityGrid, MinMax};
-/// # use fogbow::{phase::Phase, spectrum::Spectrum};
+/// # use fogbow::spectrum::Spectrum;
+/// let smoke = Properties { absorption: Spectrum::splat(0.1), scattering: Spectrum::splat(0.9), ..Properties::VACUUM };
 /// let values = [0.0, 1.0];
 /// let mut blocks = [MinMax::default(); 1];
 /// assert_eq!(blocks.len(), DensityGrid::block_count([2, 1, 1]));
-/// let grid = DensityGrid::new(
-///     [2, 1, 1],
-///     Density::F32(&values),
-///     Spectrum::splat(0.1),
-///     Spectrum::splat(0.9),
-///     Phase::ISOTROPIC,
-///     Affine3::IDENTITY,
-///     &mut blocks,
-/// )
-/// .unwrap();
+/// let grid =
+///     DensityGrid::new([2, 1, 1], Density::F32(&values), &smoke, Affine3::IDENTITY, &mut blocks)?;
 /// // Cell centres lie at 1/4 and 3/4; halfway, density is 1/2.
 /// assert_eq!(grid.extinction(Vec3::new(0.5, 0.2, 0.9))[0], 0.5);
 /// assert_eq!(grid.extinction(Vec3::new(0.9, 0.2, 0.9))[0], 1.0);
+/// # Ok::<(), fogbow::medium::MediumError>(())
 /// ```
 #[derive(Debug, Clone, Copy)]
 pub struct DensityGrid<'a> {
@@ -85,24 +79,33 @@ impl<'a> DensityGrid<'a> {
         blocks_along(size).iter().map(|&n| n as usize).product()
     }
 
-    /// One density for everything: `absorption` and `scattering` are the coefficients (m⁻¹) where
-    /// density is 1. `local_to_world` places the unit cube; `blocks` is filled here.
+    /// One density for everything: `properties` are those where it is 1, and absorption, scattering and emission are in
+    /// proportion to it. `local_to_world` places the unit cube; `blocks` is filled here.
     ///
     /// # Errors
     /// Whatever is not finite, not invertible, negative or of the wrong size.
+    ///
+    /// ```
+    /// # use fogbow::{host::{Medium, Properties}, math::{Affine3, Vec3}, medium::{Density, DensityGrid, MinMax}, spectrum::Spectrum};
+    /// let mut blocks = [MinMax::default()];
+    /// let fire = Properties { absorption: Spectrum::ONE, emission: Spectrum::splat(10.0), ..Properties::VACUUM };
+    /// let grid = DensityGrid::new([1; 3], Density::F32(&[2.0]), &fire, Affine3::IDENTITY, &mut blocks)?;
+    /// assert!(grid.is_emissive());
+    /// assert_eq!(grid.properties(Vec3::splat(0.5)).emission[0], 20.0);   // where there is twice as much, twice as bright
+    /// # Ok::<(), fogbow::medium::MediumError>(())
+    /// ```
     pub fn new(
         size: [u32; 3],
         density: Density<'a>,
-        absorption: Spectrum,
-        scattering: Spectrum,
-        phase: impl Into<Phase>,
+        properties: &Properties,
         local_to_world: Affine3,
         blocks: &'a mut [MinMax],
     ) -> Result<Self, MediumError> {
+        let Properties { absorption, scattering, emission, phase } = *properties;
         if !(absorption.is_valid() && scattering.is_valid()) {
             return Err(MediumError::Coefficients);
         }
-        let phase = phase.into().check()?;
+        let phase = phase.check()?;
         let region = BoxRegion::new(local_to_world)?;
         if cell_count(size).is_none() || size.contains(&0) {
             return Err(MediumError::Size);
@@ -130,7 +133,7 @@ impl<'a> DensityGrid<'a> {
             emission_density: None,
             scattering,
             absorption,
-            emission: Spectrum::ZERO,
+            emission,
             phase,
             region,
         };
@@ -144,10 +147,10 @@ impl<'a> DensityGrid<'a> {
     /// As in [`DensityGrid::new`].
     ///
     /// ```
-    /// # use fogbow::{host::Medium, math::{Affine3, Vec3}, medium::{Density, DensityGrid, MinMax}, phase::Phase, spectrum::Spectrum};
+    /// # use fogbow::{host::{Medium, Properties}, math::{Affine3, Vec3}, medium::{Density, DensityGrid, MinMax}, spectrum::Spectrum};
     /// let (mut blocks, mut more) = ([MinMax::default()], [MinMax::default()]);
-    /// let (steam, unit) = (Density::F32(&[2.0]), Spectrum::ONE);
-    /// let grid = DensityGrid::new([1; 3], steam, unit, unit, Phase::ISOTROPIC, Affine3::IDENTITY, &mut blocks)?
+    /// let unit = Properties { absorption: Spectrum::ONE, scattering: Spectrum::ONE, ..Properties::VACUUM };
+    /// let grid = DensityGrid::new([1; 3], Density::F32(&[2.0]), &unit, Affine3::IDENTITY, &mut blocks)?
     ///     .with_absorption_grid(Density::F32(&[0.5]), &mut more)?;
     /// let inside = grid.properties(Vec3::splat(0.5));
     /// assert_eq!((inside.scattering[0], inside.absorption[0]), (2.0, 0.5));
@@ -159,26 +162,6 @@ impl<'a> DensityGrid<'a> {
         self.check()
     }
 
-    /// The same grid emitting `emission` (W·m⁻³·sr⁻¹) where density is 1, in proportion to it.
-    ///
-    /// # Errors
-    /// Emission that is negative or not finite.
-    ///
-    /// ```
-    /// # use fogbow::{host::Medium, math::{Affine3, Vec3}, medium::{Density, DensityGrid, MinMax}, phase::Phase, spectrum::Spectrum};
-    /// let mut blocks = [MinMax::default()];
-    /// let (fire, unit) = (Density::F32(&[2.0]), Spectrum::ONE);
-    /// let grid = DensityGrid::new([1; 3], fire, unit, unit, Phase::ISOTROPIC, Affine3::IDENTITY, &mut blocks)?
-    ///     .with_emission(Spectrum::splat(10.0))?;
-    /// assert!(grid.is_emissive());
-    /// assert_eq!(grid.properties(Vec3::splat(0.5)).emission[0], 20.0);   // where there is twice as much, twice as bright
-    /// # Ok::<(), fogbow::medium::MediumError>(())
-    /// ```
-    pub fn with_emission(mut self, emission: Spectrum) -> Result<Self, MediumError> {
-        self.emission = emission;
-        self.check()
-    }
-
     /// The same grid with a density of its own, of the same size, for emission: `emission`
     /// (W·m⁻³·sr⁻¹) where that is 1.
     ///
@@ -186,10 +169,10 @@ impl<'a> DensityGrid<'a> {
     /// As in [`DensityGrid::new`]; emission that is negative or not finite.
     ///
     /// ```
-    /// # use fogbow::{host::Medium, math::{Affine3, Vec3}, medium::{Density, DensityGrid, MinMax}, phase::Phase, spectrum::Spectrum};
+    /// # use fogbow::{host::{Medium, Properties}, math::{Affine3, Vec3}, medium::{Density, DensityGrid, MinMax}, spectrum::Spectrum};
     /// let (mut blocks, mut more) = ([MinMax::default()], [MinMax::default()]);
-    /// let (soot, unit) = (Density::F32(&[2.0]), Spectrum::ONE);
-    /// let grid = DensityGrid::new([1; 3], soot, unit, unit, Phase::ISOTROPIC, Affine3::IDENTITY, &mut blocks)?
+    /// let unit = Properties { absorption: Spectrum::ONE, scattering: Spectrum::ONE, ..Properties::VACUUM };
+    /// let grid = DensityGrid::new([1; 3], Density::F32(&[2.0]), &unit, Affine3::IDENTITY, &mut blocks)?
     ///     .with_emission_grid(Density::F32(&[0.5]), Spectrum::splat(10.0), &mut more)?;
     /// assert_eq!(grid.properties(Vec3::splat(0.5)).emission[0], 5.0);   // whatever the density of what absorbs
     /// # Ok::<(), fogbow::medium::MediumError>(())
@@ -217,9 +200,10 @@ impl<'a> DensityGrid<'a> {
     /// Angular law of scattering; the same everywhere.
     ///
     /// ```
-    /// # use fogbow::{math::Affine3, medium::{Density, DensityGrid, MinMax}, phase::{Lobe, Phase}, spectrum::Spectrum};
-    /// let (mut blocks, smoke, unit) = ([MinMax::default()], Density::F32(&[1.0]), Spectrum::ONE);
-    /// let grid = DensityGrid::new([1; 3], smoke, unit, unit, Lobe::Rayleigh, Affine3::IDENTITY, &mut blocks)?;
+    /// # use fogbow::{host::Properties, math::Affine3, medium::{Density, DensityGrid, MinMax}, phase::{Lobe, Phase}, spectrum::Spectrum};
+    /// let (mut blocks, smoke) = ([MinMax::default()], Density::F32(&[1.0]));
+    /// let air = Properties { scattering: Spectrum::ONE, phase: Lobe::Rayleigh.into(), ..Properties::VACUUM };
+    /// let grid = DensityGrid::new([1; 3], smoke, &air, Affine3::IDENTITY, &mut blocks)?;
     /// assert_eq!(grid.phase(), Phase::from(Lobe::Rayleigh));
     /// # Ok::<(), fogbow::medium::MediumError>(())
     /// ```
@@ -232,10 +216,10 @@ impl<'a> DensityGrid<'a> {
     /// The unit cube's place in the world.
     ///
     /// ```
-    /// # use fogbow::{math::{Affine3, Vec3}, medium::{Density, DensityGrid, MinMax, Region}, phase::Phase, spectrum::Spectrum};
-    /// let (mut blocks, smoke, unit) = ([MinMax::default()], Density::F32(&[1.0]), Spectrum::ONE);
+    /// # use fogbow::{host::Properties, math::{Affine3, Vec3}, medium::{Density, DensityGrid, MinMax, Region}};
+    /// let (mut blocks, smoke) = ([MinMax::default()], Density::F32(&[1.0]));
     /// let place = Affine3::from_translation(5.0 * Vec3::X);
-    /// let grid = DensityGrid::new([1; 3], smoke, unit, unit, Phase::ISOTROPIC, place, &mut blocks)?;
+    /// let grid = DensityGrid::new([1; 3], smoke, &Properties::VACUUM, place, &mut blocks)?;
     /// let region = Region::Box(grid.region());
     /// assert!(region.contains(Vec3::new(5.5, 0.5, 0.5)) && !region.contains(Vec3::splat(0.5)));
     /// # Ok::<(), fogbow::medium::MediumError>(())
@@ -248,9 +232,9 @@ impl<'a> DensityGrid<'a> {
     /// Number of cells along each axis.
     ///
     /// ```
-    /// # use fogbow::{math::Affine3, medium::{Density, DensityGrid, MinMax}, phase::Phase, spectrum::Spectrum};
-    /// let (mut blocks, smoke, unit) = ([MinMax::default()], Density::F32(&[1.0; 6]), Spectrum::ONE);
-    /// let grid = DensityGrid::new([3, 2, 1], smoke, unit, unit, Phase::ISOTROPIC, Affine3::IDENTITY, &mut blocks)?;
+    /// # use fogbow::{host::Properties, math::Affine3, medium::{Density, DensityGrid, MinMax}};
+    /// let (mut blocks, smoke) = ([MinMax::default()], Density::F32(&[1.0; 6]));
+    /// let grid = DensityGrid::new([3, 2, 1], smoke, &Properties::VACUUM, Affine3::IDENTITY, &mut blocks)?;
     /// assert_eq!(grid.size(), [3, 2, 1]);
     /// # Ok::<(), fogbow::medium::MediumError>(())
     /// ```

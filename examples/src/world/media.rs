@@ -1,6 +1,6 @@
 //! Media and where they are.
 
-use fogbow::host::{Empty, Medium};
+use fogbow::host::{Empty, Medium, Properties};
 use fogbow::math::Affine3;
 use fogbow::medium::{AnyMedium, Density, DensityGrid, Homogeneous, MediumError, MinMax, Overlap, Placed, Region};
 
@@ -147,15 +147,9 @@ fn place<'a>(medium: &'a MediumDescription, table: &'a mut MediumTable) -> Resul
                 Values::U8(values) => Density::U8(values),
             };
             let placement = to_world.to_affine();
-            AnyMedium::from(DensityGrid::new(
-                volume.size,
-                density,
-                *absorption,
-                *scattering,
-                *phase,
-                placement,
-                blocks,
-            )?)
+            let (absorption, scattering, phase) = (*absorption, *scattering, *phase);
+            let properties = Properties { absorption, scattering, phase, ..Properties::VACUUM };
+            AnyMedium::from(DensityGrid::new(volume.size, density, &properties, placement, blocks)?)
         }
     };
     for place in &medium.places {

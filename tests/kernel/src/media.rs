@@ -1,6 +1,6 @@
 //! Media of every kind, and how light gets through them.
 
-use fogbow::host::Medium;
+use fogbow::host::{Medium, Properties};
 use fogbow::math::{Affine3, Mat3, Ray, Vec3};
 use fogbow::medium::{
     Density, DensityGrid, FractalNoise, Homogeneous, MediumError, MinMax, Noise, Overlap, Placed, Region,
@@ -45,13 +45,17 @@ pub(crate) fn each(mut question: impl FnMut(&dyn Medium)) -> Result<(), MediumEr
     };
     let mut blocks = [[MinMax::default(); 8]; 3];
     let [first, second, third] = &mut blocks;
-    let grid = |density, blocks| {
-        let scattering = Spectrum::new(0.5, 0.6, 0.7);
-        DensityGrid::new(SIZE, density, Spectrum::splat(0.2), scattering, Lobe::Schlick { k: 0.5 }, turned, blocks)
+    let smoke = Properties {
+        absorption: Spectrum::splat(0.2),
+        scattering: Spectrum::new(0.5, 0.6, 0.7),
+        emission: Spectrum::ZERO,
+        phase: Lobe::Schlick { k: 0.5 }.into(),
     };
-    let plume = grid(Density::F32(&floats), first)?.with_emission(Spectrum::splat(0.3))?;
+    let burning = Properties { emission: Spectrum::splat(0.3), ..smoke };
+    let plume = DensityGrid::new(SIZE, Density::F32(&floats), &burning, turned, first)?;
     question(&plume);
-    question(&grid(Density::U8(&bytes), second)?.with_absorption_grid(Density::F32(&floats), third)?);
+    let thin = DensityGrid::new(SIZE, Density::U8(&bytes), &smoke, turned, second)?;
+    question(&thin.with_absorption_grid(Density::F32(&floats), third)?);
 
     let shape = FractalNoise { frequency: 0.7, offset: 0.1, ..FractalNoise::default() };
     let noise = Noise::new(shape, Spectrum::splat(0.1), Spectrum::splat(0.8), Lobe::Rayleigh)?;

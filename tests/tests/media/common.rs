@@ -1,15 +1,18 @@
 //! What the tests of media share.
 
-use fogbow::host::{MajorantSegment, Medium};
+use fogbow::host::{MajorantSegment, Medium, Properties};
 use fogbow::math::{Affine3, Mat3, Ray, Vec3, float};
 use fogbow::medium::{Density, DensityGrid, MediumError, MinMax};
-use fogbow::phase::Phase;
 use fogbow::sampling::{Generator, uniform, uniform2, warp};
 use fogbow::spectrum::{Gradient, Spectrum};
 
 pub(crate) const SCATTERING: Spectrum = Spectrum::new(0.9, 0.5, 2.0);
 
 pub(crate) const ABSORPTION: Spectrum = Spectrum::new(0.1, 0.4, 0.0);
+
+/// Coloured smoke.
+pub(crate) const SMOKE: Properties =
+    Properties { absorption: ABSORPTION, scattering: SCATTERING, ..Properties::VACUUM };
 
 /// A grid with memory of its own.
 pub(crate) struct Voxels {
@@ -32,7 +35,7 @@ impl Voxels {
 
     pub(crate) fn try_grid(&mut self) -> Result<DensityGrid<'_>, MediumError> {
         let density = Density::F32(&self.values);
-        DensityGrid::new(self.size, density, ABSORPTION, SCATTERING, Phase::ISOTROPIC, self.placement, &mut self.blocks)
+        DensityGrid::new(self.size, density, &SMOKE, self.placement, &mut self.blocks)
     }
 }
 

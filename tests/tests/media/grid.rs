@@ -1,9 +1,8 @@
 //! Grids: bounds, lookups, derivatives.
 
-use fogbow::host::{MajorantSegment, Medium};
+use fogbow::host::{MajorantSegment, Medium, Properties};
 use fogbow::math::{Affine3, Mat3, Ray, Vec3};
 use fogbow::medium::{BLOCK, Density, DensityGrid, MinMax};
-use fogbow::phase::Phase;
 use fogbow::sampling::{Generator, uniform};
 use fogbow::spectrum::Spectrum;
 
@@ -166,8 +165,7 @@ fn bytes_agree_with_floats() {
     let floats = voxels.grid();
     let mut blocks = vec![MinMax::default(); DensityGrid::block_count([6, 5, 4])];
     let density = Density::U8(&bytes);
-    let grid =
-        DensityGrid::new([6, 5, 4], density, ABSORPTION, SCATTERING, Phase::ISOTROPIC, placement, &mut blocks).unwrap();
+    let grid = DensityGrid::new([6, 5, 4], density, &SMOKE, placement, &mut blocks).unwrap();
     for _ in 0..2000 {
         let p = placement.transform_point3(Vec3::splat(0.5) + point(&mut rng, 0.6));
         assert_near(grid.extinction(p)[2], floats.extinction(p)[2], 1e-6, "value");
@@ -254,7 +252,8 @@ fn a_second_grid_absorbs_and_a_third_emits() {
     let (a, rest) = blocks.split_at_mut(DensityGrid::block_count([10, 9, 8]));
     let (b, c) = rest.split_at_mut(a.len());
     let density = Density::F32(&smooth);
-    let grid = DensityGrid::new([10, 9, 8], density, Spectrum::ONE, SCATTERING, Phase::ISOTROPIC, place, a)
+    let steam = Properties { absorption: Spectrum::ONE, ..SMOKE };
+    let grid = DensityGrid::new([10, 9, 8], density, &steam, place, a)
         .and_then(|g| g.with_absorption_grid(Density::U8(&soot), b))
         .and_then(|g| g.with_emission_grid(Density::F32(&fire), Spectrum::new(9.0, 3.0, 1.0), c))
         .unwrap();

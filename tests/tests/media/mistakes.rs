@@ -161,7 +161,7 @@ fn beams_past_mistaken_bounds_are_whole() {
         let mut rng = Generator::new(3);
         let carried = (0..200).map(|_| {
             let mut sum = 0.0;
-            pieces(medium.fresh(), &ray(), Spectrum::ONE, 0, 10.0, &mut rng, &mut |piece| {
+            pieces(medium.fresh(), &ray(), Spectrum::ONE, 10.0, &mut rng, &mut |piece| {
                 let rate = piece.rate[0];
                 sum += piece.power[0] * if rate > 0.0 { -(-rate * piece.length).exp_m1() / rate } else { piece.length };
             });
@@ -203,6 +203,6 @@ fn rays_without_end_come_to_one() {
         assert_eq!(thickness.transmitted(), Spectrum::ZERO);
         let seen = eye_ray(&ray, medium.fresh(), |_| 0.1, |_, _, _| Spectrum::ONE, 0.5);
         assert!((seen.radiance[0] - 1.0).abs() < 2e-3, "{seen:?}");
-        pieces(medium.fresh(), &ray, Spectrum::ONE, 0, 10.0, &mut rng, &mut |_| ());
+        pieces(medium.fresh(), &ray, Spectrum::ONE, 10.0, &mut rng, &mut |_| ());
     });
 }

@@ -1,5 +1,6 @@
 //! What constructors refuse.
 
+use fogbow::host::Properties;
 use fogbow::math::{Affine3, Bounds, Mat3, Vec3};
 use fogbow::medium::{Density, DensityGrid, FractalNoise, MediumError, MinMax, Noise, Region};
 use fogbow::phase::Phase;
@@ -31,10 +32,16 @@ fn constructors_name_what_they_refuse() {
     assert_eq!(refused([1, 1, 1], vec![1.0], nowhere), Some(MediumError::Placement));
     let grid = |coefficient: f32, blocks: &mut [MinMax]| {
         let sigma = Spectrum::splat(coefficient);
-        DensityGrid::new([1, 1, 1], Density::U8(&[9]), sigma, sigma, Phase::ISOTROPIC, unit, blocks).err()
+        let fog = Properties { absorption: sigma, scattering: sigma, ..Properties::VACUUM };
+        DensityGrid::new([1, 1, 1], Density::U8(&[9]), &fog, unit, blocks).err()
     };
     assert_eq!(grid(f32::NAN, &mut [MinMax::default()]), Some(MediumError::Coefficients));
     assert_eq!(grid(1.0, &mut []), Some(MediumError::Blocks));
+    for emission in [f32::NAN, -1.0, f32::MAX] {
+        let fire = Properties { emission: Spectrum::splat(emission), ..Properties::VACUUM };
+        let (hot, mut blocks) = (Density::F32(&[2.0]), [MinMax::default()]);
+        assert_eq!(DensityGrid::new([1, 1, 1], hot, &fire, unit, &mut blocks).err(), Some(MediumError::Emission));
+    }
     assert!(Region::sphere(Vec3::ZERO, 0.0).is_err() && Region::sphere(Vec3::NAN, 1.0).is_err());
     assert!(Region::bounds(Bounds::EMPTY).is_err());
     assert_eq!(Region::bounds(Bounds::EVERYTHING), Ok(Region::Everywhere));
