@@ -26,7 +26,7 @@ const MAX_PARTS: f32 = 32.0;
 /// Photon beams, in storage lent or growing.
 ///
 /// ```
-/// # use fogbow::{beams::{Beams, BeamNode, Piece}, math::*, medium::Homogeneous, phase::Lobe};
+/// # use fogbow::{beams::{BeamNode, Beams, Piece}, math::*, medium::Homogeneous, phase::Lobe};
 /// # use fogbow::{sampling::Generator, spectrum::Spectrum};
 /// // One beam of 1 W along +z in thin fog, seen from the side.
 /// let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::splat(1e-3), Lobe::Isotropic)?;
@@ -62,7 +62,7 @@ impl<'s> Beams<'s> {
     /// None so far. For `n` pieces lend `n` of `pieces` and `n + 1` of `nodes`, which always suffices.
     ///
     /// ```
-    /// # use fogbow::{beams::{Beams, BeamNode, Piece}, spectrum::Spectrum};
+    /// # use fogbow::{beams::{BeamNode, Beams, Piece}, spectrum::Spectrum};
     /// let (mut pieces, mut nodes) = ([Piece::default(); 1], [BeamNode::default(); 2]);
     /// let mut beams = Beams::new(&mut pieces[..], &mut nodes[..]);
     /// let piece = Piece { length: 1.0, radius: 0.1, power: Spectrum::ONE, ..Piece::default() };
@@ -102,7 +102,7 @@ impl<'s> Beams<'s> {
     /// Forgets all pieces and keeps the memory.
     ///
     /// ```
-    /// # use fogbow::{beams::{Beams, BeamNode, Piece}, math::Bounds, spectrum::Spectrum};
+    /// # use fogbow::{beams::{BeamNode, Beams, Piece}, math::Bounds, spectrum::Spectrum};
     /// let (mut pieces, mut nodes) = ([Piece::default(); 1], [BeamNode::default(); 2]);
     /// let mut beams = Beams::new(&mut pieces[..], &mut nodes[..]);
     /// let piece = Piece { length: 1.0, radius: 0.1, power: Spectrum::ONE, ..Piece::default() };
@@ -121,7 +121,7 @@ impl<'s> Beams<'s> {
     /// The pieces, in the order of the tree.
     ///
     /// ```
-    /// # use fogbow::{beams::{Beams, BeamNode, Piece}, spectrum::Spectrum};
+    /// # use fogbow::{beams::{BeamNode, Beams, Piece}, spectrum::Spectrum};
     /// let (mut pieces, mut nodes) = ([Piece::default(); 2], [BeamNode::default(); 3]);
     /// let mut beams = Beams::new(&mut pieces[..], &mut nodes[..]);
     /// let piece = Piece { length: 1.0, radius: 0.1, power: Spectrum::ONE, ..Piece::default() };
@@ -138,7 +138,7 @@ impl<'s> Beams<'s> {
     /// Memory in use (bytes), without what a `Vec` or a lent slice holds in reserve.
     ///
     /// ```
-    /// # use fogbow::{beams::{Beams, BeamNode, Piece}, spectrum::Spectrum};
+    /// # use fogbow::{beams::{BeamNode, Beams, Piece}, spectrum::Spectrum};
     /// let (mut pieces, mut nodes) = ([Piece::default(); 8], [BeamNode::default(); 9]);
     /// let mut beams = Beams::new(&mut pieces[..], &mut nodes[..]);
     /// beams.push(Piece { length: 1.0, radius: 0.1, power: Spectrum::ONE, ..Piece::default() })?;
@@ -191,7 +191,7 @@ impl<'s> Beams<'s> {
     /// The box around all pieces; empty before [`Beams::build`] and without pieces.
     ///
     /// ```
-    /// # use fogbow::{beams::{Beams, BeamNode, Piece}, math::Vec3, spectrum::Spectrum};
+    /// # use fogbow::{beams::{BeamNode, Beams, Piece}, math::Vec3, spectrum::Spectrum};
     /// let (mut pieces, mut nodes) = ([Piece::default(); 1], [BeamNode::default(); 2]);
     /// let mut beams = Beams::new(&mut pieces[..], &mut nodes[..]);
     /// beams.push(Piece { length: 2.0, direction: Vec3::Z, radius: 0.5, power: Spectrum::ONE, ..Piece::default() })?;

@@ -138,7 +138,7 @@ impl<'s, R: Fn(Vec3, f32) -> f32> BeamPass<'s, R> {
     /// As [`BeamPass::new`], in the memory of `beams`, which are forgotten. Where that is lent and too small, [`BeamPass::finish`] says so.
     ///
     /// ```
-    /// use fogbow::beams::{Beams, BeamNode, BeamOutput, BeamPass, Piece, Settings};
+    /// use fogbow::beams::{BeamNode, BeamOutput, BeamPass, Beams, Piece, Settings};
     /// # use fogbow::{host::Empty, light::{Light, PointLight}, math::*, medium::Homogeneous, phase::Phase};
     /// # use fogbow::{spectrum::Spectrum, work, world::{Outline, World}};
     /// # let fog = Homogeneous::new(Spectrum::ONE, Spectrum::ONE, Phase::ISOTROPIC)?;

@@ -17,7 +17,7 @@ use crate::world::World;
 ///
 /// ```
 /// # #[cfg(feature = "alloc")] {
-/// # use fogbow::cache::{Asked, Kind, FilledRecords, RadianceCaches, CachedRadiance, Settings};
+/// # use fogbow::cache::{Asked, CachedRadiance, FilledRecords, Kind, RadianceCaches, Settings};
 /// # use fogbow::{host::Empty, light::{Light, PointLight}, math::{Bounds, Ray, Vec3}, medium::{Homogeneous, Placed, Region}};
 /// # use fogbow::{phase::Lobe, sampling::{Generator, Independent}, spectrum::Spectrum, work, world::{Outline, World}};
 /// let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::splat(0.8), Lobe::HenyeyGreenstein { g: 0.3 })?;
@@ -111,7 +111,7 @@ impl<'s> RadianceCaches<'s> {
     /// const RECORDS: usize = 48;
     /// let settings = Settings { surface: Some(effort), rays: 16, ..Settings::default() };
     /// let (mut records, mut higher) = ([Record::default(); RECORDS], [Coefficient::ZERO; 3 * RECORDS]);
-    /// let (mut nodes, mut entries) = ([[Node::default(); 4 * RECORDS]; 2], [[0; 24 * RECORDS]; 2]);
+    /// let (mut nodes, mut entries) = ([[IndexNode::default(); 4 * RECORDS]; 2], [[0; 24 * RECORDS]; 2]);
     /// let (mut spheres, mut blocks) = ([[[0.0; 4]; RECORDS]; 2], [[Block::default(); 14 * RECORDS]; 2]);
     /// let mut parts = nodes.iter_mut().zip(&mut entries).zip(spheres.iter_mut().zip(&mut blocks));
     /// let mut index = || {
@@ -126,8 +126,8 @@ impl<'s> RadianceCaches<'s> {
     ///
     /// // As much for the fill and for its jobs; here there is none, so that no place is even looked for.
     /// let asked = Asked::<fn([f32; 2]) -> Ray>::Box(bounds);
-    /// let mut filling = caches.fill_in(Memory::lent(Slots::default()), asked);
-    /// work::finish(&mut filling, &world, &mut Output::lent(&mut [], &mut [], &mut []));
+    /// let mut filling = caches.fill_in(FillingMemory::lent(Slots::default()), asked);
+    /// work::finish(&mut filling, &world, &mut FilledRecords::lent(&mut [], &mut [], &mut []));
     /// assert!(filling.is_cut() && filling.finish().records(Kind::Surface).is_empty());
     /// # Ok::<(), fogbow::medium::MediumError>(())
     /// ```

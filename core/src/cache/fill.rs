@@ -86,7 +86,7 @@ enum Round {
 ///
 /// ```
 /// # #[cfg(feature = "alloc")] {
-/// # use fogbow::cache::{Asked, Kind, FillingMemory, FilledRecords, RadianceCaches, Settings};
+/// # use fogbow::cache::{Asked, FilledRecords, FillingMemory, Kind, RadianceCaches, Settings};
 /// # use fogbow::{host::Empty, math::{Bounds, Ray, Vec3}, medium::Homogeneous, phase::Phase, spectrum::Spectrum};
 /// # use fogbow::{work::step, world::{Outline, World}};
 /// # let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::ONE, Phase::ISOTROPIC)?;

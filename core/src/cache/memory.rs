@@ -74,7 +74,7 @@ impl<'s> FillingMemory<'s> {
     /// In lent memory, whose size [`room_for`](super::room_for) tells; where that is too small, [`Filling::is_cut`](super::Filling::is_cut) says so.
     ///
     /// ```
-    /// # use fogbow::cache::{Guide, FillingMemory, Slots, Wanted};
+    /// # use fogbow::cache::{FillingMemory, Guide, Slots, Wanted};
     /// let mut wanted = [Wanted::default(); 1000];
     /// let [mut open, mut still_open] = [[0; 1000]; 2];
     /// let mut guides = [[Guide::default(); 10]; 6];

@@ -264,7 +264,7 @@ impl<'s> Fill<'s> {
     ///
     /// ```
     /// # use fogbow::{host::Empty, light::{Light, PointLight}, math::{Bounds, Vec3}, work, world::World};
-    /// use fogbow::covariance::{Deposit, Fill, GridMemory, OccluderCell, GridOutput, Settings, SurfacePoint, Voxel};
+    /// use fogbow::covariance::{Deposit, Fill, GridMemory, GridOutput, OccluderCell, Settings, SurfacePoint, Voxel};
     /// let (mut all, mut part) = ([Voxel::EMPTY; 64], [Voxel::EMPTY; 64]);
     /// let mut cells = [OccluderCell::default(); 64];
     /// let memory = GridMemory { voxels: (&mut all[..]).into(), part: (&mut part[..]).into(), occluders: (&mut cells[..]).into() };

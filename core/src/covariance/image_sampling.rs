@@ -215,7 +215,7 @@ impl<'s> Planning<'s> {
     /// [`Full`] if that is too little.
     ///
     /// ```
-    /// use fogbow::covariance::image_sampling::{Outlook, PlanOutput, Pixel, Planning};
+    /// use fogbow::covariance::image_sampling::{Outlook, Pixel, PlanOutput, Planning};
     /// use fogbow::work;
     /// let (mut pixels, mut numbers) = ([Pixel::default(); 64], [0.0; 64]);
     /// let (mut row, mut row_numbers) = ([Pixel::default(); 8], [0.0; 8]);

@@ -29,7 +29,7 @@ pub enum Rule {
 /// Here a step ends where `∫ n dt = 1`, cell by cell. Where no photon came by, and outside, light counts as even.
 ///
 /// ```
-/// # use fogbow::{covariance::{GridView, Lattice, Rule, AdaptiveSteps, Voxel}, math::*};
+/// # use fogbow::{covariance::{AdaptiveSteps, GridView, Lattice, Rule, Voxel}, math::*};
 /// let lattice = Lattice::new(Bounds { min: Vec3::ZERO, max: Vec3::new(2.0, 1.0, 1.0) }, [2, 1, 1])?;
 /// let sum = Symmetric3::from_upper([25.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
 /// let voxels = [Voxel::EMPTY, Voxel { sum, weight: 1.0 }];

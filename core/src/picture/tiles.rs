@@ -102,7 +102,7 @@ const SAMPLES_PER_JOB: u32 = 64;
 ///
 /// ```
 /// # #[cfg(feature = "alloc")] {
-/// use fogbow::picture::{TileOutput, Sample, Settings, Tiles};
+/// use fogbow::picture::{Sample, Settings, TileOutput, Tiles};
 /// use fogbow::{sampling::{Generator, Independent, uniform}, spectrum::Spectrum, work};
 /// let settings = Settings { size: [4, 3], layers: 1, samples: 64, goal: None, seed: 0, tile: 8 };
 /// let mut tiles = Tiles::new(settings, Independent);

@@ -20,7 +20,7 @@ pub trait GeneratorSource {
 /// Every number independent of all others: [`independent`].
 ///
 /// ```
-/// use fogbow::sampling::{Independent, GeneratorSource, pixel_key, uniform};
+/// use fogbow::sampling::{GeneratorSource, Independent, pixel_key, uniform};
 /// let first = |x, y| uniform(&mut Independent.start(1, pixel_key(x, y), 0));
 /// assert_eq!(first(3, 4), first(3, 4));
 /// assert_ne!(first(3, 4), first(4, 3));

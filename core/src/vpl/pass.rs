@@ -102,7 +102,7 @@ impl<'o> VplOutput<'o> {
     /// [`VplPassError::TooMany`].
     ///
     /// ```
-    /// # use fogbow::{math::Vec3, phase::Phase, spectrum::Spectrum, vpl::{VplOutput, VirtualLight}};
+    /// # use fogbow::{math::Vec3, phase::Phase, spectrum::Spectrum, vpl::{VirtualLight, VplOutput}};
     /// let light = VirtualLight::in_medium(Vec3::ZERO, Vec3::Z, Spectrum::ONE, 1, &Phase::ISOTROPIC);
     /// let (mut lights, mut seen) = ([light; 1024], [0.0; 512]);
     /// let output = VplOutput::new(&mut lights[..], &mut seen[..]);
@@ -135,7 +135,7 @@ impl<'s> VplMemory<'s> {
     /// witnesses.
     ///
     /// ```
-    /// # use fogbow::{math::Vec3, phase::Phase, spectrum::Spectrum, vpl::{VplMemory, CurvePlace, VirtualLight}};
+    /// # use fogbow::{math::Vec3, phase::Phase, spectrum::Spectrum, vpl::{CurvePlace, VirtualLight, VplMemory}};
     /// let light = VirtualLight::in_medium(Vec3::ZERO, Vec3::Z, Spectrum::ONE, 1, &Phase::ISOTROPIC);
     /// let (mut lights, mut order) = ([light; 100], [CurvePlace::default(); 100]);
     /// let mut numbers = [[0.0_f32; 100]; 2];
@@ -180,7 +180,7 @@ enum Round {
 /// Paths draw from a [`GeneratorSource`]; a low-discrepancy one makes lights even.
 ///
 /// ```
-/// use fogbow::vpl::{self, VplOutput, VplPass, Settings};
+/// use fogbow::vpl::{self, Settings, VplOutput, VplPass};
 /// use fogbow::{host::Empty, light::{Light, PointLight}, math::*, medium::Homogeneous, phase::Phase};
 /// use fogbow::sampling::{Generator, Independent};
 /// use fogbow::{spectrum::Spectrum, work, world::{Outline, World}};
