@@ -61,6 +61,14 @@ impl Properties {
 ///
 /// Equal bounds mean that the medium is constant there (all of its properties, not only the sum),
 /// so closed forms apply; a majorant of 0 means vacuum without emission.
+///
+/// ```
+/// # use fogbow::{host::MajorantSegment, spectrum::Spectrum};
+/// let gap = MajorantSegment::vacuum(2.0);
+/// assert!(gap.is_constant() && gap.majorant == Spectrum::ZERO);
+/// let smoke = MajorantSegment { minorant: Spectrum::splat(0.1), majorant: Spectrum::ONE, ..gap };
+/// assert!(!smoke.is_constant());
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[doc(alias("RayMajorantSegment", "Stretch", "bounds"))]
 pub struct MajorantSegment {
@@ -111,7 +119,7 @@ pub struct Face {
 /// A participating medium, as the host knows it.
 ///
 /// ```
-/// # use fogbow::{host::Medium, math::{Ray, Vec3}, medium::{Homogeneous, Placed, Region}, phase::Phase};
+/// # use fogbow::{host::{MajorantSegment, Medium}, math::{Ray, Vec3}, medium::{Homogeneous, Placed, Region}, phase::Phase};
 /// # use fogbow::spectrum::{Gradient, Hessian, Spectrum};
 /// let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::ONE, Phase::ISOTROPIC)?;
 /// let ball = Placed::new(fog, Region::sphere(Vec3::ZERO, 2.0)?);
@@ -124,6 +132,11 @@ pub struct Face {
 /// assert_eq!(faces, [(3.0, -1.0), (7.0, -1.0)]);   // outside minus inside
 /// assert_eq!(ball.mean_extinction(Vec3::ZERO, 0.5), Spectrum::ONE);
 /// assert!(ball.is_grey() && !ball.is_emissive());
+/// // A ray towards it: vacuum as far as the ball, then the fog in it.
+/// let ray = Ray::new(-5.0 * Vec3::X, Vec3::X);
+/// assert_eq!(ball.majorant_segment(&ray, 0.0), MajorantSegment::vacuum(3.0));
+/// let inside = ball.marching_segment(&ray, 3.0);
+/// assert_eq!((inside.until, inside.minorant, inside.majorant), (7.0, Spectrum::ONE, Spectrum::ONE));
 /// # Ok::<(), fogbow::medium::MediumError>(())
 /// ```
 pub trait Medium {

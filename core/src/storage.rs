@@ -116,6 +116,15 @@ impl<T: Copy> List<'_, T> {
     }
 
     /// Whether there is no element.
+    ///
+    /// ```
+    /// # use fogbow::storage::List;
+    /// let mut slots = [0u32; 2];
+    /// let mut list = List::from(&mut slots[..]);
+    /// assert!(list.is_empty());   // what a lent slice held counts for nothing
+    /// list.push(7).unwrap();
+    /// assert!(!list.is_empty());
+    /// ```
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.as_slice().is_empty()

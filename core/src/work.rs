@@ -41,11 +41,15 @@ use core::ops::Range;
 ///         self.taken += 1;
 ///         if self.taken >= 3 { self.round += 1 }
 ///     }
+///     fn stage(&self) -> &'static str {
+///         if self.round == 0 { "square" } else { "root" }
+///     }
 /// }
 ///
 /// let mut norm = Norm::default();
+/// assert_eq!(norm.stage(), "square");
 /// finish(&mut norm, &[2.0, 3.0, 6.0][..], &mut 0.0);
-/// assert_eq!(norm.sum, 7.0);
+/// assert_eq!((norm.sum, norm.stage()), (7.0, "root"));
 /// ```
 pub trait Rounds<W: ?Sized> {
     /// What a job leaves, in memory of its own, which may be used again for other jobs.

@@ -55,10 +55,21 @@ impl<'o> BeamOutput<'o> {
     /// [`BeamPassError::TooMany`].
     ///
     /// ```
-    /// # use fogbow::beams::{BeamOutput, Piece};
-    /// let mut slots = [Piece::default(); 4096];
-    /// let output = BeamOutput::new(&mut slots[..]);
-    /// # let _ = output;
+    /// # use fogbow::beams::{BeamOutput, BeamPass, BeamPassError, Piece, Settings};
+    /// # use fogbow::{host::Empty, light::{Light, PointLight}, math::*, medium::Homogeneous, phase::Phase};
+    /// # use fogbow::{spectrum::Spectrum, work, world::{Outline, World}};
+    /// # let fog = Homogeneous::new(Spectrum::ONE, Spectrum::ONE, Phase::ISOTROPIC)?;
+    /// # let lamps = [Light::Point(PointLight::from_flux(Vec3::ZERO, Spectrum::ONE)?)];
+    /// # let world = World { medium: &fog, scene: &Empty, lights: &lamps };
+    /// # let outline = Outline::of(&world, Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE });
+    /// let settings = Settings { paths: 16, ..Settings::for_outline(&outline) };
+    /// let run = |slots: &mut [Piece]| {
+    ///     let mut pass = BeamPass::new(&settings, 0, |_, pass| pass);
+    ///     work::finish(&mut pass, &world, &mut BeamOutput::new(slots));
+    ///     pass.error()
+    /// };
+    /// assert_eq!((run(&mut [Piece::default(); 2048]), run(&mut [Piece::default(); 15])), (None, Some(BeamPassError::TooMany)));
+    /// # Ok::<(), Box<dyn core::error::Error>>(())
     /// ```
     pub fn new(pieces: impl Into<List<'o, Piece>>) -> Self {
         Self { pieces: pieces.into(), error: None }
@@ -119,6 +130,26 @@ impl<'s> BeamPass<'s, fn(Vec3, f32) -> f32> {
     }
 
     /// As [`BeamPass::pilot`], in the memory of `beams`.
+    ///
+    /// ```
+    /// # use fogbow::beams::{BeamNode, BeamOutput, BeamPass, Beams, Piece, Settings};
+    /// # use fogbow::{host::Empty, light::{Light, PointLight}, math::*, medium::Homogeneous, phase::Phase};
+    /// # use fogbow::{spectrum::Spectrum, work, world::{Outline, World}};
+    /// # let fog = Homogeneous::new(Spectrum::ONE, Spectrum::ONE, Phase::ISOTROPIC)?;
+    /// # let lamps = [Light::Point(PointLight::from_flux(Vec3::ZERO, Spectrum::ONE)?)];
+    /// # let world = World { medium: &fog, scene: &Empty, lights: &lamps };
+    /// # let outline = Outline::of(&world, Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE });
+    /// let settings = Settings { pieces: 20_000, ..Settings::for_outline(&outline) };
+    /// let (mut pieces, mut slots) = (vec![Piece::default(); 100_000], [Piece::default(); 4096]);
+    /// // A pilot is counted, never looked up: it needs no tree.
+    /// let mut pilot = BeamPass::pilot_in(Beams::new(&mut pieces[..], &mut [][..]), &settings);
+    /// work::finish(&mut pilot, &world, &mut BeamOutput::new(&mut slots[..]));
+    /// let settings = pilot.settings_for_pieces();
+    /// let mut pass = BeamPass::new(&settings, 0, |_, pass| pass);
+    /// work::finish(&mut pass, &world, &mut BeamOutput::default());
+    /// assert!((18_000..22_000).contains(&pass.finish()?.pieces().len()));
+    /// # Ok::<(), Box<dyn core::error::Error>>(())
+    /// ```
     #[must_use]
     pub fn pilot_in(beams: Beams<'s>, settings: &Settings) -> Self {
         Self::new_in(beams, &settings.of_pilot(), PILOT, |_, pass| pass)

@@ -142,6 +142,27 @@ impl<'s> RadianceCaches<'s> {
 
     /// As [`RadianceCaches::fill`], in lent memory. Where that is too small, the rest is left out:
     /// [`Filling::is_cut`].
+    ///
+    /// ```
+    /// # #[cfg(feature = "alloc")] {
+    /// # use fogbow::cache::{Asked, FilledRecords, FillingMemory, Kind, RadianceCaches, Settings};
+    /// # use fogbow::{host::Empty, math::{Bounds, Ray, Vec3}, medium::Homogeneous, phase::Phase, spectrum::Spectrum};
+    /// # use fogbow::{work, world::{Outline, World}};
+    /// # let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::ONE, Phase::ISOTROPIC)?;
+    /// # let world = World { medium: &fog, scene: &Empty, lights: &[] };
+    /// # let bounds = Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE };
+    /// # let settings = Settings { rays: 20, ..Settings::for_outline(&Outline::of(&world, bounds)).with_walks(16) };
+    /// # let asked = || Asked::<fn([f32; 2]) -> Ray>::Box(bounds);
+    /// let mut output = FilledRecords::default();
+    /// let mut filling = RadianceCaches::new(settings).fill_in(FillingMemory::default(), asked());
+    /// work::finish(&mut filling, &world, &mut output);
+    /// assert!(filling.computed(Kind::Multiple) > 0);
+    /// // Who asks for the same again has no work.
+    /// let mut again = filling.finish().fill_in(FillingMemory::default(), asked());
+    /// assert!(!work::step(&mut again, &world, &mut output));
+    /// # }
+    /// # Ok::<(), Box<dyn core::error::Error>>(())
+    /// ```
     #[must_use]
     pub fn fill_in<F: Fn([f32; 2]) -> Ray>(self, mut memory: FillingMemory<'s>, asked: Asked<F>) -> Filling<'s, F> {
         memory.clear();

@@ -41,12 +41,24 @@ impl<'o> FilledRecords<'o> {
     /// makes. [`room_for`](super::room_for) says how many; where that is too small, [`Filling::is_cut`](super::Filling::is_cut) says so.
     ///
     /// ```
-    /// # use fogbow::cache::{FilledRecords, Wanted};
+    /// # #[cfg(feature = "alloc")] {
+    /// # use fogbow::cache::{Asked, FilledRecords, RadianceCaches, Settings, Wanted, room_for};
     /// # use fogbow::sh::Coefficient;
-    /// let (mut wanted, mut open) = ([Wanted::default(); 256], [0; 256]);
-    /// let mut higher = [Coefficient::ZERO; 3];
-    /// let output = FilledRecords::lent(&mut wanted, &mut open, &mut higher);
-    /// # let _ = output;
+    /// # use fogbow::{host::Empty, math::{Bounds, Ray, Vec3}, medium::Homogeneous, phase::Phase, spectrum::Spectrum};
+    /// # use fogbow::{work, world::{Outline, World}};
+    /// # let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::ONE, Phase::ISOTROPIC)?;
+    /// # let world = World { medium: &fog, scene: &Empty, lights: &[] };
+    /// # let bounds = Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE };
+    /// # let settings = Settings { rays: 20, ..Settings::for_outline(&Outline::of(&world, bounds)).with_walks(16) };
+    /// # let asked = || Asked::<fn([f32; 2]) -> Ray>::Box(bounds);
+    /// let room = room_for(&settings, 2000, 100);
+    /// let (mut wanted, mut open) = (vec![Wanted::default(); room.of_job_wanted], vec![0; room.of_job_open]);
+    /// let mut higher = vec![Coefficient::ZERO; room.of_job_higher];
+    /// let mut filling = RadianceCaches::new(settings).fill(asked());
+    /// work::finish(&mut filling, &world, &mut FilledRecords::lent(&mut wanted, &mut open, &mut higher));
+    /// assert!(!filling.is_cut());
+    /// # }
+    /// # Ok::<(), Box<dyn core::error::Error>>(())
     /// ```
     #[must_use]
     pub fn lent(wanted: &'o mut [Wanted], open: &'o mut [u32], higher: &'o mut [Coefficient]) -> Self {
@@ -74,17 +86,35 @@ impl<'s> FillingMemory<'s> {
     /// In lent memory, whose size [`room_for`](super::room_for) tells; where that is too small, [`Filling::is_cut`](super::Filling::is_cut) says so.
     ///
     /// ```
-    /// # use fogbow::cache::{FillingMemory, Guide, Slots, Wanted};
-    /// let mut wanted = [Wanted::default(); 1000];
-    /// let [mut open, mut still_open] = [[0; 1000]; 2];
-    /// let mut guides = [[Guide::default(); 10]; 6];
+    /// # #[cfg(feature = "alloc")] {
+    /// # use fogbow::cache::{Asked, Estimate, FilledRecords, FillingMemory, Guide, RadianceCaches, Settings, Slots, Wanted, room_for};
+    /// # use fogbow::sh::Coefficient;
+    /// # use fogbow::{host::Empty, math::{Bounds, Ray, Vec3}, medium::Homogeneous, phase::Phase, spectrum::Spectrum};
+    /// # use fogbow::{work, world::{Outline, World}};
+    /// # let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::ONE, Phase::ISOTROPIC)?;
+    /// # let world = World { medium: &fog, scene: &Empty, lights: &[] };
+    /// # let bounds = Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE };
+    /// # let settings = Settings { rays: 20, ..Settings::for_outline(&Outline::of(&world, bounds)).with_walks(16) };
+    /// # let asked = || Asked::<fn([f32; 2]) -> Ray>::Box(bounds);
+    /// let room = room_for(&settings, 2000, 100);
+    /// let mut wanted = vec![Wanted::default(); room.wanted];
+    /// let [mut open, mut still_open] = [(); 2].map(|()| vec![0; room.open]);
+    /// let mut chosen = vec![(0, 0.0); room.chosen];
+    /// let (mut estimates, mut higher) = (vec![Estimate::default(); room.estimates], vec![Coefficient::ZERO; room.higher]);
+    /// let mut guides = room.guides.map(|count| vec![Guide::default(); count]);
     /// let memory = FillingMemory::lent(Slots {
     ///     wanted: &mut wanted,
     ///     open: [&mut open, &mut still_open],
+    ///     chosen: &mut chosen,
+    ///     estimates: &mut estimates,
+    ///     higher: &mut higher,
     ///     guides: guides.each_mut().map(|guides| &mut guides[..]),
-    ///     ..Slots::default() // and so on
     /// });
-    /// # let _ = memory;
+    /// let mut filling = RadianceCaches::new(settings).fill_in(memory, asked());
+    /// work::finish(&mut filling, &world, &mut FilledRecords::default());
+    /// assert!(!filling.is_cut());
+    /// # }
+    /// # Ok::<(), Box<dyn core::error::Error>>(())
     /// ```
     #[must_use]
     pub fn lent(slots: Slots<'s>) -> Self {

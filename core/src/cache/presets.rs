@@ -111,6 +111,17 @@ impl Settings {
     }
 
     /// Single scattering cached, or connected to (`false`), whatever the number of lights.
+    ///
+    /// ```
+    /// # use fogbow::{cache::Settings, host::Empty, light::{Light, PointLight}, math::{Bounds, Vec3}};
+    /// # use fogbow::{spectrum::Spectrum, world::{Outline, World}};
+    /// let lamps = [Light::Point(PointLight::new(Vec3::ZERO, Spectrum::ONE)?)];
+    /// let world = World { medium: &Empty, scene: &Empty, lights: &lamps };
+    /// let outline = Outline::of(&world, Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE });
+    /// let settings = Settings::for_outline(&outline); // which connects to a single lamp
+    /// assert!(settings.single.is_none() && settings.with_single_cached(&outline, true).single.is_some());
+    /// # Ok::<(), fogbow::light::LightError>(())
+    /// ```
     #[must_use]
     pub fn with_single_cached(self, outline: &Outline, cached: bool) -> Self {
         let lights = if cached { MANY_LIGHTS } else { 0 };

@@ -177,7 +177,23 @@ impl<'o> GridOutput<'o> {
     /// In lent memory: for as many surface points as a row of rays meets, and for as many cells as some walks cross. What finds no
     /// room is left out: [`Fill::is_cut`].
     ///
-    /// See [`Fill::new_in`] for an example.
+    /// ```
+    /// # #[cfg(feature = "alloc")] {
+    /// # use fogbow::{host::Empty, light::{Light, PointLight}, math::{Bounds, Vec3}, spectrum::Spectrum, work, world::World};
+    /// use fogbow::covariance::{Deposit, Fill, GridOutput, Settings};
+    /// let lamps = [Light::Point(PointLight::new(Vec3::splat(0.5), Spectrum::ONE)?)];
+    /// let world = World { medium: &Empty, scene: &Empty, lights: &lamps };
+    /// let settings = Settings { photons: 100, edge: 8, ..Settings::new(Bounds { min: Vec3::ZERO, max: Vec3::ONE }) };
+    /// let is_cut = |deposits: &mut [Deposit]| -> Result<bool, Box<dyn core::error::Error>> {
+    ///     let mut fill = Fill::new(settings)?;
+    ///     work::finish(&mut fill, &world, &mut GridOutput::lent(&mut [], deposits));
+    ///     Ok(fill.is_cut())
+    /// };
+    /// // Every flight from the middle to the walls crosses several cells. No surface stops any.
+    /// assert!(!is_cut(&mut [Deposit::default(); 8192])? && is_cut(&mut [Deposit::default(); 3])?);
+    /// # }
+    /// # Ok::<(), Box<dyn core::error::Error>>(())
+    /// ```
     #[must_use]
     pub fn lent(surface: &'o mut [SurfacePoint], deposits: &'o mut [Deposit]) -> Self {
         Self { surface: List::from(surface), deposits: List::from(deposits), is_cut: false }
@@ -222,7 +238,9 @@ enum Round {
 /// let world = World { medium: &fog, scene: &Empty, lights: &spot };
 /// let bounds = Bounds { min: Vec3::new(-0.5, -0.5, 0.0), max: Vec3::new(0.5, 0.5, 2.0) };
 /// let mut fill = Fill::new(Settings { photons: 2000, edge: 16, ..Settings::new(bounds) })?;
+/// assert_eq!((fill.sent(), fill.share()), (0, 0.0));
 /// work::finish(&mut fill, &world, &mut GridOutput::default());
+/// assert_eq!((fill.sent(), fill.share(), fill.is_cut()), (2000, 1.0, false));
 /// let grid = fill.finish();
 /// // Across the beam light varies, along it hardly.
 /// let gamma = grid.view().covariance(Vec3::new(0.0, 0.0, 1.0)).unwrap();

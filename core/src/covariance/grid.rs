@@ -89,6 +89,18 @@ impl<'a> GridView<'a> {
 }
 
 /// A filled grid with its voxels, in lent memory or in memory of its own.
+///
+/// ```
+/// # #[cfg(feature = "alloc")] {
+/// # use fogbow::{covariance::{Fill, Settings, Voxel}, math::{Bounds, Vec3}};
+/// // Of a fill that has yet to begin: two cells along each edge, through which no light came.
+/// let bounds = Bounds { min: Vec3::ZERO, max: Vec3::ONE };
+/// let grid = Fill::new(Settings { edge: 2, ..Settings::new(bounds) })?.finish();
+/// assert_eq!((grid.view().voxels(), grid.view().paths()), (&[Voxel::EMPTY; 8][..], 0));
+/// assert_eq!(grid.bytes(), 8 * size_of::<Voxel>());
+/// # }
+/// # Ok::<(), fogbow::covariance::FillError>(())
+/// ```
 #[derive(Debug)]
 pub struct CovarianceGrid<'s> {
     lattice: Lattice,

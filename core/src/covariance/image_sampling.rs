@@ -74,6 +74,14 @@ pub struct Outlook {
 }
 
 /// Who knows something of every pixel beforehand: a [`Sight`], or a slice with an [`Outlook`] for each.
+///
+/// ```
+/// # use fogbow::covariance::image_sampling::{Outlook, Outlooks};
+/// let known = [3.0, 5.0, 7.0].map(|depth| Outlook { covariance: None, depth });
+/// let depth = |pixel| known.outlook(pixel, [2, 2]).depth;
+/// // Row by row; of the last pixel nothing is known.
+/// assert_eq!([depth([1, 0]), depth([0, 1]), depth([1, 1])], [5.0, 7.0, 0.0]);
+/// ```
 pub trait Outlooks {
     /// What is known of the pixel in this column and row of a picture of `size`, width and height.
     fn outlook(&self, pixel: [u32; 2], size: [u32; 2]) -> Outlook;
@@ -147,6 +155,21 @@ pub struct PlanOutput<'o> {
 
 impl<'o> PlanOutput<'o> {
     /// In lent memory: as many elements of both as a picture is wide.
+    ///
+    /// ```
+    /// use fogbow::covariance::image_sampling::{Outlook, Pixel, PlanOutput, Planning};
+    /// use fogbow::work;
+    /// # #[cfg(feature = "alloc")] {
+    /// let is_cut = |width: usize| {
+    ///     let (mut row, mut numbers) = (vec![Pixel::default(); width], vec![0.0; width]);
+    ///     let mut planning = Planning::new([8, 8], 0.5)?;
+    ///     work::finish(&mut planning, &[Outlook::default(); 64][..], &mut PlanOutput::lent(&mut row, &mut numbers));
+    ///     Ok(planning.is_cut())
+    /// };
+    /// assert_eq!((is_cut(8)?, is_cut(7)?), (false, true));
+    /// # }
+    /// # Ok::<(), fogbow::storage::Full>(())
+    /// ```
     #[must_use]
     pub fn lent(pixels: &'o mut [Pixel], numbers: &'o mut [f32]) -> Self {
         Self { pixels: List::from(pixels), numbers: List::from(numbers), is_cut: false }
@@ -170,6 +193,19 @@ enum Round {
 }
 
 /// The making of a [`Plan`], as [`Rounds`] of jobs.
+///
+/// ```
+/// use fogbow::covariance::image_sampling::{Outlook, PlanOutput, Planning};
+/// use fogbow::work;
+/// # #[cfg(feature = "alloc")] {
+/// let mut planning = Planning::new([10, 10], 1.0)?;
+/// work::finish(&mut planning, &[Outlook::default(); 100][..], &mut PlanOutput::default());
+/// assert!(!planning.is_cut());
+/// let plan = planning.finish();
+/// assert!((0..100).all(|pixel| plan.is_computed(pixel)));   // all of them were asked for
+/// # }
+/// # Ok::<(), fogbow::storage::Full>(())
+/// ```
 #[derive(Debug)]
 pub struct Planning<'s> {
     plan: Plan<'s>,
@@ -353,6 +389,28 @@ impl<W: Outlooks + ?Sized> Rounds<W> for Planning<'_> {
 }
 
 /// Which pixels are computed, and how the others are filled in. Made by [`Planning`].
+///
+/// ```
+/// # use fogbow::covariance::image_sampling::{Outlook, PlanOutput, Planning};
+/// # use fogbow::{math::float::PI, spectrum::Spectrum, work};
+/// # #[cfg(feature = "alloc")] {
+/// let mut planning = Planning::new([16, 16], 0.25)?;
+/// work::finish(&mut planning, &[Outlook::default(); 256][..], &mut PlanOutput::default());
+/// let plan = planning.finish();
+/// let computed = (0..256).filter(|pixel| plan.is_computed(*pixel)).count();
+/// assert_eq!((plan.size(), plan.share()), ([16, 16], computed as f32 / 256.0));
+/// // The mean density is the share that was asked for. In a corner fewer pixels lend each other their light: it is higher.
+/// let mean = (0..256).map(|pixel| plan.density(pixel)).sum::<f32>() / 256.0;
+/// assert!((mean - 0.25).abs() < 1e-3 && (plan.share() - mean).abs() < 0.02);
+/// assert!(plan.density(0) > 2.0 * plan.density(8 * 16 + 8));
+/// // What varies nowhere is filtered as wide as can be: with a standard deviation of 4 pixels.
+/// assert!((plan.shape(100).xx.sqrt() - 1.0 / (2.0 * PI * 4.0)).abs() < 1e-4);
+/// // Filling in keeps what is even, and does not look at pixels that were not computed.
+/// let image: Vec<Spectrum> = (0..256).map(|pixel| Spectrum::splat(if plan.is_computed(pixel) { 0.5 } else { 9.0 })).collect();
+/// assert!((0..256).all(|pixel| (plan.filled(pixel, &image)[0] - 0.5).abs() < 1e-6));
+/// # }
+/// # Ok::<(), fogbow::storage::Full>(())
+/// ```
 #[derive(Debug)]
 pub struct Plan<'s> {
     size: [u32; 2],
@@ -571,7 +629,7 @@ pub struct Computed<'a> {
 /// let mut filled = [Spectrum::ZERO; 256];
 /// let mut work = FillingIn::new(&plan, &mut filled[..])?;
 /// work::finish(&mut work, &Computed { plan: &plan, pixels: &image }, &mut List::default());
-/// assert!(filled.iter().all(|colour| (colour[0] - 0.5).abs() < 1e-6));
+/// assert!(work.pixels().iter().all(|colour| (colour[0] - 0.5).abs() < 1e-6));
 /// # }
 /// # Ok::<(), fogbow::storage::Full>(())
 /// ```

@@ -158,6 +158,24 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Walk<'_, M, S> {
     /// `known(point, to_eye, properties)` may answer for all light but that straight from the lights walks
     /// connect to (those that are no sky) that is scattered towards `to_eye` at a collision (W·m⁻²·sr⁻¹), with its gradients as the point moves
     /// and as `to_eye` turns: then the path ends there. `outgoing` as for [`Walk::path`].
+    ///
+    /// ```
+    /// # use fogbow::{host::Empty, math::{Ray, Vec3}, medium::Homogeneous, phase::Phase, sampling::{Generator, warp}};
+    /// # use fogbow::{single_scatter::Contribution, spectrum::{Gradient, Spectrum}, transmittance::thickness::Steps, world::World};
+    /// use fogbow::multiple_scatter::{Settings, Start, Walk};
+    /// // Endless fog that absorbs nothing, in which light of radiance 1 is scattered into every direction, everywhere.
+    /// let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::ONE, Phase::ISOTROPIC)?;
+    /// let world = World { medium: &fog, scene: &Empty, lights: &[] };
+    /// let walk = Walk { world, settings: Settings::new(Steps::Length(0.1)) };
+    /// let (ray, rng) = (Ray::new(Vec3::ZERO, Vec3::X), &mut Generator::new(1));
+    /// let collision = walk.first(&ray, None, 0.5, false, rng).collision;
+    /// let start = Start { ray, end: None, pdf: warp::uniform_sphere_pdf(), collision };
+    /// let even = Contribution { radiance: Spectrum::ONE, gradient: Gradient::ZERO };
+    /// let incoming = walk.along(&start, |_, _| Spectrum::ZERO, |_, _, _| Some((even, Gradient::ZERO)), rng);
+    /// // Then it arrives as radiance 1, from wherever it is asked: over the density of directions, 4π.
+    /// assert!((incoming.irradiance[0] - 4.0 * core::f32::consts::PI).abs() < 1e-4);
+    /// # Ok::<(), fogbow::medium::MediumError>(())
+    /// ```
     pub fn along(
         &self,
         start: &Start,

@@ -41,6 +41,16 @@ pub struct Sample<'t, T> {
 
 /// What a sample of a picture is: writes a colour per layer into the slice it is given (black at first), from the random
 /// numbers it is given and nothing else that changes.
+///
+/// ```
+/// use fogbow::picture::{Integrand, Sample};
+/// use fogbow::{sampling::Generator, spectrum::Spectrum};
+/// // A function that counts nothing is one.
+/// let columns = |sample: &Sample<'_, ()>, _: &mut Generator, layers: &mut [Spectrum]| layers[0] = Spectrum::splat(sample.x as f32);
+/// let mut layers = [Spectrum::ZERO];
+/// columns.sample(&Sample { x: 3, y: 0, index: 0, tally: &() }, &mut Generator::new(1), &mut layers);
+/// assert_eq!(layers[0], Spectrum::splat(3.0));
+/// ```
 pub trait Integrand<R> {
     /// What it counts on its way; `()` for nothing.
     type Tally: Tally;
@@ -50,6 +60,39 @@ pub trait Integrand<R> {
 }
 
 /// What an [`Integrand`] counts, job by job: each starts with the default.
+///
+/// ```
+/// # #[cfg(feature = "alloc")] {
+/// use core::cell::Cell;
+/// use fogbow::picture::{Integrand, Sample, Settings, Tally, TileOutput, Tiles};
+/// use fogbow::{sampling::{Generator, Independent}, spectrum::Spectrum, work};
+///
+/// #[derive(Default)]
+/// struct Rays(Cell<u64>);
+///
+/// impl Tally for Rays {
+///     type Total = u64;
+///     fn add_to(&self, total: &mut u64) {
+///         *total += self.0.get();
+///     }
+/// }
+///
+/// /// Sends one ray more in each row than in the row above.
+/// struct Rows;
+///
+/// impl Integrand<Generator> for Rows {
+///     type Tally = Rays;
+///     fn sample(&self, sample: &Sample<'_, Rays>, _: &mut Generator, _: &mut [Spectrum]) {
+///         sample.tally.0.set(sample.tally.0.get() + u64::from(sample.y));
+///     }
+/// }
+///
+/// let settings = Settings { size: [5, 3], layers: 1, samples: 10, goal: None, seed: 0, tile: 8 };
+/// let mut tiles = Tiles::new(settings, Independent);
+/// work::finish(&mut tiles, &Rows, &mut TileOutput::default());
+/// assert_eq!(*tiles.total(), 10 * 5 * (0 + 1 + 2));
+/// # }
+/// ```
 pub trait Tally: Default {
     /// The sum over all jobs.
     type Total: Default;
@@ -114,6 +157,28 @@ const SAMPLES_PER_JOB: u32 = 64;
 /// assert!((tiles.mean(1, 0, 0).mean() - 1.5 / 4.0).abs() < 0.05);
 /// # }
 /// ```
+///
+/// A host may decide pass by pass how many samples come next, and end where it likes:
+///
+/// ```
+/// # #[cfg(feature = "alloc")] {
+/// # use fogbow::picture::{Sample, Settings, TileOutput, Tiles};
+/// # use fogbow::{sampling::{Generator, Independent, uniform}, spectrum::Spectrum, work};
+/// # let settings = Settings { size: [4, 3], layers: 1, samples: 64, goal: None, seed: 0, tile: 8 };
+/// # let ramp = |sample: &Sample<'_, ()>, rng: &mut Generator, layers: &mut [Spectrum]| {
+/// #     layers[0] = Spectrum::splat((sample.x as f32 + uniform(rng)) / 4.0);
+/// # };
+/// let mut tiles = Tiles::new(Settings { samples: 14, ..settings }, Independent).by_pass();
+/// let mut passes = Vec::new();
+/// while !tiles.is_done() {
+///     work::finish(&mut tiles, &ramp, &mut TileOutput::default());
+///     assert_eq!(tiles.least_count(), tiles.until());
+///     passes.push(tiles.until());
+///     tiles.begin(tiles.next_until(5)); // at most five more
+/// }
+/// assert_eq!(passes, [1, 2, 4, 8, 13, 14]);
+/// # }
+/// ```
 #[derive(Debug)]
 pub struct Tiles<'s, Q, C = ()> {
     settings: Settings,
@@ -148,6 +213,21 @@ impl<Q, C: Default> Tiles<'static, Q, C> {
     ///
     /// # Panics
     /// If there are not as many as the size says.
+    ///
+    /// ```
+    /// # use fogbow::picture::{Sample, Settings, TileOutput, Tiles};
+    /// # use fogbow::{sampling::{Generator, Independent, uniform}, spectrum::Spectrum, work};
+    /// # let settings = |samples| Settings { size: [4, 3], layers: 1, samples, goal: None, seed: 0, tile: 8 };
+    /// # let noise = |_: &Sample<'_, ()>, rng: &mut Generator, layers: &mut [Spectrum]| layers[0] = Spectrum::splat(uniform(rng));
+    /// let finished = |mut tiles: Tiles<'static, Independent>| {
+    ///     work::finish(&mut tiles, &noise, &mut TileOutput::default());
+    ///     tiles.into_sums()
+    /// };
+    /// let (sums, counts) = finished(Tiles::new(settings(10), Independent));
+    /// let continued = finished(Tiles::of(settings(16), Independent, sums, counts));
+    /// // The bits of a picture that was never left.
+    /// assert_eq!(continued, finished(Tiles::new(settings(16), Independent)));
+    /// ```
     #[must_use]
     pub fn of(settings: Settings, source: Q, sums: alloc::vec::Vec<[f64; 3]>, counts: alloc::vec::Vec<u32>) -> Self {
         let pixels = settings.size[0] as usize * settings.size[1] as usize;
@@ -182,6 +262,16 @@ impl<Q, C: Default> Tiles<'static, Q, C> {
     }
 
     /// Sums and numbers of samples, as [`Tiles::of`] takes them.
+    ///
+    /// ```
+    /// # use fogbow::picture::{Sample, Settings, TileOutput, Tiles};
+    /// # use fogbow::{sampling::{Generator, Independent}, spectrum::Spectrum, work};
+    /// # let settings = Settings { size: [2, 1], layers: 1, samples: 8, goal: None, seed: 0, tile: 8 };
+    /// let mut tiles = Tiles::new(settings, Independent);
+    /// let white = |_: &Sample<'_, ()>, _: &mut Generator, layers: &mut [Spectrum]| layers[0] = Spectrum::ONE;
+    /// work::finish(&mut tiles, &white, &mut TileOutput::default());
+    /// assert_eq!(tiles.into_sums(), (vec![[8.0; 3]; 2], vec![8; 2]));
+    /// ```
     #[must_use]
     pub fn into_sums(self) -> (alloc::vec::Vec<[f64; 3]>, alloc::vec::Vec<u32>) {
         (self.sums.into_vec(), self.counts.into_vec())
@@ -278,6 +368,32 @@ impl<Q, C> Tiles<'_, Q, C> {
     }
 
     /// What integrands have counted.
+    ///
+    /// ```
+    /// # #[cfg(feature = "alloc")] {
+    /// # use core::cell::Cell;
+    /// # use fogbow::picture::{Integrand, Sample, Settings, Tally, TileOutput, Tiles};
+    /// # use fogbow::{sampling::{Generator, Independent}, spectrum::Spectrum, work};
+    /// # #[derive(Default)]
+    /// # struct Rays(Cell<u64>);
+    /// # impl Tally for Rays {
+    /// #     type Total = u64;
+    /// #     fn add_to(&self, total: &mut u64) { *total += self.0.get() }
+    /// # }
+    /// # struct Camera;
+    /// # impl Integrand<Generator> for Camera {
+    /// #     type Tally = Rays;
+    /// #     fn sample(&self, sample: &Sample<'_, Rays>, _: &mut Generator, _: &mut [Spectrum]) {
+    /// #         sample.tally.0.set(sample.tally.0.get() + 1);
+    /// #     }
+    /// # }
+    /// # let settings = Settings { size: [5, 3], layers: 1, samples: 10, goal: None, seed: 0, tile: 8 };
+    /// let mut tiles = Tiles::new(settings, Independent).by_pass();
+    /// work::finish(&mut tiles, &Camera, &mut TileOutput::default());
+    /// // `Camera` counts a ray for each sample; the first pass takes one of each pixel.
+    /// assert_eq!((*tiles.total(), tiles.counts().samples), (15, 15));
+    /// # }
+    /// ```
     #[must_use]
     pub fn total(&self) -> &C {
         &self.total

@@ -8,6 +8,20 @@ use super::uniform::mix;
 /// A source of random numbers: a generator for every sample of everything that has a key.
 ///
 /// A host that brings a low-discrepancy sequence implements this for it: the samples of one key are the points of a sequence.
+///
+/// ```
+/// use fogbow::sampling::{Generator, GeneratorSource, independent, uniform};
+/// /// The same numbers in every pixel, for a look at what else differs between them.
+/// struct Alike;
+/// impl GeneratorSource for Alike {
+///     type Rng = Generator;
+///     fn start(&self, seed: u64, _: u64, sample: u32) -> Generator {
+///         independent(seed, 0, sample)
+///     }
+/// }
+/// let first = |key, sample| uniform(&mut Alike.start(7, key, sample));
+/// assert!(first(1, 0) == first(2, 0) && first(1, 0) != first(1, 1));
+/// ```
 pub trait GeneratorSource {
     /// The generator of one sample.
     type Rng: Rng;

@@ -102,11 +102,22 @@ impl<'o> VplOutput<'o> {
     /// [`VplPassError::TooMany`].
     ///
     /// ```
-    /// # use fogbow::{math::Vec3, phase::Phase, spectrum::Spectrum, vpl::{VirtualLight, VplOutput}};
-    /// let light = VirtualLight::in_medium(Vec3::ZERO, Vec3::Z, Spectrum::ONE, 1, &Phase::ISOTROPIC);
-    /// let (mut lights, mut seen) = ([light; 1024], [0.0; 512]);
-    /// let output = VplOutput::new(&mut lights[..], &mut seen[..]);
-    /// # let _ = output;
+    /// # use fogbow::vpl::{Settings, VirtualLight, VplOutput, VplPass, VplPassError};
+    /// # use fogbow::{host::Empty, light::{Light, PointLight}, math::*, medium::Homogeneous, phase::Phase, sampling::Independent};
+    /// # use fogbow::{spectrum::Spectrum, work, world::{Outline, World}};
+    /// # let fog = Homogeneous::new(Spectrum::ONE, Spectrum::ONE, Phase::ISOTROPIC)?;
+    /// # let lamps = [Light::Point(PointLight::from_flux(Vec3::ZERO, Spectrum::ONE)?)];
+    /// # let world = World { medium: &fog, scene: &Empty, lights: &lamps };
+    /// # let outline = Outline::of(&world, Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE });
+    /// # let light = VirtualLight::in_medium(Vec3::ZERO, Vec3::Z, Spectrum::ONE, 1, &Phase::ISOTROPIC);
+    /// let settings = Settings { paths: 64, ..Settings::for_outline(&outline) };
+    /// let run = |lights: &mut [VirtualLight]| {
+    ///     let mut pass = VplPass::new(&settings, 0, Independent, &[]);
+    ///     work::finish(&mut pass, &world, &mut VplOutput::new(lights, &mut [0.0; 512][..]));
+    ///     pass.error()
+    /// };
+    /// assert_eq!((run(&mut [light; 1024]), run(&mut [light; 10])), (None, Some(VplPassError::TooMany)));
+    /// # Ok::<(), Box<dyn core::error::Error>>(())
     /// ```
     pub fn new(lights: impl Into<List<'o, VirtualLight>>, seen: impl Into<List<'o, f32>>) -> Self {
         Self { lights: lights.into(), seen: seen.into(), error: None }
@@ -135,13 +146,26 @@ impl<'s> VplMemory<'s> {
     /// witnesses.
     ///
     /// ```
-    /// # use fogbow::{math::Vec3, phase::Phase, spectrum::Spectrum, vpl::{CurvePlace, VirtualLight, VplMemory}};
-    /// let light = VirtualLight::in_medium(Vec3::ZERO, Vec3::Z, Spectrum::ONE, 1, &Phase::ISOTROPIC);
-    /// let (mut lights, mut order) = ([light; 100], [CurvePlace::default(); 100]);
-    /// let mut numbers = [[0.0_f32; 100]; 2];
-    /// let [importance, seen] = &mut numbers;
+    /// # use fogbow::host::Medium;
+    /// # use fogbow::vpl::{CurvePlace, Receiver, Settings, VirtualLight, VplMemory, VplOutput, VplPass};
+    /// # use fogbow::{host::Empty, light::{Light, PointLight}, math::*, medium::Homogeneous, phase::Phase, sampling::Independent};
+    /// # use fogbow::{spectrum::Spectrum, work, world::{Outline, World}};
+    /// # let fog = Homogeneous::new(Spectrum::ONE, Spectrum::ONE, Phase::ISOTROPIC)?;
+    /// # let lamps = [Light::Point(PointLight::from_flux(Vec3::ZERO, Spectrum::ONE)?)];
+    /// # let world = World { medium: &fog, scene: &Empty, lights: &lamps };
+    /// # let outline = Outline::of(&world, Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE });
+    /// # let light = VirtualLight::in_medium(Vec3::ZERO, Vec3::Z, Spectrum::ONE, 1, &Phase::ISOTROPIC);
+    /// // Half of all light is absorbed in every collision: 64 paths leave about 64 lights, of which 20 are kept by what a witness sees.
+    /// let settings = Settings { lights: 20, paths: 64, ..Settings::for_outline(&outline) };
+    /// let (mut lights, mut order) = ([light; 512], [CurvePlace::default(); 512]);
+    /// let [mut importance, mut seen] = [[0.0_f32; 512]; 2];
     /// let memory = VplMemory::new(&mut lights[..], &mut order[..], &mut importance[..], &mut seen[..]);
-    /// # let _ = memory;
+    /// let witnesses = [Receiver::in_medium(Vec3::X, Vec3::Z, &fog.properties(Vec3::X)).unwrap()];
+    /// let mut pass = VplPass::new_in(memory, &settings, 0, Independent, &witnesses);
+    /// let (mut of_job, mut seen_of_job) = ([light; 512], [0.0; 512]);
+    /// work::finish(&mut pass, &world, &mut VplOutput::new(&mut of_job[..], &mut seen_of_job[..]));
+    /// assert!((19..=21).contains(&pass.finish()?.len()));
+    /// # Ok::<(), Box<dyn core::error::Error>>(())
     /// ```
     pub fn new(
         lights: impl Into<List<'s, VirtualLight>>,
@@ -239,6 +263,28 @@ impl<'s, Q: GeneratorSource> VplPass<'s, Q> {
     }
 
     /// As [`VplPass::pilot`], in lent memory.
+    ///
+    /// ```
+    /// # use fogbow::vpl::{Settings, VirtualLight, VplMemory, VplOutput, VplPass};
+    /// # use fogbow::{host::Empty, light::{Light, PointLight}, math::*, medium::Homogeneous, phase::Phase, sampling::Independent};
+    /// # use fogbow::{spectrum::Spectrum, work, world::{Outline, World}};
+    /// # let fog = Homogeneous::new(Spectrum::ONE, Spectrum::ONE, Phase::ISOTROPIC)?;
+    /// # let lamps = [Light::Point(PointLight::from_flux(Vec3::ZERO, Spectrum::ONE)?)];
+    /// # let world = World { medium: &fog, scene: &Empty, lights: &lamps };
+    /// # let outline = Outline::of(&world, Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE });
+    /// # let light = VirtualLight::in_medium(Vec3::ZERO, Vec3::Z, Spectrum::ONE, 1, &Phase::ISOTROPIC);
+    /// let settings = Settings { lights: 100, candidates: 1, ..Settings::for_outline(&outline) };
+    /// let (mut lights, mut of_job, mut seen) = (vec![light; 20_000], vec![light; 1024], [0.0; 512]);
+    /// // Without witnesses nothing is weighed, and no other memory needed.
+    /// let memory = VplMemory::new(&mut lights[..], &mut [][..], &mut [][..], &mut [][..]);
+    /// let mut pilot = VplPass::pilot_in(memory, &settings, Independent);
+    /// work::finish(&mut pilot, &world, &mut VplOutput::new(&mut of_job[..], &mut seen[..]));
+    /// let settings = pilot.settings_for_lights();
+    /// let mut pass = VplPass::new(&settings, 0, Independent, &[]);
+    /// work::finish(&mut pass, &world, &mut VplOutput::default());
+    /// assert!((70..130).contains(&pass.finish()?.len()));
+    /// # Ok::<(), Box<dyn core::error::Error>>(())
+    /// ```
     #[must_use]
     pub fn pilot_in(memory: VplMemory<'s>, settings: &Settings, source: Q) -> Self {
         Self::new_in(memory, &settings.of_pilot(), PILOT, source, &[])
@@ -252,6 +298,28 @@ impl<'s, Q: GeneratorSource> VplPass<'s, Q> {
     }
 
     /// As [`VplPass::new`], in lent memory. Where that is too small, [`VplPass::finish`] says so.
+    ///
+    /// ```
+    /// # use fogbow::vpl::{Settings, VirtualLight, VplMemory, VplOutput, VplPass, VplPassError};
+    /// # use fogbow::{host::Empty, light::{Light, PointLight}, math::*, medium::Homogeneous, phase::Phase, sampling::Independent};
+    /// # use fogbow::{spectrum::Spectrum, work, world::{Outline, World}};
+    /// # let fog = Homogeneous::new(Spectrum::ONE, Spectrum::ONE, Phase::ISOTROPIC)?;
+    /// # let lamps = [Light::Point(PointLight::from_flux(Vec3::ZERO, Spectrum::ONE)?)];
+    /// # let world = World { medium: &fog, scene: &Empty, lights: &lamps };
+    /// # let outline = Outline::of(&world, Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE });
+    /// # let light = VirtualLight::in_medium(Vec3::ZERO, Vec3::Z, Spectrum::ONE, 1, &Phase::ISOTROPIC);
+    /// let settings = Settings { paths: 256, ..Settings::for_outline(&outline) };
+    /// let count = |room: usize| {
+    ///     let (mut lights, mut of_job) = (vec![light; room], vec![light; 1024]);
+    ///     let memory = VplMemory::new(&mut lights[..], &mut [][..], &mut [][..], &mut [][..]);
+    ///     let mut pass = VplPass::new_in(memory, &settings, 0, Independent, &[]);
+    ///     work::finish(&mut pass, &world, &mut VplOutput::new(&mut of_job[..], &mut [][..]));
+    ///     pass.finish().map(|lights| lights.len())
+    /// };
+    /// let all = count(4096)?;
+    /// assert_eq!((count(all), count(all - 1)), (Ok(all), Err(VplPassError::TooMany)));
+    /// # Ok::<(), Box<dyn core::error::Error>>(())
+    /// ```
     #[must_use]
     pub fn new_in(
         mut memory: VplMemory<'s>,

@@ -119,7 +119,7 @@ impl Settings {
     /// points, which compensation asks for: about cubes, half as long as the bound's radius.
     ///
     /// ```
-    /// # use fogbow::{host::Empty, math::{Bounds, Vec3}, medium::{Homogeneous, Pyramid}, phase::Phase};
+    /// # use fogbow::{host::{Empty, Medium}, math::{Bounds, Vec3}, medium::{Homogeneous, Pyramid}, phase::Phase};
     /// # use fogbow::{spectrum::Spectrum, vpl::Settings, world::{Outline, World}};
     /// let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::ONE, Phase::ISOTROPIC)?;
     /// let world = World { medium: &fog, scene: &Empty, lights: &[] };
@@ -127,6 +127,8 @@ impl Settings {
     /// let (bounds, size) = Settings::for_outline(&outline).pyramid();
     /// let mut cells = vec![Spectrum::ZERO; Pyramid::<()>::cell_count(size)];
     /// let averaged = Pyramid::new(&fog, bounds, size, &mut cells)?;
+    /// // The mean of what is the same everywhere.
+    /// assert!((averaged.mean_extinction(Vec3::ZERO, 0.5)[0] - 1.0).abs() < 1e-5);
     /// let world = World { medium: &averaged, scene: &Empty, lights: &[] };
     /// # let _ = world;
     /// # Ok::<(), fogbow::medium::MediumError>(())

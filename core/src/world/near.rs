@@ -92,6 +92,18 @@ impl Joint<'_> {
     /// The point of the light it is joined to, what that sends, and the density (sr⁻¹) of its direction as
     /// [`Light::anchor_pdf`] has it. `on_light` is asked where the point of the light has yet to be drawn. `None` where
     /// nothing arrives.
+    ///
+    /// ```
+    /// # use fogbow::{light::{Light, PointLight}, math::{Ray, Vec2, Vec3}, spectrum::Spectrum, world::NearLight};
+    /// let lamp = Light::Point(PointLight::new(Vec3::Y, Spectrum::ONE)?);
+    /// let ray = Ray::new(Vec3::NEG_X, Vec3::X);
+    /// let joint = NearLight::of(&lamp, &ray, 0.0, 2.0).unwrap().join(&ray, 0.3, Vec2::ZERO).unwrap();
+    /// // A lamp that is a point is joined to where it is, with the light that falls off like 1/r².
+    /// let light = joint.light(|| unreachable!()).unwrap().incident;
+    /// let r = joint.point.distance(Vec3::Y);
+    /// assert!((light.distance - r).abs() < 1e-6 && (light.irradiance[0] - 1.0 / (r * r)).abs() < 1e-6);
+    /// # Ok::<(), fogbow::light::LightError>(())
+    /// ```
     #[inline]
     #[must_use]
     pub fn light(&self, on_light: impl FnOnce() -> Vec2) -> Option<LightSample> {
