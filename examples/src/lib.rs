@@ -9,6 +9,7 @@
 //! | [`plume`] | an animation of smoke |
 //! | [`figures`] | figures of papers, rebuilt |
 //! | [`derivatives`] | second derivatives of the fluence by differences |
+//! | [`statistics`] | what a run took, phase by phase |
 //! | [`compare`] | how far two images are apart |
 //! | [`cli`] | the command line |
 
@@ -24,6 +25,7 @@ pub mod mesh;
 pub mod picture;
 pub mod plume;
 pub mod scene_file;
+pub mod statistics;
 pub mod transform;
 pub mod volume;
 pub mod world;

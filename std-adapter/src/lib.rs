@@ -12,8 +12,7 @@
 //! | [`radiance_cache`] | files of radiance caches |
 //! | [`threads`] | the one driver: runs any work in rounds on threads |
 //! | [`image`] | PNG, PFM and (feature `exr`, on by default) OpenEXR files |
-//! | [`image_sampling`] | pixels that are not computed, filled in on threads |
-//! | [`stats`] | seconds per phase, queries of the world |
+//! | [`stats`] | the clock, queries of the world |
 //!
 //! A glowing fog in front of a black wall, 2 m away at the left and 6 m at the right:
 //!
@@ -44,7 +43,6 @@ pub mod covariance;
 pub mod files;
 pub mod film;
 pub mod image;
-pub mod image_sampling;
 pub mod progress;
 pub mod progressive;
 pub mod radiance_cache;

@@ -1,10 +1,10 @@
 //! How far a render is, and how to stop it.
 
 use core::fmt;
-use core::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use core::sync::atomic::{AtomicBool, Ordering};
 use core::time::Duration;
-use std::sync::Mutex;
-use std::time::Instant;
+
+use crate::stats::Stopwatch;
 
 /// How far a render is.
 ///
@@ -66,8 +66,7 @@ impl Progress {
 pub struct Control<'a> {
     /// Set by the host (from another thread, a signal handler, the progress function) to stop soon.
     pub cancel: Option<&'a AtomicBool>,
-    /// Called about twenty times a second from whichever thread finishes a tile, never twice at
-    /// once, and once at the end.
+    /// Called at most twenty times a second, by the thread that renders, and once at the end.
     pub progress: Option<&'a (dyn Fn(&Progress) + Sync)>,
 }
 
@@ -89,12 +88,12 @@ impl fmt::Debug for Control<'_> {
 #[derive(Debug)]
 pub(crate) struct Reporter<'a> {
     control: &'a Control<'a>,
-    done: AtomicU64,
+    done: u64,
     total: u64,
     before: u64,
     budget: Option<Duration>,
-    start: Instant,
-    last: Mutex<Instant>,
+    clock: Stopwatch,
+    last: Duration,
 }
 
 impl<'a> Reporter<'a> {
@@ -102,41 +101,26 @@ impl<'a> Reporter<'a> {
     const INTERVAL: Duration = Duration::from_millis(50);
 
     pub(crate) fn new(control: &'a Control<'a>, before: u64, total: u64, budget: Option<Duration>) -> Self {
-        let start = Instant::now();
-        Self { control, done: AtomicU64::new(before), total, before, budget, start, last: Mutex::new(start) }
+        Self { control, done: before, total, before, budget, clock: Stopwatch::start(), last: Duration::ZERO }
     }
 
     pub(crate) fn elapsed(&self) -> Duration {
-        self.start.elapsed()
+        self.clock.wall()
     }
 
     /// Adds finished samples.
-    pub(crate) fn add(&self, samples: u64) {
-        self.done.fetch_add(samples, Ordering::Relaxed);
+    pub(crate) fn add(&mut self, samples: u64) {
+        self.done += samples;
+        if self.elapsed() - self.last >= Self::INTERVAL {
+            self.tell();
+            self.last = self.elapsed();
+        }
+    }
+
+    /// Says how far the render is; the last word, too.
+    pub(crate) fn tell(&self) {
         let Some(progress) = self.control.progress else { return };
-        // Whoever does not get the lock leaves the word to the thread that has it.
-        if let Ok(mut last) = self.last.try_lock()
-            && last.elapsed() >= Self::INTERVAL
-        {
-            progress(&self.state());
-            *last = Instant::now();
-        }
-    }
-
-    /// The last word.
-    pub(crate) fn finish(&self) {
-        if let Some(progress) = self.control.progress {
-            progress(&self.state());
-        }
-    }
-
-    fn state(&self) -> Progress {
-        Progress {
-            done: self.done.load(Ordering::Relaxed),
-            total: self.total,
-            before: self.before,
-            elapsed: self.elapsed(),
-            budget: self.budget,
-        }
+        let Self { done, total, before, budget, .. } = *self;
+        progress(&Progress { done, total, before, elapsed: self.elapsed(), budget });
     }
 }

@@ -1,213 +1,10 @@
-//! What a render took: seconds per phase, queries of the host's world, bytes.
+//! What a render took: the one clock, and the core's counters of queries of the host's world.
 
-use core::cell::Cell;
-use core::ops::{Add, AddAssign};
+use core::ops::Add;
+use core::time::Duration;
 use std::time::Instant;
 
-use fogbow::glam::Vec3;
-use fogbow::host::{Face, Gradients, Hit, MajorantSegment, Medium, Properties, Scene};
-use fogbow::math::{Ray, Symmetric3};
-use fogbow::spectrum::{Gradient, Hessian, Spectrum};
-
-/// How often the world was asked.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Counters {
-    /// Samples in the film.
-    pub samples: u64,
-    /// Closest-hit queries.
-    pub rays: u64,
-    /// Visibility queries.
-    pub shadow_rays: u64,
-    /// Collisions of paths with a medium, as the integrand reports them: see [`Tally::collide`].
-    pub collisions: u64,
-    /// Queries of a medium at a point: properties, extinction, derivatives.
-    pub lookups: u64,
-    /// Queries of a medium's bounds along a ray.
-    pub segments: u64,
-    /// Questions asked of caches: see [`Tally::look_up`].
-    pub cache_lookups: u64,
-    /// Of these, questions no record answered.
-    pub cache_misses: u64,
-    /// Samples that were no finite numbers and were taken for black: 0 unless something is wrong.
-    pub non_finite: u64,
-}
-
-impl Add for Counters {
-    type Output = Self;
-    fn add(self, o: Self) -> Self {
-        Self {
-            samples: self.samples + o.samples,
-            rays: self.rays + o.rays,
-            shadow_rays: self.shadow_rays + o.shadow_rays,
-            collisions: self.collisions + o.collisions,
-            lookups: self.lookups + o.lookups,
-            segments: self.segments + o.segments,
-            cache_lookups: self.cache_lookups + o.cache_lookups,
-            cache_misses: self.cache_misses + o.cache_misses,
-            non_finite: self.non_finite + o.non_finite,
-        }
-    }
-}
-
-impl AddAssign for Counters {
-    fn add_assign(&mut self, other: Self) {
-        *self = *self + other;
-    }
-}
-
-/// Counters that many wrappers of one thread may raise.
-#[derive(Debug, Default)]
-pub struct Tally {
-    rays: Cell<u64>,
-    shadow_rays: Cell<u64>,
-    collisions: Cell<u64>,
-    lookups: Cell<u64>,
-    segments: Cell<u64>,
-    cache_lookups: Cell<u64>,
-    cache_misses: Cell<u64>,
-}
-
-impl Tally {
-    /// Adds collisions: what only the integrand knows.
-    #[inline]
-    pub fn collide(&self, collisions: u32) {
-        self.collisions.set(self.collisions.get() + u64::from(collisions));
-    }
-
-    /// Adds questions asked of caches, and those of them that no record answered.
-    #[inline]
-    pub fn look_up(&self, lookups: u32, misses: u32) {
-        self.cache_lookups.set(self.cache_lookups.get() + u64::from(lookups));
-        self.cache_misses.set(self.cache_misses.get() + u64::from(misses));
-    }
-
-    /// What was counted so far.
-    #[must_use]
-    pub fn counters(&self) -> Counters {
-        Counters {
-            rays: self.rays.get(),
-            shadow_rays: self.shadow_rays.get(),
-            collisions: self.collisions.get(),
-            lookups: self.lookups.get(),
-            segments: self.segments.get(),
-            cache_lookups: self.cache_lookups.get(),
-            cache_misses: self.cache_misses.get(),
-            ..Counters::default()
-        }
-    }
-}
-
-#[inline]
-fn raise(counter: &Cell<u64>) {
-    counter.set(counter.get() + 1);
-}
-
-/// A scene that counts what it is asked; two references, to be made where it is needed.
-///
-/// ```
-/// use fogbow::{glam::Vec3, host::{Empty, Scene}, math::Ray};
-/// use fogbow_std::stats::{CountingScene, Tally};
-/// let tally = Tally::default();
-/// let scene = CountingScene { scene: &Empty, tally: &tally };
-/// assert!(scene.closest_hit(&Ray::new(Vec3::ZERO, Vec3::X)).is_none());
-/// assert_eq!(tally.counters().rays, 1);
-/// ```
-#[derive(Debug, Clone, Copy)]
-pub struct CountingScene<'t, S> {
-    /// The scene that answers.
-    pub scene: S,
-    /// Where the queries are counted.
-    pub tally: &'t Tally,
-}
-
-impl<S: Scene> Scene for CountingScene<'_, S> {
-    #[inline]
-    fn closest_hit(&self, ray: &Ray) -> Option<Hit> {
-        raise(&self.tally.rays);
-        self.scene.closest_hit(ray)
-    }
-    #[inline]
-    fn is_blocked(&self, ray: &Ray) -> bool {
-        raise(&self.tally.shadow_rays);
-        self.scene.is_blocked(ray)
-    }
-    fn curvature(&self, ray: &Ray, hit: &Hit) -> Symmetric3 {
-        self.scene.curvature(ray, hit)
-    }
-}
-
-/// A medium that counts what it is asked.
-///
-/// ```
-/// use fogbow::{glam::Vec3, host::{Empty, Medium}};
-/// use fogbow_std::stats::{CountingMedium, Tally};
-/// let tally = Tally::default();
-/// let medium = CountingMedium { medium: &Empty, tally: &tally };
-/// medium.extinction(Vec3::ZERO);
-/// assert_eq!(tally.counters().lookups, 1);
-/// ```
-#[derive(Debug, Clone, Copy)]
-pub struct CountingMedium<'t, M> {
-    /// The medium that answers.
-    pub medium: M,
-    /// Where the queries are counted.
-    pub tally: &'t Tally,
-}
-
-impl<M: Medium> Medium for CountingMedium<'_, M> {
-    #[inline]
-    fn properties(&self, point: Vec3) -> Properties {
-        raise(&self.tally.lookups);
-        self.medium.properties(point)
-    }
-    #[inline]
-    fn majorant_segment(&self, ray: &Ray, from: f32) -> MajorantSegment {
-        raise(&self.tally.segments);
-        self.medium.majorant_segment(ray, from)
-    }
-    #[inline]
-    fn marching_segment(&self, ray: &Ray, from: f32) -> MajorantSegment {
-        raise(&self.tally.segments);
-        self.medium.marching_segment(ray, from)
-    }
-    #[inline]
-    fn extinction(&self, point: Vec3) -> Spectrum {
-        raise(&self.tally.lookups);
-        self.medium.extinction(point)
-    }
-    #[inline]
-    fn extinction_with_gradient(&self, point: Vec3) -> (Spectrum, Gradient) {
-        raise(&self.tally.lookups);
-        self.medium.extinction_with_gradient(point)
-    }
-    #[inline]
-    fn resolution(&self) -> f32 {
-        self.medium.resolution()
-    }
-    fn gradients(&self, point: Vec3) -> Gradients {
-        raise(&self.tally.lookups);
-        self.medium.gradients(point)
-    }
-    fn extinction_hessian(&self, point: Vec3) -> Hessian {
-        raise(&self.tally.lookups);
-        self.medium.extinction_hessian(point)
-    }
-    fn mean_extinction(&self, centre: Vec3, radius: f32) -> Spectrum {
-        raise(&self.tally.lookups);
-        self.medium.mean_extinction(centre, radius)
-    }
-    fn faces(&self, ray: &Ray, visit: &mut dyn FnMut(Face)) {
-        self.medium.faces(ray, visit);
-    }
-    #[inline]
-    fn is_grey(&self) -> bool {
-        self.medium.is_grey()
-    }
-    #[inline]
-    fn is_emissive(&self) -> bool {
-        self.medium.is_emissive()
-    }
-}
+pub use fogbow::picture::{Counters, CountingMedium, CountingScene, Queries};
 
 /// A length of time.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -244,6 +41,11 @@ impl Stopwatch {
         Self { wall: Instant::now(), cpu: cpu_seconds() }
     }
 
+    /// Time since the start, on the wall alone.
+    pub(crate) fn wall(&self) -> Duration {
+        self.wall.elapsed()
+    }
+
     /// Time since the start.
     #[must_use]
     pub fn elapsed(&self) -> Seconds {
@@ -261,41 +63,4 @@ fn cpu_seconds() -> Option<f64> {
 #[cfg(not(any(unix, windows)))]
 fn cpu_seconds() -> Option<f64> {
     None
-}
-
-/// What a program did, phase by phase: plain fields, for the host to print as it likes.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct Statistics {
-    /// Phases with their times, in the order in which they first ended.
-    pub phases: Vec<(String, Seconds)>,
-    /// Queries of the world.
-    pub counters: Counters,
-    /// Bytes held by named things: film, grids, trees.
-    pub bytes: Vec<(String, u64)>,
-    /// Records of caches.
-    pub records: Vec<(String, u64)>,
-}
-
-impl Statistics {
-    /// Does `work` and adds its time to phase `name`.
-    ///
-    /// ```
-    /// let mut statistics = fogbow_std::stats::Statistics::default();
-    /// assert_eq!(statistics.time("read", || 42), 42);
-    /// assert_eq!(statistics.phases[0].0, "read");
-    /// ```
-    pub fn time<T>(&mut self, name: &str, work: impl FnOnce() -> T) -> T {
-        let clock = Stopwatch::start();
-        let result = work();
-        self.add(name, clock.elapsed());
-        result
-    }
-
-    /// Adds to the time of phase `name`.
-    pub fn add(&mut self, name: &str, seconds: Seconds) {
-        match self.phases.iter_mut().find(|(n, _)| n == name) {
-            Some((_, sum)) => *sum = *sum + seconds,
-            None => self.phases.push((name.to_owned(), seconds)),
-        }
-    }
 }

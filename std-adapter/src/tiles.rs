@@ -15,7 +15,7 @@ use fogbow::spectrum::Spectrum;
 use crate::film::Film;
 use crate::progress::{Control, Reporter};
 use crate::seed::{SampleRng, Sequence};
-use crate::stats::{Counters, Seconds, Stopwatch, Tally};
+use crate::stats::{Counters, Queries, Seconds, Stopwatch};
 use crate::threads::{Ending, Threads, ThreadsError, run};
 
 /// How to render.
@@ -49,7 +49,7 @@ impl Default for Settings {
 
 /// What the integrand is asked for: one sample of one pixel, with counters for [`crate::stats::CountingScene`] and
 /// [`crate::stats::CountingMedium`].
-pub type Sample<'t> = picture::Sample<'t, Tally>;
+pub type Sample<'t> = picture::Sample<'t, Queries>;
 
 /// Why a render ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -198,19 +198,11 @@ where
 struct Counted<F>(F);
 
 impl<F: Fn(&Sample<'_>, &mut SampleRng, &mut [Spectrum])> Integrand<SampleRng> for Counted<F> {
-    type Tally = Tally;
+    type Tally = Queries;
 
     #[inline]
     fn sample(&self, sample: &Sample<'_>, rng: &mut SampleRng, layers: &mut [Spectrum]) {
         (self.0)(sample, rng, layers);
-    }
-}
-
-impl picture::Tally for Tally {
-    type Total = Counters;
-
-    fn add_to(&self, total: &mut Counters) {
-        *total += self.counters();
     }
 }
 
@@ -260,7 +252,7 @@ impl<'a> Render<'a> {
     }
 
     fn outcome(mut self, reason: Reason) -> Outcome {
-        self.reporter.finish();
+        self.reporter.tell();
         let counters = self.tiles.as_ref().map_or_else(Counters::default, |tiles| {
             let picture::Counts { samples, non_finite } = tiles.counts();
             Counters { samples, non_finite, ..*tiles.total() }
@@ -283,7 +275,7 @@ impl<'a> Render<'a> {
         let Some(tiles) = &mut self.tiles else { return false };
         tiles.begin(until);
         let mut before = tiles.counts().samples;
-        let reporter = &self.reporter;
+        let reporter = &mut self.reporter;
         let ran = run(tiles, integrand, &self.threads, self.control, None, |tiles| {
             reporter.add(tiles.counts().samples - before);
             before = tiles.counts().samples;

@@ -7,9 +7,12 @@
 //! |---|---|
 //! | `tiles` | [`Tiles`]: passes over all pixels |
 //! | `noise` | [`Goal`]: how many samples are enough, by the noise they still have |
+//! | `counting` | [`Queries`]: how often the world is asked |
 
+mod counting;
 mod noise;
 mod tiles;
 
+pub use counting::{Counters, CountingMedium, CountingScene, Queries};
 pub use noise::Goal;
 pub use tiles::{Counts, Integrand, Sample, Settings, Tally, TileOutput, Tiles, accumulate};

@@ -13,11 +13,11 @@ use fogbow::path;
 use fogbow_std::covariance::{load, save};
 use fogbow_std::files::Problem;
 use fogbow_std::progress::Control;
-use fogbow_std::stats::Statistics;
 use fogbow_std::threads::{self, Ending, Threads};
 
 use super::{Failure, output};
 use crate::scene_file::fingerprint;
+use crate::statistics::Statistics;
 use crate::world::{WithMedium, World};
 
 /// Options of covariance grids.

@@ -1,22 +1,23 @@
 //! `--image-sampling covariance`: fewer pixels computed where light is smooth.
 
 use clap::{Args, ValueEnum};
-use fogbow::covariance::image_sampling::{self, LEAST_PLAN, Plan, Planning, USUAL_SHARE};
+use fogbow::covariance::image_sampling::{self, Computed, FillingIn, LEAST_PLAN, Plan, Planning, USUAL_SHARE};
 use fogbow::covariance::{GridView, filter_precision};
 use fogbow::host::Medium;
 use fogbow::light::Light;
 use fogbow::math::{Ray, Vec2};
 use fogbow::spectrum::Spectrum;
+use fogbow::storage::Full;
 use fogbow_std::film::{Film, Image};
-use fogbow_std::image_sampling::filled;
 use fogbow_std::progress::Control;
-use fogbow_std::stats::{Seconds, Statistics};
+use fogbow_std::stats::Seconds;
 use fogbow_std::threads::{self, Threads};
 use fogbow_std::tiles::Sample;
 
 use super::Failure;
 use super::render::CACHE_LAYERS;
 use crate::camera::Camera;
+use crate::statistics::Statistics;
 use crate::world::{WithMedium, World};
 
 /// Options of adaptive sampling.
@@ -136,6 +137,18 @@ pub(super) fn finished(film: &Film, plan: &Plan<'_>, has_layers: bool, threads: 
         out.add(index % film.width(), index / film.width(), &colours);
     }
     Ok(out)
+}
+
+/// The image that the computed pixels of `image` give; the others' values are not read.
+fn filled(plan: &Plan<'_>, image: &Image, threads: &Threads) -> Result<Image, Full> {
+    if plan.size() != [image.width, image.height] {
+        return Err(Full);
+    }
+    let mut pixels = vec![Spectrum::ZERO; image.pixels.len()];
+    let mut work = FillingIn::new(plan, &mut pixels[..])?;
+    let computed = Computed { plan, pixels: &image.pixels };
+    threads::run(&mut work, &computed, threads, &Control::default(), None, |_| {});
+    Ok(Image { width: image.width, height: image.height, pixels })
 }
 
 fn ellipse(plan: &Plan<'_>, index: usize) -> Spectrum {

@@ -8,13 +8,13 @@ use fogbow::covariance::{GridView, hessian_bound};
 use fogbow::host::Medium;
 use fogbow::math::{Bounds, Symmetric3, Vec3};
 use fogbow_std::progress::Control;
-use fogbow_std::stats::Statistics;
 
 use super::covariance::{CovarianceArguments, GridJob};
 use super::render::path_settings;
 use super::{Ending, Failure, output};
 use crate::derivatives::{Upper, difference, filtered};
 use crate::scene_file::SceneFile;
+use crate::statistics::Statistics;
 use crate::world::{Storage, WithMedium, World};
 
 /// Most points of one run.

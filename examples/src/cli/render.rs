@@ -20,7 +20,7 @@ use fogbow_std::film::Film;
 use fogbow_std::image::write_film;
 use fogbow_std::progress::{Control, Progress};
 use fogbow_std::seed::SampleRng;
-use fogbow_std::stats::{CountingMedium, CountingScene, Statistics};
+use fogbow_std::stats::{CountingMedium, CountingScene};
 use fogbow_std::threads::Threads;
 use fogbow_std::tiles::{self, Outcome, Reason, RenderError, Sample};
 
@@ -34,6 +34,7 @@ use super::vpl::{self, Audit, VplArguments, VplJob};
 use super::{Ending, Failure, ellipsoids, output};
 use crate::camera::Camera;
 use crate::scene_file::SceneFile;
+use crate::statistics::Statistics;
 use crate::world::{Storage, WithMedium, World};
 
 /// Renders a Mitsuba 3 scene.

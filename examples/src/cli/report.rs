@@ -4,12 +4,13 @@ use core::fmt::Write;
 use std::path::PathBuf;
 
 use fogbow_std::progress::Progress;
-use fogbow_std::stats::{Seconds, Statistics};
+use fogbow_std::stats::Seconds;
 use fogbow_std::tiles::{Outcome, Reason};
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::vpl::Audit;
 use super::{Method, RenderArguments};
+use crate::statistics::Statistics;
 
 /// Steps of the progress bar.
 const STEPS: u64 = 1000;

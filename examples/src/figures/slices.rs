@@ -7,13 +7,13 @@ use fogbow::math::Vec3;
 use fogbow::spectrum::Spectrum;
 use fogbow_std::film::Image;
 use fogbow_std::progress::Control;
-use fogbow_std::stats::Statistics;
 
 use super::{Plan, montage, percent, rendered};
 use crate::cli::covariance::GridJob;
 use crate::cli::render::path_settings;
 use crate::cli::{CovarianceArguments, Failure};
 use crate::scene_file::SceneFile;
+use crate::statistics::Statistics;
 use crate::world::{Storage, World};
 
 /// Cells along the longest side.
