@@ -52,17 +52,21 @@ impl<E: core::error::Error + 'static> core::error::Error for FileError<E> {
     }
 }
 
+impl<E> Problem<E> {
+    pub(crate) fn of(self, path: &Path) -> FileError<E> {
+        FileError { path: path.to_owned(), problem: self }
+    }
+}
+
 /// Reads a file and makes something of its bytes.
 pub(crate) fn load<T, E>(path: &Path, decode: impl FnOnce(&[u8]) -> Result<T, E>) -> Result<T, FileError<E>> {
     let bytes = read(path).map_err(Problem::Io).and_then(|bytes| bytes.ok_or(Problem::NoFile));
-    bytes
-        .and_then(|bytes| decode(&bytes).map_err(Problem::Content))
-        .map_err(|problem| FileError { path: path.to_owned(), problem })
+    bytes.and_then(|bytes| decode(&bytes).map_err(Problem::Content)).map_err(|problem| problem.of(path))
 }
 
 /// Writes a file; the one that was there is lost only when the new one is complete.
 pub(crate) fn save<E>(path: &Path, bytes: &[u8]) -> Result<(), FileError<E>> {
-    replace(path, bytes).map_err(|error| FileError { path: path.to_owned(), problem: Problem::Io(error) })
+    replace(path, bytes).map_err(|error| Problem::Io(error).of(path))
 }
 
 /// The bytes of a file; `None` if it is a directory or a device.

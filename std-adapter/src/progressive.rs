@@ -4,8 +4,8 @@
 //! the pass. The same bits for any number of threads.
 
 use core::fmt;
-use core::num::NonZero;
 
+use fogbow::picture::whole_passes;
 use fogbow::spectrum::Spectrum;
 use fogbow::work::Rounds;
 
@@ -114,9 +114,4 @@ where
     let prepare =
         |pass: u32, threads: &Threads| make(pass, &Runner { threads, control }).map_err(ProgressiveError::Method);
     render_prepared(film, settings, control, passes, prepare, integrand)
-}
-
-/// A multiple of the length, `u32::MAX` included; no samples stay none.
-fn whole_passes(samples: u32, length: NonZero<u32>) -> u32 {
-    samples.checked_next_multiple_of(length.get()).unwrap_or(u32::MAX / length * length.get())
 }

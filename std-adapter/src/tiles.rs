@@ -9,7 +9,7 @@ use core::num::NonZero;
 use core::time::Duration;
 
 pub use fogbow::picture::Goal;
-use fogbow::picture::{self, Integrand, Tiles};
+use fogbow::picture::{self, Integrand, Tiles, affordable};
 use fogbow::spectrum::Spectrum;
 
 use crate::film::Film;
@@ -24,7 +24,7 @@ pub struct Settings {
     /// Samples every pixel shall have in the end, those already in the film included; `u32::MAX`
     /// for as many as time allows.
     pub samples: u32,
-    /// Ends a tile sooner, once its new samples leave less noise than this. [`render_prepared`], whose noise is that of
+    /// Ends a tile sooner, once its new samples leave less noise than this. [`crate::progressive::render`], whose noise is that of
     /// passes and not of samples, takes no notice.
     pub goal: Option<Goal>,
     /// Time granted on the wall clock, if limited. Whole passes are done while they are expected
@@ -151,30 +151,9 @@ pub struct Passes {
     pub may_break: bool,
 }
 
-/// As [`render`], in `passes`, for methods whose samples share something that is
-/// made anew for each pass: `prepare` is told the number of the pass, and what it makes is lent to `integrand`.
-///
-/// `prepare` may use all threads of the pool it is called in. For bits that do not depend on their number, let what it
-/// makes depend on the number of the pass alone. Time ends a render between passes, unless these may break; the last is
-/// cut short where [`Settings::samples`] says so.
-///
-/// # Errors
-/// As [`render`], and what `prepare` fails with; the film then holds the passes up to there.
-///
-/// ```
-/// use core::num::NonZero;
-/// use fogbow::spectrum::Spectrum;
-/// use fogbow_std::{film::Film, progress::Control, tiles::{Passes, RenderError, Settings, render_prepared}};
-/// let mut film = Film::new(2, 2, &["total"]).unwrap();
-/// let settings = Settings { samples: 6, ..Settings::default() };
-/// let passes = Passes { length: NonZero::new(2).unwrap(), may_break: false };
-/// render_prepared(&mut film, &settings, &Control::default(), passes,
-///     |pass, _| Ok::<f32, RenderError>(pass as f32),
-///     |prepared, _, _, layers| layers[0] = Spectrum::splat(*prepared),
-/// ).unwrap();
-/// assert_eq!(film.mean(0).unwrap().pixels[3], Spectrum::ONE);
-/// ```
-pub fn render_prepared<T, E, P, F>(
+/// As [`render`], in `passes`: `prepare` is told the number of the pass, and what it makes is lent to `integrand`. Time ends
+/// a render between passes, unless these may break; [`Settings::samples`] are whole passes.
+pub(crate) fn render_prepared<T, E, P, F>(
     film: &mut Film,
     settings: &Settings,
     control: &Control<'_>,
@@ -251,16 +230,13 @@ impl<'a> Render<'a> {
         Ok(Self { film, settings, control, threads, tiles, clock, reporter })
     }
 
-    fn outcome(mut self, reason: Reason) -> Outcome {
+    fn outcome(self, reason: Reason) -> Outcome {
         self.reporter.tell();
         let counters = self.tiles.as_ref().map_or_else(Counters::default, |tiles| {
             let picture::Counts { samples, non_finite } = tiles.counts();
             Counters { samples, non_finite, ..*tiles.total() }
         });
-        if let Some(tiles) = self.tiles.take() {
-            self.film.restore(tiles.into_sums());
-        }
-        Outcome { samples: self.film.min_count(), reason, counters, seconds: self.clock.elapsed() }
+        Outcome { samples: self.done(), reason, counters, seconds: self.clock.elapsed() }
     }
 
     fn done(&self) -> u32 {
@@ -300,7 +276,7 @@ impl<'a> Render<'a> {
             }
             let Some(tiles) = self.tiles.as_ref().filter(|tiles| !tiles.is_done()) else { return Reason::Done };
             let now = self.reporter.elapsed();
-            let Some(most) = affordable(self.settings, now, now - before, until - done) else {
+            let Some(most) = affordable(self.settings.time, now, now - before, until - done) else {
                 return Reason::TimeUp;
             };
             done = until;
@@ -349,7 +325,7 @@ impl<'a> Render<'a> {
                     }
                     break;
                 }
-                let (Some(affordable), true) = (affordable(settings, now, now - start, until - from), until < end)
+                let (Some(affordable), true) = (affordable(settings.time, now, now - start, until - from), until < end)
                 else {
                     return Ok(Reason::TimeUp);
                 };
@@ -357,16 +333,4 @@ impl<'a> Render<'a> {
             }
         }
     }
-}
-
-/// How many samples the time left allows, after `samples` took `taken`; `None` if it is up.
-fn affordable(settings: &Settings, now: Duration, taken: Duration, samples: u32) -> Option<u32> {
-    let Some(budget) = settings.time else { return Some(u32::MAX) };
-    let per_sample = taken.as_secs_f64() / f64::from(samples);
-    let affordable = (budget.saturating_sub(now).as_secs_f64() / per_sample).min(1e6);
-    if now >= budget || affordable < 1.0 {
-        return None;
-    }
-    // Passes vary in speed: most of what is left now, the rest by a better estimate.
-    Some(((0.75 * affordable) as u32).max(1))
 }

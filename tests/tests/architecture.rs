@@ -342,6 +342,80 @@ fn the_core_depends_on_five_crates() {
 }
 
 // ---------------------------------------------------------------------------------------------
+// Threads, locks and clocks
+
+/// Words that none but the adapter's driver may use.
+const DRIVER_WORDS: [&str; 10] =
+    ["Mutex", "RwLock", "Condvar", "Once", "OnceLock", "Barrier", "rayon", "thread", "Instant", "SystemTime"];
+
+/// What other files of the adapter may use of these, or of atomics, and why.
+const EXCEPTIONS: [(&str, &str, &str); 2] = [
+    ("stats.rs", "Instant", "the stopwatch, which all others ask for the time"),
+    ("progress.rs", "AtomicBool", "the flag by which a host cancels"),
+];
+
+/// The most lines of the adapter.
+const ADAPTER_LINES: usize = 1800;
+
+/// Lines with words that only the driver may use, but for `allowed` ones.
+fn driver_words(name: &str, source: &str, allowed: &[&str]) -> Vec<String> {
+    let is_forbidden = |word: &str| DRIVER_WORDS.contains(&word) || word.starts_with("Atomic");
+    let found = tokens(source).into_iter().filter_map(|token| Some((token.word()?.to_owned(), token.line)));
+    found
+        .filter(|(word, _)| is_forbidden(word) && !allowed.contains(&word.as_str()))
+        .map(|(word, line)| format!("{name}:{line}: `{word}`"))
+        .collect()
+}
+
+/// `(path, text)` of every Rust file in a folder of the repository.
+fn rust_files(folder: &str) -> Vec<(String, String)> {
+    let (mut files, mut folders) = (Vec::new(), vec![repository().join(folder)]);
+    while let Some(folder) = folders.pop() {
+        for entry in fs::read_dir(&folder).expect("sources can be listed") {
+            let path = entry.expect("sources can be listed").path();
+            if path.is_dir() {
+                folders.push(path);
+            } else if path.extension().is_some_and(|kind| kind == "rs") {
+                files.push((path.to_string_lossy().replace('\\', "/"), read(&path)));
+            }
+        }
+    }
+    files
+}
+
+#[test]
+fn only_the_driver_knows_threads_locks_and_clocks() {
+    let mut complaints = Vec::new();
+    for (name, source) in rust_files("core/src") {
+        complaints.extend(driver_words(&name, &source, &[]));
+    }
+    for (name, source) in rust_files("std-adapter/src").iter().filter(|(name, _)| !name.ends_with("/threads.rs")) {
+        let file = name.rsplit('/').next().unwrap_or_default();
+        let allowed: Vec<&str> = EXCEPTIONS.iter().filter(|(f, ..)| *f == file).map(|(_, word, _)| *word).collect();
+        complaints.extend(driver_words(name, source, &allowed));
+    }
+    assert!(complaints.is_empty(), "\n{}", complaints.join("\n"));
+}
+
+#[test]
+fn the_adapter_is_thin_and_names_rayon_in_one_file() {
+    let files = rust_files("std-adapter/src");
+    let lines: usize = files.iter().map(|(_, source)| source.lines().count()).sum();
+    assert!(lines > 500 && lines <= ADAPTER_LINES, "std-adapter/src has {lines} lines, at most {ADAPTER_LINES}");
+    let with_rayon = files.iter().filter(|(_, source)| tokens(source).iter().any(|t| t.word() == Some("rayon")));
+    assert_eq!(with_rayon.count(), 1);
+}
+
+#[test]
+fn words_of_the_driver_are_found_in_code_alone() {
+    let each = DRIVER_WORDS.iter().map(|word| format!("use x::{word};\n")).collect::<String>();
+    assert_eq!(driver_words("x.rs", &each, &[]).len(), DRIVER_WORDS.len());
+    assert_eq!(driver_words("x.rs", "\nuse std::sync::Mutex;", &[]), ["x.rs:2: `Mutex`"]);
+    assert_eq!(driver_words("x.rs", "fn f(a: &AtomicU64, b: AtomicBool) {}", &["AtomicBool"]), ["x.rs:1: `AtomicU64`"]);
+    assert!(driver_words("x.rs", "// a Mutex\nconst A: &str = \"rayon\"; fn threads() {}", &[]).is_empty());
+}
+
+// ---------------------------------------------------------------------------------------------
 // The repository
 
 /// Every file git tracks; without git (a downloaded archive), every file outside `target`.

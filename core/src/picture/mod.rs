@@ -7,12 +7,15 @@
 //! |---|---|
 //! | `tiles` | [`Tiles`]: passes over all pixels |
 //! | `noise` | [`Goal`]: how many samples are enough, by the noise they still have |
+//! | `budget` | [`affordable`]: samples that the time left allows |
 //! | `counting` | [`Queries`]: how often the world is asked |
 
+mod budget;
 mod counting;
 mod noise;
 mod tiles;
 
+pub use budget::{affordable, whole_passes};
 pub use counting::{Counters, CountingMedium, CountingScene, Queries};
 pub use noise::Goal;
 pub use tiles::{Counts, Integrand, Sample, Settings, Tally, TileOutput, Tiles, accumulate};

@@ -6,9 +6,9 @@ pub mod pfm;
 pub mod png;
 
 use core::fmt;
-use std::io;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
+use crate::files::{FileError, Problem};
 use crate::film::{Film, Image, SizeError};
 
 /// A picture with a name.
@@ -21,20 +21,12 @@ pub struct Layer<'a> {
 }
 
 /// What is wrong with a picture file.
-#[derive(Debug)]
-pub struct ImageError {
-    /// The file.
-    pub path: PathBuf,
-    /// What is wrong.
-    pub kind: ErrorKind,
-}
+pub type ImageError = FileError<ErrorKind>;
 
 /// What is wrong with a picture or its bytes.
 #[derive(Debug)]
 #[non_exhaustive]
 pub enum ErrorKind {
-    /// The system cannot read or write the file.
-    Io(io::Error),
     /// The extension is none of these known ones.
     Extension(&'static [&'static str]),
     /// No layers to write, layers of different sizes, or fewer pixels than the size says.
@@ -45,16 +37,9 @@ pub enum ErrorKind {
     Format(String),
 }
 
-impl fmt::Display for ImageError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}: {}", self.path.display(), self.kind)
-    }
-}
-
 impl fmt::Display for ErrorKind {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Io(error) => error.fmt(f),
             Self::Extension(known) => write!(f, "the extension is none of {}", known.join(", ")),
             Self::Layers => f.write_str("no layers, or layers that differ in size"),
             Self::Size(error) => error.fmt(f),
@@ -63,14 +48,7 @@ impl fmt::Display for ErrorKind {
     }
 }
 
-impl core::error::Error for ImageError {
-    fn source(&self) -> Option<&(dyn core::error::Error + 'static)> {
-        match &self.kind {
-            ErrorKind::Io(error) => Some(error),
-            _ => None,
-        }
-    }
-}
+impl core::error::Error for ErrorKind {}
 
 impl From<SizeError> for ErrorKind {
     fn from(error: SizeError) -> Self {
@@ -127,8 +105,9 @@ pub fn is_writable(path: impl AsRef<Path>) -> bool {
 pub fn write(path: impl AsRef<Path>, layers: &[Layer<'_>], exposure: f32) -> Result<(), ImageError> {
     let path = path.as_ref();
     encode(&extension(path), layers, exposure)
-        .and_then(|bytes| std::fs::write(path, bytes).map_err(ErrorKind::Io))
-        .map_err(|kind| ImageError { path: path.to_owned(), kind })
+        .map_err(Problem::Content)
+        .and_then(|bytes| std::fs::write(path, bytes).map_err(Problem::Io))
+        .map_err(|problem| problem.of(path))
 }
 
 /// Writes the means of a film's layers, as [`write`](fn@write).
@@ -170,10 +149,10 @@ pub fn read(path: impl AsRef<Path>) -> Result<Image, ImageError> {
         "pfm" => pfm::decode,
         #[cfg(feature = "exr")]
         "exr" => exr::decode,
-        _ => return Err(ImageError { path: path.to_owned(), kind: ErrorKind::Extension(READABLE) }),
+        _ => return Err(Problem::Content(ErrorKind::Extension(READABLE)).of(path)),
     };
     std::fs::read(path)
-        .map_err(ErrorKind::Io)
-        .and_then(|bytes| decode(&bytes))
-        .map_err(|kind| ImageError { path: path.to_owned(), kind })
+        .map_err(Problem::Io)
+        .and_then(|bytes| decode(&bytes).map_err(Problem::Content))
+        .map_err(|problem| problem.of(path))
 }
