@@ -60,4 +60,4 @@ pub use metrics::{
 pub use occluders::{NEAREST, OccluderCell, Occluders};
 pub use photon::FrequencyPhotons;
 pub use radii::Radii;
-pub use steps::{AdaptiveSteps, Rule};
+pub use steps::{AdaptiveSteps, EVEN_STEP, LEAST_STEP, LONGEST_STEP, Rule, STEP_COUNT};

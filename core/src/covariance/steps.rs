@@ -4,6 +4,19 @@ use super::grid::GridView;
 use super::lattice::{CellCrossing, Cells};
 use crate::math::{Ray, Vec3, float};
 
+/// Longest step over the diagonal of the world, where steps follow the light. Longer: dark stretches cost less, and what no photon
+/// met is missed; shorter: nothing is left to save.
+pub const LONGEST_STEP: f32 = 1.0 / 8.0;
+
+/// Step over the diagonal of the world, where all are of one length. Longer: more noise from light that varies; shorter: time.
+pub const EVEN_STEP: f32 = 1.0 / 32.0;
+
+/// Shortest step over the least side of a cell. Shorter: time, for noise of covariances; longer: sharp borders of shafts are noisy.
+pub const LEAST_STEP: f32 = 0.05;
+
+/// [`Rule::Error::count`] if nothing else is asked for. More: less noise, and time in proportion; fewer: the other way round.
+pub const STEP_COUNT: f32 = 16.0;
+
 /// By what rule steps are as long as they are.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Rule {

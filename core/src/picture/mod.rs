@@ -17,5 +17,5 @@ mod tiles;
 
 pub use budget::{affordable, whole_passes};
 pub use counting::{Counters, CountingMedium, CountingScene, Queries};
-pub use noise::Goal;
+pub use noise::{Goal, LEAST_SAMPLES, MOST_SAMPLES};
 pub use tiles::{Counts, Integrand, Sample, Settings, Tally, TileOutput, Tiles, accumulate};

@@ -8,6 +8,12 @@ use crate::storage::List;
 /// corners need not be known to their own precision.
 const FLOOR: f64 = 0.1;
 
+/// [`Goal::least`] if nothing else is asked for. Fewer: noise is told too badly, and tiles stop early; more: smooth tiles cost more.
+pub const LEAST_SAMPLES: u32 = 8;
+
+/// The most samples per pixel for a given noise. More: a light seen through a keyhole takes forever; fewer: it stays noisy.
+pub const MOST_SAMPLES: u32 = 65536;
+
 /// When a tile has enough samples before it has [`Settings::samples`](super::Settings::samples).
 ///
 /// ```text

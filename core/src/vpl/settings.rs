@@ -24,7 +24,7 @@ const MOST_CANDIDATES: u32 = 1 << 17;
 
 /// Samples of every pixel in a pass, among which its lights are dealt out. More: smoother surfaces and fewer lights for each sample, whose
 /// other costs stay; fewer: the other way round.
-const SAMPLES: u32 = 64;
+pub const SAMPLES: u32 = 64;
 
 /// Points on a segment of an eye ray that each light is gathered at. More cost as much as more lights, which serve better.
 const POINTS: u32 = 1;

@@ -5,7 +5,9 @@ use std::path::{Path, PathBuf};
 use clap::{Args, ValueEnum};
 use fogbow::bytes::Crc;
 use fogbow::covariance::bytes::GridBytesError;
-use fogbow::covariance::{AdaptiveSteps, CovarianceGrid, Fill, GridView, Rule, Settings};
+use fogbow::covariance::{
+    AdaptiveSteps, CovarianceGrid, EVEN_STEP, Fill, GridView, LEAST_STEP, LONGEST_STEP, Rule, STEP_COUNT, Settings,
+};
 use fogbow::host::Medium;
 use fogbow::light::Light;
 use fogbow::math::Ray;
@@ -50,7 +52,7 @@ pub struct MarchArguments {
     #[arg(long, value_name = "LENGTH", value_parser = output::positive)]
     pub step_length: Option<f64>,
     /// How fine `--step covariance` is: about the number of steps where light fills a ray.
-    #[arg(long, value_name = "N", value_parser = steps, default_value_t = 16.0)]
+    #[arg(long, value_name = "N", value_parser = steps, default_value_t = STEP_COUNT)]
     pub step_count: f32,
     /// Shortest step with covariances [default: a twentieth of the grid's cell].
     #[arg(long, value_name = "LENGTH", value_parser = output::positive)]
@@ -173,8 +175,9 @@ impl MarchArguments {
     pub(super) fn stride<'a>(&self, size: f32, grid: Option<&'a GridView<'a>>) -> Stride<'a> {
         let given = |length: Option<f64>| length.map(|l| l as f32);
         let grid = grid.filter(|_| self.step != Step::Uniform);
-        let longest = given(self.step_length).unwrap_or(if grid.is_some() { size / 8.0 } else { size / 32.0 });
-        let least = grid.map_or(longest, |grid| 0.05 * grid.lattice().cell().min_element());
+        let longest =
+            given(self.step_length).unwrap_or(if grid.is_some() { LONGEST_STEP * size } else { EVEN_STEP * size });
+        let least = grid.map_or(longest, |grid| LEAST_STEP * grid.lattice().cell().min_element());
         let least = given(self.step_least).unwrap_or(least).min(longest);
         let rule = match self.step {
             Step::Uniform => None,

@@ -5,13 +5,14 @@ use core::time::Duration;
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
-use fogbow::cache::{Kind, RadianceCaches};
+use fogbow::cache::{self, Kind, RadianceCaches};
 use fogbow::covariance::image_sampling::Plan;
 use fogbow::covariance::{CovarianceGrid, GridView};
 use fogbow::host::Medium;
 use fogbow::light::Light;
 use fogbow::math::{Ray, Vec2};
 use fogbow::path::{self, InScattered, Radiance};
+use fogbow::picture;
 use fogbow::sampling::{Generator, uniform2};
 use fogbow::spectrum::Spectrum;
 use fogbow::vpl::VirtualLight;
@@ -146,22 +147,6 @@ const VPL_LAYERS: [&str; 12] = {
     layers
 };
 
-/// Samples per pixel of virtual lights: one pass.
-const VPL_SAMPLES: u32 = 64;
-
-/// Noise of radiance caching, where neither samples nor time are given: that of its records is of this size. What is left
-/// for samples to even out are edges and direct light.
-const CACHE_NOISE: f64 = 0.02;
-
-/// The most samples per pixel for that: where noise falls no faster, an edge runs between black and a lamp.
-const CACHE_SAMPLES: u32 = 256;
-
-/// Samples that tell how much noise there is.
-const LEAST_SAMPLES: u32 = 8;
-
-/// The most samples per pixel for a given noise: a light seen through a keyhole must not take forever.
-const MOST_SAMPLES: u32 = 65536;
-
 /// Set by Ctrl-C.
 static STOP: AtomicBool = AtomicBool::new(false);
 
@@ -249,7 +234,7 @@ pub(crate) fn render(arguments: &RenderArguments) -> Result<Rendered, Failure> {
     let (samples, noise) = arguments.samples(scene.sensor.samples);
     let settings = tiles::Settings {
         samples,
-        goal: noise.map(|noise| tiles::Goal { noise: noise as f32, least: LEAST_SAMPLES }),
+        goal: noise.map(|noise| tiles::Goal { noise: noise as f32, least: picture::LEAST_SAMPLES }),
         time: arguments.time.map(Duration::try_from_secs_f64).transpose()?,
         threads: arguments.threads,
         seed: arguments.seed,
@@ -356,13 +341,13 @@ impl RenderArguments {
     /// Samples of a pixel at most, given what the scene names, and the noise at which fewer are enough.
     fn samples(&self, named: u32) -> (u32, Option<f64>) {
         let is_free = self.spp.is_none() && self.time.is_none();
-        let usual = (is_free && self.method == Method::RadianceCache).then_some(CACHE_NOISE);
+        let usual = (is_free && self.method == Method::RadianceCache).then_some(f64::from(cache::USUAL_NOISE));
         let samples = match (self.spp, self.time, self.method) {
             (Some(spp), ..) => spp,
             (None, Some(_), _) => u32::MAX,
-            (None, None, _) if self.noise.is_some() => MOST_SAMPLES,
-            (None, None, Method::RadianceCache) => CACHE_SAMPLES,
-            (None, None, Method::Vpl) => self.beams.pass_samples.map_or(VPL_SAMPLES, core::num::NonZero::get),
+            (None, None, _) if self.noise.is_some() => picture::MOST_SAMPLES,
+            (None, None, Method::RadianceCache) => cache::MOST_SAMPLES,
+            (None, None, Method::Vpl) => self.beams.pass_samples.map_or(fogbow::vpl::SAMPLES, core::num::NonZero::get),
             (None, None, _) => named,
         };
         (samples, self.noise.or(usual))
