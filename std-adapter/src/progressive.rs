@@ -13,7 +13,7 @@ use crate::film::Film;
 use crate::progress::Control;
 use crate::seed::SampleRng;
 use crate::threads::{Threads, run};
-use crate::tiles::{Outcome, Passes, RenderError, Sample, Settings, render_prepared};
+use crate::tiles::{Outcome, Passes, Render, RenderError, Sample, Settings};
 
 /// Why rendering ended without a result: the method, or [`crate::tiles::render`].
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -110,8 +110,10 @@ where
     P: FnMut(u32, &Runner<'_>) -> Result<T, E>,
     F: Fn(&T, &Sample<'_>, &mut SampleRng, &mut [Spectrum]) + Sync,
 {
-    let settings = &Settings { samples: whole_passes(settings.samples, passes.length), ..*settings };
-    let prepare =
-        |pass: u32, threads: &Threads| make(pass, &Runner { threads, control }).map_err(ProgressiveError::Method);
-    render_prepared(film, settings, control, passes, prepare, integrand)
+    let samples = whole_passes(settings.samples, passes.length);
+    let settings = &Settings { samples, goal: None, ..*settings };
+    let mut render = Render::new(film, settings, control)?;
+    let prepare = |pass: u32, threads: &Threads| make(pass, &Runner { threads, control });
+    let reason = render.prepared_passes(passes, prepare, &integrand).map_err(ProgressiveError::Method)?;
+    Ok(render.outcome(reason))
 }

@@ -23,7 +23,7 @@ use crate::stats::{Seconds, Stopwatch};
 #[derive(Debug)]
 pub struct Threads {
     #[cfg(feature = "threads")]
-    pool: Option<rayon::ThreadPool>,
+    pool: rayon::ThreadPool,
 }
 
 /// The system gave no threads; what it said.
@@ -71,7 +71,7 @@ impl Threads {
         #[cfg(feature = "threads")]
         {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(count).build();
-            Ok(Self { pool: Some(pool.map_err(|error| ThreadsError(error.to_string()))?) })
+            pool.map(|pool| Self { pool }).map_err(|error| ThreadsError(error.to_string()))
         }
         #[cfg(not(feature = "threads"))]
         {
@@ -85,7 +85,7 @@ impl Threads {
     pub fn count(&self) -> usize {
         #[cfg(feature = "threads")]
         {
-            self.pool.as_ref().map_or(1, rayon::ThreadPool::current_num_threads)
+            self.pool.current_num_threads()
         }
         #[cfg(not(feature = "threads"))]
         1
@@ -94,8 +94,8 @@ impl Threads {
     /// Calls `work(index, element)` for every element, on all threads.
     fn each<T: Send>(&self, elements: &mut [T], work: impl Fn(usize, &mut T) + Sync) {
         #[cfg(feature = "threads")]
-        if let (Some(pool), true) = (&self.pool, elements.len() > 1) {
-            pool.install(|| elements.par_iter_mut().with_max_len(1).enumerate().for_each(|(i, e)| work(i, e)));
+        if elements.len() > 1 {
+            self.pool.install(|| elements.par_iter_mut().with_max_len(1).enumerate().for_each(|(i, e)| work(i, e)));
             return;
         }
         elements.iter_mut().enumerate().for_each(|(i, e)| work(i, e));

@@ -37,7 +37,7 @@ pub struct Settings {
     /// Kind of random numbers.
     pub sequence: Sequence,
     /// Side of a tile in pixels. Larger: threads wait for each other at the end of a pass.
-    /// Smaller: more locking of the film. Changes no result but with a [`Settings::goal`], which each tile reaches by itself.
+    /// Smaller: more jobs, each with its overhead. Changes no result but with a [`Settings::goal`], which each tile reaches by itself.
     pub tile: u32,
 }
 
@@ -151,28 +151,6 @@ pub struct Passes {
     pub may_break: bool,
 }
 
-/// As [`render`], in `passes`: `prepare` is told the number of the pass, and what it makes is lent to `integrand`. Time ends
-/// a render between passes, unless these may break; [`Settings::samples`] are whole passes.
-pub(crate) fn render_prepared<T, E, P, F>(
-    film: &mut Film,
-    settings: &Settings,
-    control: &Control<'_>,
-    passes: Passes,
-    mut prepare: P,
-    integrand: F,
-) -> Result<Outcome, E>
-where
-    T: Sync,
-    E: From<RenderError>,
-    P: FnMut(u32, &Threads) -> Result<T, E>,
-    F: Fn(&T, &Sample<'_>, &mut SampleRng, &mut [Spectrum]) + Sync,
-{
-    let settings = &Settings { goal: None, ..*settings };
-    let mut render = Render::new(film, settings, control)?;
-    let reason = render.prepared_passes(passes, &mut prepare, &integrand)?;
-    Ok(render.outcome(reason))
-}
-
 /// An integrand whose queries of the world are counted.
 struct Counted<F>(F);
 
@@ -186,7 +164,7 @@ impl<F: Fn(&Sample<'_>, &mut SampleRng, &mut [Spectrum])> Integrand<SampleRng> f
 }
 
 /// A render on its way; the film gets its samples back when it is dropped.
-struct Render<'a> {
+pub(crate) struct Render<'a> {
     film: &'a mut Film,
     settings: &'a Settings,
     control: &'a Control<'a>,
@@ -205,7 +183,11 @@ impl Drop for Render<'_> {
 }
 
 impl<'a> Render<'a> {
-    fn new(film: &'a mut Film, settings: &'a Settings, control: &'a Control<'a>) -> Result<Self, RenderError> {
+    pub(crate) fn new(
+        film: &'a mut Film,
+        settings: &'a Settings,
+        control: &'a Control<'a>,
+    ) -> Result<Self, RenderError> {
         if settings.samples == 0 {
             return Err(RenderError::NoSamples);
         }
@@ -230,7 +212,7 @@ impl<'a> Render<'a> {
         Ok(Self { film, settings, control, threads, tiles, clock, reporter })
     }
 
-    fn outcome(self, reason: Reason) -> Outcome {
+    pub(crate) fn outcome(self, reason: Reason) -> Outcome {
         self.reporter.tell();
         let counters = self.tiles.as_ref().map_or_else(Counters::default, |tiles| {
             let picture::Counts { samples, non_finite } = tiles.counts();
@@ -284,10 +266,12 @@ impl<'a> Render<'a> {
         }
     }
 
-    fn prepared_passes<T, E, F>(
+    /// Samples in `passes`, each with what `prepare` makes for it, given its number. Time ends them between passes, unless these
+    /// may break.
+    pub(crate) fn prepared_passes<T, E, F>(
         &mut self,
         passes: Passes,
-        prepare: &mut impl FnMut(u32, &Threads) -> Result<T, E>,
+        mut prepare: impl FnMut(u32, &Threads) -> Result<T, E>,
         integrand: &F,
     ) -> Result<Reason, E>
     where

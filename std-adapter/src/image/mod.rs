@@ -8,8 +8,8 @@ pub mod png;
 use core::fmt;
 use std::path::Path;
 
-use crate::files::{FileError, Problem};
-use crate::film::{Film, Image, SizeError};
+use crate::files::{self, FileError, Problem};
+use crate::film::{Film, Image, SizeError, pixel_count};
 
 /// A picture with a name.
 #[derive(Debug, Clone, Copy)]
@@ -57,18 +57,10 @@ impl From<SizeError> for ErrorKind {
 }
 
 /// Extensions that [`write`](fn@write) knows.
-#[cfg(feature = "exr")]
-pub const WRITABLE: &[&str] = &["png", "pfm", "exr"];
-/// Extensions that [`write`](fn@write) knows.
-#[cfg(not(feature = "exr"))]
-pub const WRITABLE: &[&str] = &["png", "pfm"];
+pub const WRITABLE: &[&str] = if cfg!(feature = "exr") { &["png", "pfm", "exr"] } else { &["png", "pfm"] };
 
 /// Extensions that [`read`] knows.
-#[cfg(feature = "exr")]
-pub const READABLE: &[&str] = &["pfm", "exr"];
-/// Extensions that [`read`] knows.
-#[cfg(not(feature = "exr"))]
-pub const READABLE: &[&str] = &["pfm"];
+pub const READABLE: &[&str] = if cfg!(feature = "exr") { &["pfm", "exr"] } else { &["pfm"] };
 
 fn extension(path: &Path) -> String {
     path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default()
@@ -84,7 +76,7 @@ pub fn is_writable(path: impl AsRef<Path>) -> bool {
 ///
 /// PNG (8-bit sRGB after `exposure` stops) and PFM take the first layer, OpenEXR all of them: the
 /// first as channels `R`, `G`, `B`, the others as `name.R` and so on. The measuring formats ignore
-/// `exposure`. All is encoded before the file is opened.
+/// `exposure`. The file that was there is lost only when the new one is complete.
 ///
 /// # Errors
 /// An unknown extension, no layers or different sizes, or what the system says.
@@ -104,10 +96,8 @@ pub fn is_writable(path: impl AsRef<Path>) -> bool {
 /// ```
 pub fn write(path: impl AsRef<Path>, layers: &[Layer<'_>], exposure: f32) -> Result<(), ImageError> {
     let path = path.as_ref();
-    encode(&extension(path), layers, exposure)
-        .map_err(Problem::Content)
-        .and_then(|bytes| std::fs::write(path, bytes).map_err(Problem::Io))
-        .map_err(|problem| problem.of(path))
+    let bytes = encode(&extension(path), layers, exposure).map_err(|kind| Problem::Content(kind).of(path))?;
+    files::save(path, &bytes)
 }
 
 /// Writes the means of a film's layers, as [`write`](fn@write).
@@ -123,7 +113,7 @@ pub fn write_film(path: impl AsRef<Path>, film: &Film, exposure: f32) -> Result<
 fn encode(extension: &str, layers: &[Layer<'_>], exposure: f32) -> Result<Vec<u8>, ErrorKind> {
     let Some(first) = layers.first() else { return Err(ErrorKind::Layers) };
     let (width, height) = (first.image.width, first.image.height);
-    let count = crate::film::pixel_count(width, height)?;
+    let count = pixel_count(width, height)?;
     let fits =
         |layer: &Layer<'_>| (layer.image.width, layer.image.height, layer.image.pixels.len()) == (width, height, count);
     if !layers.iter().all(fits) {
@@ -151,8 +141,5 @@ pub fn read(path: impl AsRef<Path>) -> Result<Image, ImageError> {
         "exr" => exr::decode,
         _ => return Err(Problem::Content(ErrorKind::Extension(READABLE)).of(path)),
     };
-    std::fs::read(path)
-        .map_err(Problem::Io)
-        .and_then(|bytes| decode(&bytes).map_err(Problem::Content))
-        .map_err(|problem| problem.of(path))
+    files::load(path, decode)
 }
