@@ -41,4 +41,4 @@ pub use generate::{select, shoot};
 pub use light::{Connection, VirtualLight};
 pub use pass::{CurvePlace, VplMemory, VplOutput, VplPass, VplPassError, witnesses};
 pub use scatterer::{Receiver, Scatterer};
-pub use settings::{SAMPLES, Settings};
+pub use settings::{MOST_CANDIDATES, SAMPLES, Settings};

@@ -19,8 +19,9 @@ const LIGHTS: u32 = 1000;
 /// sixteen halve the mean error of blocks for the same number of lights.
 const CANDIDATES: u32 = 16;
 
-/// Candidates of a pass at most, or as many as lights: so that they take no more memory than a picture.
-const MOST_CANDIDATES: u32 = 1 << 17;
+/// Candidates of a pass at most, or as many as lights: so that they take no more memory than a picture. Fewer: passes of many lights choose
+/// among fewer; more: memory.
+pub const MOST_CANDIDATES: u32 = 1 << 17;
 
 /// Samples of every pixel in a pass, among which its lights are dealt out. More: smoother surfaces and fewer lights for each sample, whose
 /// other costs stay; fewer: the other way round.

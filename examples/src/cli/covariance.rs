@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use clap::{Args, ValueEnum};
+use clap::{Arg, Args, ValueEnum};
 use fogbow::bytes::Crc;
 use fogbow::covariance::bytes::GridBytesError;
 use fogbow::covariance::{
@@ -17,6 +17,7 @@ use fogbow_std::files::Problem;
 use fogbow_std::progress::Control;
 use fogbow_std::threads::{self, Ending, Threads};
 
+use super::defaults::{unit_outline, with_default};
 use super::{Failure, output};
 use crate::scene_file::fingerprint;
 use crate::statistics::Statistics;
@@ -24,12 +25,12 @@ use crate::world::{WithMedium, World};
 
 /// Options of covariance grids.
 #[derive(Debug, Clone, Args)]
-#[command(next_help_heading = "Covariance grid")]
+#[command(next_help_heading = "Covariance grid", mut_args(told_of_grids))]
 pub struct CovarianceArguments {
-    /// Photons that fill the covariance grid [default: 100000, for kernels of photon beams 10000].
+    /// Photons that fill the covariance grid.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=1 << 32))]
     pub grid_paths: Option<u64>,
-    /// Cells of the covariance grid along its longest side [default: 64].
+    /// Cells of the covariance grid along its longest side.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=512))]
     pub grid_cells: Option<u32>,
     /// Takes the covariance grid from a file instead of filling it.
@@ -42,21 +43,45 @@ pub struct CovarianceArguments {
 
 /// Options of ray marching.
 #[derive(Debug, Clone, Args)]
-#[command(next_help_heading = "Ray marching")]
+#[command(next_help_heading = "Ray marching", mut_args(told_of_steps))]
 pub struct MarchArguments {
     /// How the steps along eye rays are chosen.
     #[arg(long, value_enum, default_value_t = Step::Uniform)]
     pub step: Step,
-    /// Length of uniform steps; with covariances the longest one [default: 1/32 of the scene's diagonal, with covariances
-    /// 1/8].
+    /// Length of uniform steps; with covariances the longest one.
     #[arg(long, value_name = "LENGTH", value_parser = output::positive)]
     pub step_length: Option<f64>,
     /// How fine `--step covariance` is: about the number of steps where light fills a ray.
     #[arg(long, value_name = "N", value_parser = steps, default_value_t = STEP_COUNT)]
     pub step_count: f32,
-    /// Shortest step with covariances [default: a twentieth of the grid's cell].
+    /// Shortest step with covariances.
     #[arg(long, value_name = "LENGTH", value_parser = output::positive)]
     pub step_least: Option<f64>,
+}
+
+/// An option with the default of [`Settings::for_outline`].
+fn told_of_grids(option: Arg) -> Arg {
+    let usual = Settings::for_outline(&unit_outline());
+    match option.get_id().as_str() {
+        "grid_paths" => {
+            let for_kernels = usual.for_kernels().photons;
+            with_default(option, format!("{}, for kernels of photon beams {for_kernels}", usual.photons))
+        }
+        "grid_cells" => with_default(option, usual.edge),
+        _ => option,
+    }
+}
+
+/// An option with its default, which [`MarchArguments::stride`] takes.
+fn told_of_steps(option: Arg) -> Arg {
+    match option.get_id().as_str() {
+        "step_length" => {
+            let [even, longest] = [EVEN_STEP, LONGEST_STEP].map(f32::recip);
+            with_default(option, format!("1/{even} of the scene's diagonal, with covariances 1/{longest}"))
+        }
+        "step_least" => with_default(option, format!("{LEAST_STEP} of the grid's cell")),
+        _ => option,
+    }
 }
 
 fn steps(text: &str) -> Result<f32, String> {

@@ -1,6 +1,6 @@
 //! `--image-sampling covariance`: fewer pixels computed where light is smooth.
 
-use clap::{Args, ValueEnum};
+use clap::{Arg, Args, ValueEnum};
 use fogbow::covariance::image_sampling::{self, Computed, FillingIn, LEAST_PLAN, Plan, Planning, USUAL_SHARE};
 use fogbow::covariance::{GridView, filter_precision};
 use fogbow::host::Medium;
@@ -15,6 +15,7 @@ use fogbow_std::threads::{self, Threads};
 use fogbow_std::tiles::Sample;
 
 use super::Failure;
+use super::defaults::with_remark;
 use super::render::CACHE_LAYERS;
 use crate::camera::Camera;
 use crate::statistics::Statistics;
@@ -22,12 +23,12 @@ use crate::world::{WithMedium, World};
 
 /// Options of adaptive sampling.
 #[derive(Debug, Clone, Args)]
-#[command(next_help_heading = "Adaptive sampling")]
+#[command(next_help_heading = "Adaptive sampling", mut_args(told))]
 pub struct SamplingArguments {
     /// At which pixels light scattered by the medium is computed; surfaces are at all.
     #[arg(long, value_enum, default_value_t = ImageSampling::Uniform)]
     pub image_sampling: ImageSampling,
-    /// Share of pixels that `--image-sampling covariance` computes at most, from 0.05 to 1.
+    /// Share of pixels that `--image-sampling covariance` computes at most.
     #[arg(long, value_name = "SHARE", value_parser = share, default_value_t = USUAL_SHARE)]
     pub image_share: f32,
 }
@@ -41,10 +42,18 @@ pub enum ImageSampling {
     Covariance,
 }
 
+/// An option with its limits.
+fn told(option: Arg) -> Arg {
+    match option.get_id().as_str() {
+        "image_share" => with_remark(option, format!("from {LEAST_PLAN} to 1")),
+        _ => option,
+    }
+}
+
 fn share(text: &str) -> Result<f32, String> {
     match text.parse::<f32>() {
         Ok(value) if (LEAST_PLAN..=1.0).contains(&value) => Ok(value),
-        _ => Err("must be a number from 0.05 to 1".to_owned()),
+        _ => Err(format!("must be a number from {LEAST_PLAN} to 1")),
     }
 }
 

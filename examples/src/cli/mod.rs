@@ -4,6 +4,7 @@
 
 mod compare;
 pub(crate) mod covariance;
+mod defaults;
 mod ellipsoids;
 mod figures;
 mod image_sampling;

@@ -2,11 +2,12 @@
 
 use core::num::NonZero;
 
-use clap::{Args, ValueEnum};
+use clap::{Arg, Args, ValueEnum};
 use fogbow::beams::{self, Settings, kernel};
 use fogbow::covariance::Radii;
 use fogbow::host::Medium;
 use fogbow::math::Vec3;
+use fogbow::vpl;
 use fogbow::world::{Outline, World as LitWorld};
 use fogbow_std::film::Film;
 use fogbow_std::progressive;
@@ -14,35 +15,35 @@ use fogbow_std::stats::{CountingMedium, CountingScene};
 use fogbow_std::threads::{self, Threads};
 use fogbow_std::tiles::{Outcome, Passes};
 
+use super::defaults::{unit_outline, with_default};
 use super::render::{Shot, write_layers};
 use super::{Failure, output};
 use crate::world::WithMedium;
 
 /// Options of `--method photon-beams`.
 #[derive(Debug, Clone, Args)]
-#[command(next_help_heading = "Photon beams")]
+#[command(next_help_heading = "Photon beams", mut_args(told))]
 pub struct BeamArguments {
     /// How wide beams are blurred.
     #[arg(long, value_enum, default_value_t = Kernel::Progressive)]
     pub kernel: Kernel,
-    /// Paths sent from the lights in each pass [default: as many as leave four pieces of beams for every pixel].
+    /// Paths sent from the lights in each pass.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1 << 24))]
     pub beams: Option<u32>,
     /// Samples per pixel in each pass, of virtual lights, too; beams are gathered by the first of them, virtual lights are
-    /// dealt out among them [default: 8, for virtual lights 64].
+    /// dealt out among them.
     #[arg(long, value_name = "N")]
     pub pass_samples: Option<NonZero<u32>>,
-    /// Radius of the blur in the first pass, in the scene's unit of length [default: 0.005 of the scene's diagonal].
+    /// Radius of the blur in the first pass, in the scene's unit of length.
     #[arg(long, value_name = "R", value_parser = output::positive)]
     pub radius: Option<f64>,
-    /// Bias that `--kernel covariance` allows, as a part of the light itself [default: 0.02].
+    /// Bias that `--kernel covariance` allows, as a part of the light itself.
     #[arg(long, value_name = "BETA", value_parser = output::positive)]
     pub bias: Option<f64>,
-    /// Greatest radius of `--kernel covariance` [default: 0.05 of the scene's diagonal].
+    /// Greatest radius of `--kernel covariance`.
     #[arg(long, value_name = "R", value_parser = output::positive)]
     pub radius_most: Option<f64>,
-    /// How fast the blur narrows, in (0, 1]: after i passes its square has shrunk by about i^(alpha-1)
-    /// [default: 0.6].
+    /// How fast the blur narrows, in (0, 1]: after i passes its square has shrunk by about i^(alpha-1).
     #[arg(long, value_name = "ALPHA", value_parser = alpha)]
     pub alpha: Option<f32>,
 }
@@ -54,6 +55,25 @@ pub enum Kernel {
     Progressive,
     /// Wider where light is smooth, by its covariances.
     Covariance,
+}
+
+/// An option with the default of [`Settings::for_outline`].
+fn told(option: Arg) -> Arg {
+    /// Pixels of a picture of middle size, whose pieces are neither the least nor the most.
+    const PIXELS: u64 = 1 << 16;
+    let usual = Settings::for_outline(&unit_outline());
+    match option.get_id().as_str() {
+        "beams" => {
+            let pieces = u64::from(usual.for_pixels(PIXELS).pieces) / PIXELS;
+            with_default(option, format!("as many as leave {pieces} pieces of beams for every pixel"))
+        }
+        "pass_samples" => with_default(option, format!("{}, for virtual lights {}", usual.samples, vpl::SAMPLES)),
+        "radius" => with_default(option, format!("{} of the scene's diagonal", usual.radius)),
+        "bias" => with_default(option, usual.bias),
+        "radius_most" => with_default(option, format!("{} of the scene's diagonal", usual.widest)),
+        "alpha" => with_default(option, usual.alpha),
+        _ => option,
+    }
 }
 
 fn alpha(text: &str) -> Result<f32, String> {

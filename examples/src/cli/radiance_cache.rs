@@ -2,15 +2,17 @@
 
 use std::path::{Path, PathBuf};
 
-use clap::{Args, ValueEnum};
+use clap::{Arg, Args, ValueEnum};
 use fogbow::bytes::Crc;
-use fogbow::cache::{self, Asked, CachedRadiance, CachesError, Extrapolation, RadianceCaches, RaySettings};
+use fogbow::cache::{self, Asked, CachedRadiance, CachesError, Effort, Extrapolation, RadianceCaches, RaySettings};
 use fogbow::covariance::image_sampling::Plan;
 use fogbow::host::Medium;
 use fogbow::light::Light;
 use fogbow::math::{Ray, Vec2};
 use fogbow::path;
+use fogbow::phase::Lobe;
 use fogbow::sampling::uniform2;
+use fogbow::sh;
 use fogbow::world::{Outline, World as LitWorld};
 use fogbow_std::files::Problem;
 use fogbow_std::film::Film;
@@ -20,6 +22,7 @@ use fogbow_std::stats::{CountingMedium, CountingScene, Seconds, Stopwatch};
 use fogbow_std::threads::{self, Threads};
 use fogbow_std::tiles::{self, Outcome};
 
+use super::defaults::{unit_outline, with_default};
 use super::image_sampling::is_computed;
 use super::{Failure, output};
 use crate::camera::Camera;
@@ -29,22 +32,20 @@ use crate::world::{WithMedium, World};
 
 /// Of `--method radiance-cache`.
 #[derive(Debug, Clone, Args)]
-#[command(next_help_heading = "Radiance caching")]
+#[command(next_help_heading = "Radiance caching", mut_args(told))]
 pub struct CacheArguments {
-    /// Error tolerance of all caches: smaller is finer and slower [default: 0.2 for single, 2 for surface, for
-    /// multiple 1 less the absolute mean cosine of the phase function, within 0.1 and 0.8, 0.35 for irradiance].
+    /// Error tolerance of all caches: smaller is finer and slower.
     #[arg(long, value_name = "E", value_parser = output::positive)]
     pub tolerance: Option<f64>,
     /// Error tolerance of one cache, as CACHE=E; may be repeated.
     #[arg(long, value_name = "CACHE=E", value_parser = named)]
     pub tolerance_of: Vec<(Kind, f64)>,
     /// Random walks of each of the two estimates of a record of multiple scattering, fewer where it reaches less far
-    /// than others, in the second up to four times as many where they differ much; the other caches in proportion
-    /// [default: 2048].
+    /// than others, in the second up to four times as many where they differ much; the other caches in proportion.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     pub paths: Option<u32>,
     /// Degree of expansions in anisotropic media [default: from the phase function].
-    #[arg(long, value_name = "L", value_parser = clap::value_parser!(u32).range(0..=16))]
+    #[arg(long, value_name = "L", value_parser = clap::value_parser!(u32).range(0..=sh::MAX_DEGREE as i64))]
     pub degree: Option<u32>,
     /// Caches not to use: their light is estimated anew at every point; may be repeated.
     #[arg(long, value_name = "CACHE", value_enum)]
@@ -93,6 +94,30 @@ impl CacheArguments {
             }
             _ => error.to_string(),
         })
+    }
+}
+
+/// An option with the default of [`cache::Settings::for_outline`].
+fn told(option: Arg) -> Arg {
+    let usual = |phase: Lobe| {
+        let outline = Outline { phase: phase.into(), ..unit_outline() };
+        cache::Settings::for_outline(&outline).with_single_cached(&outline, true)
+    };
+    let (even, sharp) = (usual(Lobe::Isotropic), usual(Lobe::HenyeyGreenstein { g: 0.999 }));
+    let tolerance = |effort: Option<Effort>| effort.map_or(0.0, |effort| effort.tolerance);
+    match option.get_id().as_str() {
+        "tolerance" => {
+            let [single, surface, irradiance] = [even.single, even.surface, even.irradiance].map(tolerance);
+            let [low, high] = [sharp.multiple, even.multiple].map(tolerance);
+            with_default(
+                option,
+                format!(
+                    "{single} for single, {surface} for surface, for multiple 1 less the absolute mean cosine of the phase function, within {low} and {high}, {irradiance} for irradiance"
+                ),
+            )
+        }
+        "paths" => with_default(option, even.multiple.map_or(0, |effort| effort.samples)),
+        _ => option,
     }
 }
 

@@ -4,7 +4,7 @@ use core::sync::atomic::{AtomicBool, Ordering};
 use core::time::Duration;
 use std::path::PathBuf;
 
-use clap::{Args, ValueEnum};
+use clap::{Arg, Args, ValueEnum};
 use fogbow::cache::{self, Kind, RadianceCaches};
 use fogbow::covariance::image_sampling::Plan;
 use fogbow::covariance::{CovarianceGrid, GridView};
@@ -26,6 +26,7 @@ use fogbow_std::threads::Threads;
 use fogbow_std::tiles::{self, Outcome, Reason, RenderError, Sample};
 
 use super::covariance::{CovarianceArguments, GridJob, MarchArguments, Step, Stopped};
+use super::defaults::{with_default, with_remark};
 use super::image_sampling::{self, SamplingArguments, Sight};
 use super::march::MarchJob;
 use super::photon_beams::{BeamArguments, BeamJob, Kernel};
@@ -40,18 +41,18 @@ use crate::world::{Storage, WithMedium, World};
 
 /// Renders a Mitsuba 3 scene.
 #[derive(Debug, Args)]
+#[command(mut_args(told))]
 pub struct RenderArguments {
     /// The scene file.
     pub scene: PathBuf,
     /// How light is computed.
     #[arg(long, value_enum, default_value_t = Method::Path)]
     pub method: Method,
-    /// Samples per pixel, with --noise the most; for photon beams and virtual lights rounded up to whole passes [default: what
-    /// the scene says, for radiance caching as --noise 0.02 wants, at most 256, for virtual lights one pass; with --time, as many as fit].
+    /// Samples per pixel, with --noise the most; for photon beams and virtual lights rounded up to whole passes.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub spp: Option<u32>,
-    /// Relative noise at which tiles of 8 by 8 pixels have enough samples: they get 8, and more where that leaves more noise,
-    /// without --spp at most 65536; not for photon beams and virtual lights, whose noise is that of whole passes.
+    /// Relative noise at which tiles of some pixels have enough samples; not for photon beams and virtual lights, whose noise is
+    /// that of whole passes.
     #[arg(long, value_name = "E", value_parser = output::positive)]
     pub noise: Option<f64>,
     /// Seconds to render for, on the wall clock.
@@ -105,6 +106,25 @@ pub struct RenderArguments {
     /// Of covariance grids.
     #[command(flatten)]
     pub covariance: CovarianceArguments,
+}
+
+/// An option with what [`RenderArguments::samples`] takes where it is not given.
+fn told(option: Arg) -> Arg {
+    match option.get_id().as_str() {
+        "spp" => with_default(
+            option,
+            format!(
+                "what the scene says, for radiance caching as --noise {} wants, at most {}, for virtual lights one pass; with --time, as many as fit",
+                cache::USUAL_NOISE,
+                cache::MOST_SAMPLES,
+            ),
+        ),
+        "noise" => with_remark(
+            option,
+            format!("at least {} samples, without --spp at most {}", picture::LEAST_SAMPLES, picture::MOST_SAMPLES,),
+        ),
+        _ => option,
+    }
 }
 
 /// How light is computed.

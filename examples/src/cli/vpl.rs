@@ -3,13 +3,13 @@
 use core::num::NonZero;
 use core::str::FromStr;
 
-use clap::{Args, ValueEnum};
+use clap::{Arg, Args, ValueEnum};
 use fogbow::host::Medium;
 use fogbow::math::{Ray, Vec2};
 use fogbow::medium::Pyramid;
 use fogbow::sampling::{Generator, uniform2};
 use fogbow::spectrum::Spectrum;
-use fogbow::vpl::{self, Bound, Compensation, EyeSettings, LEVELS, Settings, VplRadiance};
+use fogbow::vpl::{self, Bound, Compensation, EyeSettings, LEVELS, MOST_CANDIDATES, Settings, VplRadiance};
 use fogbow::world::{Outline, World as LitWorld};
 use fogbow_std::film::Film;
 use fogbow_std::progressive;
@@ -18,18 +18,18 @@ use fogbow_std::stats::{CountingMedium, CountingScene};
 use fogbow_std::tiles::{Outcome, Passes};
 
 use super::Failure;
+use super::defaults::{unit_outline, with_default};
 use super::render::{LAYERS, Shot, write_layers};
 use crate::world::WithMedium;
 
 /// Options of `--method vpl`.
 #[derive(Debug, Clone, Args)]
-#[command(next_help_heading = "Virtual lights")]
+#[command(next_help_heading = "Virtual lights", mut_args(told))]
 pub struct VplArguments {
-    /// Virtual lights of each pass [default: 1000].
+    /// Virtual lights of each pass.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1 << 24))]
     pub lights: Option<u32>,
-    /// How many times as many are made; those are kept that matter most for the picture. 1 keeps all; no more
-    /// than 131072 are made, or as many as lights [default: 16].
+    /// How many times as many are made; those are kept that matter most for the picture. 1 keeps all.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=256))]
     pub candidates: Option<u32>,
     /// Bound of geometry terms, by which near virtual lights are clamped, in the scene's unit of length to the power of
@@ -39,19 +39,40 @@ pub struct VplArguments {
     /// How what clamping takes away is brought back.
     #[arg(long, value_enum, default_value_t = Recovery::Abc)]
     pub compensation: Recovery,
-    /// Steps of compensation [default: 2].
+    /// Steps of compensation.
     #[arg(long, value_name = "K", value_parser = clap::value_parser!(u32).range(1..))]
     pub steps: Option<u32>,
-    /// Whether compensation asks what lies between a point of the medium and the next [default: on].
+    /// Whether compensation asks what lies between a point of the medium and the next.
     #[arg(long, value_enum, value_name = "on|off")]
     pub local_visibility: Option<Switch>,
     /// Lights that share a point on the eye ray and a compensation path, with 1-to-1 and abc: more cost less, and are
-    /// noisier together [default: 1, for abc 4].
+    /// noisier together.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1 << 24))]
     pub share: Option<u32>,
-    /// Points on each eye ray at which each light is gathered [default: 1].
+    /// Points on each eye ray at which each light is gathered.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=4096))]
     pub light_points: Option<u32>,
+}
+
+/// An option with the default of [`Settings::for_outline`].
+fn told(option: Arg) -> Arg {
+    const ABC: Compensation = Compensation::APPROXIMATE;
+    let usual = Settings::for_outline(&unit_outline());
+    match option.get_id().as_str() {
+        "lights" => with_default(option, usual.lights),
+        "candidates" => with_default(
+            option,
+            format!("{}; at most {MOST_CANDIDATES} in all, or as many as lights", usual.candidates),
+        ),
+        "steps" => with_default(option, ABC.steps),
+        "local_visibility" => with_default(option, if ABC.local_visibility { "on" } else { "off" }),
+        "share" => {
+            let [one_to_one, abc] = [Compensation::ONE_TO_ONE, ABC].map(|of| of.lights_per_point);
+            with_default(option, format!("{one_to_one}, for abc {abc}"))
+        }
+        "light_points" => with_default(option, usual.points),
+        _ => option,
+    }
 }
 
 /// How what clamping takes away is brought back.
