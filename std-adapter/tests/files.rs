@@ -28,5 +28,11 @@ fn errors_name_the_file_and_nothing_is_left_behind() {
         write(folder.join(&name), &layers, 1.0).unwrap();
         assert_eq!(read(folder.join(&name)).unwrap(), image, "{name}");
     }
+    // Over what is there; and nothing stays beside it.
+    write(folder.join("x.pfm"), &[Layer { name: "total", image: &smaller }], 0.0).unwrap();
+    assert_eq!(read(folder.join("x.pfm")).unwrap(), smaller);
+    assert_eq!(std::fs::read_dir(&folder).unwrap().count(), READABLE.len());
+    std::fs::create_dir(folder.join("folder.pfm")).unwrap();
+    assert!(read(folder.join("folder.pfm")).unwrap_err().to_string().ends_with("folder.pfm: is not a file"));
     std::fs::remove_dir_all(&folder).unwrap();
 }
