@@ -79,7 +79,14 @@ fn filled<M: Medium + Sync>(
 ) -> RadianceCaches<'static> {
     let effort = |tolerance| {
         let limits = Limits { min: 0.01 * most, max: most };
-        Some(Effort { tolerance, samples: SAMPLES, degree: 0, limits, clearance: f32::INFINITY })
+        Some(Effort {
+            tolerance,
+            samples: SAMPLES,
+            degree: 0,
+            limits,
+            clearance: f32::INFINITY,
+            free_paths: f32::INFINITY,
+        })
     };
     let caches = RadianceCaches::new(Settings {
         surface: effort(2.0),

@@ -293,7 +293,7 @@ impl Drop for Folder {
 /// Few records: as large as the room.
 fn settings() -> Settings {
     let limits = Limits { min: 1.0, max: 1.5 };
-    let effort = Effort { tolerance: 0.5, samples: 64, degree: 1, limits, clearance: 0.5 };
+    let effort = Effort { tolerance: 0.5, samples: 64, degree: 1, limits, clearance: 0.5, free_paths: 1.0 };
     let flat = Effort { degree: 0, ..effort };
     Settings {
         single: None,

@@ -56,7 +56,9 @@ fn eye_ray(film: [f32; 2]) -> Ray {
 fn settings() -> Settings {
     let limits = Limits { min: 0.02, max: 0.8 };
     let clearance = f32::INFINITY;
-    let effort = |tolerance: f32, degree: usize| Some(Effort { tolerance, samples: 32, degree, limits, clearance });
+    let effort = |tolerance: f32, degree: usize| {
+        Some(Effort { tolerance, samples: 32, degree, limits, clearance, free_paths: f32::INFINITY })
+    };
     Settings {
         single: effort(0.5, 3),
         surface: effort(1.5, 2),

@@ -97,6 +97,16 @@ fn warps_of_the_unit_square() {
             },
         );
     }
+    for widest in [0.1_f32, 1.5] {
+        sphere(
+            "steep cone",
+            Vec3::Z,
+            f64::from(0.5 - 0.5 * widest.cos()).ln() / 0.25_f64.ln(),
+            SAMPLES,
+            |u, _| Some(warp::steep_cone(u, widest)),
+            |d| f64::from(warp::steep_cone_pdf(Vec3::Z.cross(d).length(), d.z, widest)),
+        );
+    }
     square(
         "triangle",
         SAMPLES,

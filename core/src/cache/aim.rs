@@ -32,6 +32,8 @@ struct Cone {
     axis: Vec3,
     /// 1 − cos of half the opening angle.
     height: f32,
+    /// Half the opening angle (rad), for lamps without extent: directions are the denser the closer they pass.
+    steep: Option<f32>,
     weight: f32,
 }
 
@@ -63,7 +65,9 @@ impl Aims {
             if scene.is_blocked(&Ray { origin: point, direction: axis, length: distance - radius }) {
                 continue;
             }
-            let cone = Cone { axis, height: 1.0 - float::safe_sqrt(1.0 - sine * sine), weight };
+            let cosine = float::safe_sqrt(1.0 - sine * sine);
+            let steep = field.radius().is_none().then(|| libm::atan2f(sine, cosine));
+            let cone = Cone { axis, height: 1.0 - cosine, steep, weight };
             if let Err(cone) = cones.push(cone)
                 && let Some(weakest) = cones.iter_mut().min_by(|a, b| a.weight.total_cmp(&b.weight))
                 && weakest.weight < cone.weight
@@ -84,14 +88,19 @@ impl Aims {
         let Some((cone, choice)) = choose(self.cones.iter().map(|cone| (cone.weight, cone)), u.x) else {
             return Vec3::Z;
         };
-        let local = warp::uniform_cone(Vec2::new(choice.remainder, u.y), cone.height);
+        let u = Vec2::new(choice.remainder, u.y);
+        let local = cone.steep.map_or_else(|| warp::uniform_cone(u, cone.height), |widest| warp::steep_cone(u, widest));
         Frame::around(cone.axis).to_world(local)
     }
 
     /// Its density (sr⁻¹).
     pub(super) fn pdf(&self, direction: Vec3) -> f32 {
-        let inside = |cone: &&Cone| 0.5 * cone.axis.distance_squared(direction) <= cone.height;
-        let sum: f32 = self.cones.iter().filter(inside).map(|c| c.weight * warp::uniform_cone_pdf(c.height)).sum();
+        let of = |cone: &Cone| match cone.steep {
+            Some(widest) => warp::steep_cone_pdf(cone.axis.cross(direction).length(), cone.axis.dot(direction), widest),
+            None if 0.5 * cone.axis.distance_squared(direction) <= cone.height => warp::uniform_cone_pdf(cone.height),
+            None => 0.0,
+        };
+        let sum: f32 = self.cones.iter().map(|cone| cone.weight * of(cone)).sum();
         if self.total > 0.0 { sum / self.total } else { 0.0 }
     }
 }

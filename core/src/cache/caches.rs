@@ -107,7 +107,7 @@ impl<'s> RadianceCaches<'s> {
     /// # let world = World { medium: &fog, scene: &Empty, lights: &[] };
     /// # let bounds = Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE };
     /// # let limits = Limits { min: 0.1, max: 1.0 };
-    /// # let effort = Effort { tolerance: 0.5, samples: 16, degree: 1, limits, clearance: f32::INFINITY };
+    /// # let effort = Effort { tolerance: 0.5, samples: 16, degree: 1, limits, clearance: f32::INFINITY, free_paths: f32::INFINITY };
     /// const RECORDS: usize = 48;
     /// let settings = Settings { surface: Some(effort), rays: 16, ..Settings::default() };
     /// let (mut records, mut higher) = ([Record::default(); RECORDS], [Coefficient::ZERO; 3 * RECORDS]);

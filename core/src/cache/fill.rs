@@ -21,10 +21,11 @@ use super::settings::{Effort, Settings};
 use super::slot::{Attached, ByKind, Inserted, learnt_near};
 use super::{Estimator, Record};
 use crate::host::{Medium, Scene};
-use crate::math::{Ray, Vec3};
+use crate::math::{Ray, Vec3, float};
 use crate::sampling::Generator;
 use crate::sampling::uniform::mix;
 use crate::sh::Coefficient;
+use crate::spectrum::Spectrum;
 use crate::storage::Full;
 use crate::work::Rounds;
 use crate::world::World;
@@ -65,6 +66,16 @@ const LEAST_SAMPLES: u32 = 16;
 /// Records that reach less far than usual take a share of the samples down to this.
 const LEAST_SHARE: f32 = 0.25;
 
+/// Walks and directions of a fill for each eye ray of an audit. An audited ray is compared at some eight points by whole walks and with a whole
+/// path, which takes as long as some sixty of those that end at records; and a twentieth of the time is to be spent.
+const WALKS_PER_AUDIT_RAY: u64 = 1200;
+
+/// Eye rays of an audit at least and at most. Fewer cannot tell ten per cent from chance; more tell less than a tenth of a per cent.
+const LEAST_AUDIT_RAYS: u32 = 4096;
+
+/// See [`LEAST_AUDIT_RAYS`].
+const MOST_AUDIT_RAYS: u32 = 1 << 18;
+
 /// What the jobs of a round do.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Round {
@@ -100,7 +111,8 @@ enum Round {
 ///     step(&mut filling, &world, &mut output); // so many jobs a frame
 /// }
 /// // What there is by now can be read at any time.
-/// assert!(!filling.is_cut() && filling.computed(Kind::Single) == 0 && filling.caches().reader().single.is_none());
+/// assert!(!filling.is_cut() && filling.audit_rays() >= 4096);
+/// assert!( filling.computed(Kind::Single) == 0 && filling.caches().reader().single.is_none());
 /// let caches = filling.finish();
 /// # }
 /// # Ok::<(), Box<dyn core::error::Error>>(())
@@ -242,6 +254,15 @@ impl<'s, F> Filling<'s, F> {
         self.all_computed[kind]
     }
 
+    /// Eye rays for an [`Audit`](super::Audit) that takes about a twentieth of the time of this fill, and at least enough to see whether a
+    /// picture is grossly wrong.
+    #[must_use]
+    pub fn audit_rays(&self) -> u32 {
+        let samples = |kind: Kind| self.settings().effort(kind).map_or(0, |effort| u64::from(effort.samples));
+        let walks: u64 = Kind::ALL.into_iter().map(|kind| self.computed(kind) * samples(kind)).sum();
+        u32::try_from(walks / WALKS_PER_AUDIT_RAY).unwrap_or(u32::MAX).clamp(LEAST_AUDIT_RAYS, MOST_AUDIT_RAYS)
+    }
+
     fn settings(&self) -> &Settings {
         &self.caches.settings
     }
@@ -342,7 +363,7 @@ impl<'s, F> Filling<'s, F> {
             }
             Asked::Box(_) => effort.limits,
         };
-        let limits = limits.within(self.reach(&effort, &place, world.scene));
+        let limits = limits.within(self.reach((step.kind, &effort), &place, world));
         let number = self.first.wrapping_add(self.computed + u64::from(job));
         let row = step.kind.row();
         let is_first = row.is_ground && self.first == 0 && number < FIRST.0;
@@ -408,12 +429,28 @@ impl<'s, F> Filling<'s, F> {
         true
     }
 
-    /// How far a record may reach because of surfaces near it.
-    fn reach(&self, effort: &Effort, place: &Place, scene: &(impl Scene + ?Sized)) -> f32 {
-        if effort.clearance == f32::INFINITY {
-            return f32::INFINITY;
+    /// How far a record may reach because of surfaces near it, and of the medium it lies in.
+    fn reach<M: Medium + ?Sized, S: Scene + ?Sized>(
+        &self,
+        (kind, effort): (Kind, &Effort),
+        place: &Place,
+        world: &World<'_, M, S>,
+    ) -> f32 {
+        let mut reach = f32::INFINITY;
+        if effort.clearance < f32::INFINITY {
+            reach = (effort.clearance * clearance(place.point, place.normal, world.scene)).max(self.settings().finest);
         }
-        (effort.clearance * clearance(place.point, place.normal, scene)).max(self.settings().finest)
+        if effort.free_paths < f32::INFINITY {
+            let properties = world.medium.properties(place.point);
+            let straight = match kind {
+                Kind::Multiple | Kind::CoarseMultiple => {
+                    properties.phase.mean_cosine().map(|g| float::safe_sqrt(1.0 - g))
+                }
+                _ => Spectrum::ONE,
+            };
+            reach = reach.min(effort.free_paths / (properties.extinction() * straight).max_element());
+        }
+        reach
     }
 
     /// The round after one is complete.

@@ -36,11 +36,13 @@
 //! | `estimate` | [`Estimator`]: what records are made of |
 //! | `evidence` | how far gradients can be believed; edges of the sky |
 //! | `eye` | [`places`] and [`radiance`] of eye rays |
+//! | `audit` | [`Audit`]: how far pictures from caches are off |
 //! | `room` | [`Slots`] and [`room_for`]: lent memory, and how much of it is needed |
 //! | [`bytes`] | caches as bytes, to be saved |
 
 mod aim;
 mod asked;
+mod audit;
 pub mod bytes;
 mod caches;
 mod estimate;
@@ -64,6 +66,7 @@ mod slot;
 mod store;
 
 pub use asked::{Asked, Wanted};
+pub use audit::{Audit, Compared, Deviation, Findings};
 pub use caches::RadianceCaches;
 pub use estimate::Estimator;
 pub use extrapolate::{Blend, Extrapolation, exponent_limit, weight};

@@ -77,7 +77,7 @@ pub struct Room {
 /// ```
 /// # use fogbow::cache::{Effort, Kind, Limits, Settings, room_for};
 /// let limits = Limits { min: 0.1, max: 1.0 };
-/// let effort = Effort { tolerance: 0.5, samples: 32, degree: 2, limits, clearance: f32::INFINITY };
+/// let effort = Effort { tolerance: 0.5, samples: 32, degree: 2, limits, clearance: f32::INFINITY, free_paths: f32::INFINITY };
 /// let room = room_for(&Settings { surface: Some(effort), ..Settings::default() }, 1000, 50);
 /// let [surface, multiple] = [Kind::Surface, Kind::Multiple].map(|kind| room.kinds[kind as usize]);
 /// // Nine coefficients, the mean of which is the record itself.

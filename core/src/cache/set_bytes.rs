@@ -11,9 +11,9 @@
 //! | 20 | 4 | 1 if a fill was left before its end and its records are still to be estimated anew, else 0 |
 //! | 24 | 8 | tag: what the caches were made for |
 //! | 32 | 8 | CRC-64 of bytes 0 to 32 and of both tables below |
-//! | 40 | 36 p | a part each: number of the [`Kind`], degree, tolerance (`f32`), samples per record, least and greatest radius, clearance (`f32`), length in bytes (8) |
-//! | 40 + 36 p | 8 v | marks of the views that were filled to the end |
-//! | 40 + 36 p + 8 v | … | the parts, one after the other |
+//! | 40 | 40 p | a part each: number of the [`Kind`], degree, tolerance (`f32`), samples per record, least and greatest radius, clearance, free paths (`f32`), length in bytes (8) |
+//! | 40 + 40 p | 8 v | marks of the views that were filled to the end |
+//! | 40 + 40 p + 8 v | … | the parts, one after the other |
 
 use core::fmt;
 
@@ -32,11 +32,11 @@ use crate::storage::Full;
 const MAGIC: [u8; 8] = *b"\x89FOGSET\n";
 
 /// Of the layout above.
-const VERSION: u32 = 3;
+const VERSION: u32 = 4;
 
 /// Length of the header, of a part's row and of a view's (bytes).
 const HEADER: usize = 40;
-const ROW: usize = 36;
+const ROW: usize = 40;
 const VIEW: usize = 8;
 
 /// Why bytes are not the caches asked for, in the order of the checks.
@@ -164,7 +164,7 @@ impl RadianceCaches<'_> {
             for (kind, effort, length) in self.parts() {
                 let Limits { min, max } = effort.limits;
                 let words = [kind as u32, effort.degree as u32, effort.tolerance.to_bits(), effort.samples];
-                let bounds = [min, max, effort.clearance].map(f32::to_bits);
+                let bounds = [min, max, effort.clearance, effort.free_paths].map(f32::to_bits);
                 words.iter().chain(&bounds).try_for_each(|word| each(&word.to_le_bytes()))?;
                 each(&(length as u64).to_le_bytes())?;
             }
@@ -215,7 +215,7 @@ impl RadianceCaches<'_> {
     /// # #[cfg(feature = "alloc")] {
     /// use fogbow::cache::{Effort, Limits, RadianceCaches, Settings};
     /// let limits = Limits { min: 0.01, max: 1.0 };
-    /// let effort = Effort { tolerance: 0.5, samples: 64, degree: 2, limits, clearance: 1.0 };
+    /// let effort = Effort { tolerance: 0.5, samples: 64, degree: 2, limits, clearance: 1.0, free_paths: 1.0 };
     /// let settings = Settings { multiple: Some(effort), ..Settings::default() };
     ///
     /// let bytes = RadianceCaches::new(settings).to_bytes(7);
@@ -310,7 +310,7 @@ fn rows(file: &[u8], tag: u64) -> Result<Rows<'_>, CachesError> {
         return Err(CachesError::Checksum);
     }
     let (table, views) = tables.split_at(parts as usize * ROW);
-    let lengths = table.chunks_exact(ROW).map(|row| long(row, 28));
+    let lengths = table.chunks_exact(ROW).map(|row| long(row, 32));
     let before = (HEADER + tables.len()) as u64;
     let due = lengths.fold(before, u64::saturating_add);
     if due != file.len() as u64 {
@@ -326,9 +326,10 @@ fn rows(file: &[u8], tag: u64) -> Result<Rows<'_>, CachesError> {
             samples: word(row, 12),
             limits: Limits { min: number(16), max: number(20) },
             clearance: number(24),
+            free_paths: number(28),
         };
         // Their sum is the length of the rest.
-        let (bytes, others) = rest.split_at_checked(long(row, 28) as usize).ok_or(CachesError::Parts)?;
+        let (bytes, others) = rest.split_at_checked(long(row, 32) as usize).ok_or(CachesError::Parts)?;
         (*slot, rest) = (Some(Row { effort, bytes }), others);
     }
     if long(header, 24) != tag {

@@ -24,6 +24,10 @@ pub struct Effort {
     /// Greatest radius as a multiple of the distance to the nearest surface ([`clearance`](super::clearance)), wherever
     /// that is more than [`Settings::finest`] and [`Effort::limits`] allow it; infinite for no such bound.
     pub clearance: f32,
+    /// Greatest radius in free paths `1/σₜ` of the medium at the record, for light scattered more than once in `1/(σₜ √(1 − g))`;
+    /// infinite for no such bound. Larger: what walks end in misses light, and every scattering adds to what is missing. Smaller:
+    /// records, by the cube.
+    pub free_paths: f32,
 }
 
 impl Effort {
@@ -38,10 +42,10 @@ impl Effort {
 /// ```
 /// use fogbow::cache::{Effort, Kind, Limits, Settings};
 /// let limits = Limits { min: 0.01, max: 1.0 };
-/// let effort = Effort { tolerance: 0.5, samples: 1024, degree: 2, limits, clearance: 2.0 };
+/// let effort = Effort { tolerance: 0.5, samples: 1024, degree: 2, limits, clearance: 2.0, free_paths: 1.0 };
 /// let settings = Settings { multiple: Some(effort), ..Settings::default() };
 /// // The records at which walks end follow from those of the picture.
-/// assert_eq!(settings.effort(Kind::CoarseMultiple).unwrap().samples, 128);
+/// assert_eq!(settings.effort(Kind::CoarseMultiple).unwrap().samples, 256);
 /// assert!(settings.effort(Kind::Single).is_none());
 ///
 /// // Four times the walks halve the noise of records.
@@ -126,10 +130,10 @@ impl Settings {
             Kind::Surface => self.surface,
             Kind::Multiple => self.multiple,
             Kind::Irradiance => self.irradiance,
-            // As fine as the final ones, with an eighth of the samples. What they get wrong is what all walks bring along,
+            // As fine as the final ones, with a quarter of the samples. What they get wrong is what all walks bring along,
             // more of it with every scattering, and in corners most: so none reaches past a surface.
             Kind::CoarseMultiple => {
-                self.multiple.map(|e| Effort { clearance: e.clearance.min(1.0), ..e.coarser(1.0, 8) })
+                self.multiple.map(|e| Effort { clearance: e.clearance.min(1.0), ..e.coarser(1.0, 4) })
             }
             Kind::CoarseIrradiance => self.irradiance.map(|e| e.coarser(3.0, 8)),
         }

@@ -183,7 +183,7 @@ pub(super) enum Inserted {
 }
 
 /// Caches by kind, and what is the same for one of each.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(super) struct ByKind<T>(pub(super) [T; Kind::COUNT]);
 
 impl<T> core::ops::Index<Kind> for ByKind<T> {

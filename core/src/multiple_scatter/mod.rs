@@ -29,11 +29,13 @@
 //! |---|---|
 //! | `weight` | [`Weight`]: a path's weight and its gradient, in forward mode; [`Shift`]: how vertices move |
 //! | `flight` | the distance to the next collision: marched, by delta tracking, or by J's Eq. 29 |
+//! | `lamps` | directions towards lamps without extent |
 //! | `walk` | [`Walk`]: one path; [`Incoming`]: the light it brings |
 //! | `estimate` | [`sample`], [`sample_directional`]: sums over paths |
 
 mod estimate;
 mod flight;
+mod lamps;
 mod walk;
 mod weight;
 

@@ -129,6 +129,43 @@ pub fn uniform_cone_pdf(one_minus_cos: f32) -> f32 {
     1.0 / (2.0 * PI * one_minus_cos)
 }
 
+/// A direction within a cone around +z of half angle `widest` (rad), uniform in its angle θ to the axis: the denser, the
+/// closer to it. As light that rays collect from a lamp that they pass goes like `1/sin θ`, too, samples of it have a bound.
+///
+/// ```
+/// # use fogbow::{math::Vec2, sampling::warp::steep_cone};
+/// let direction = steep_cone(Vec2::new(0.5, 0.0), 1.0);
+/// assert!((direction.x - 0.5f32.sin()).abs() < 1e-6);
+/// ```
+#[inline]
+#[must_use]
+pub fn steep_cone(u: Vec2, widest: f32) -> Vec3 {
+    let (sin, cos) = float::sin_cos(u.x * widest);
+    spherical(cos, sin, u.y)
+}
+
+/// Density (sr⁻¹) of [`steep_cone`] in a unit direction whose cross product with the axis is `across`, and dot product `along`.
+///
+/// ```text
+/// p = 1/(2π θ_max sin θ)
+/// ```
+///
+/// ```
+/// # use fogbow::{math::{Vec3, float::PI}, sampling::warp::steep_cone_pdf};
+/// let axis = Vec3::Z;
+/// let pdf = |direction: Vec3| steep_cone_pdf(axis.cross(direction).length(), axis.dot(direction), 0.5 * PI);
+/// assert!((pdf(Vec3::new(0.6, 0.0, 0.8)) * 2.0 * PI * 0.5 * PI * 0.6 - 1.0).abs() < 1e-6);
+/// assert_eq!(pdf(Vec3::NEG_Z), 0.0);   // outside
+/// ```
+#[inline]
+#[must_use]
+pub fn steep_cone_pdf(across: f32, along: f32, widest: f32) -> f32 {
+    if libm::atan2f(across, along) > widest {
+        return 0.0;
+    }
+    1.0 / (2.0 * PI * widest * across.max(f32::MIN_POSITIVE))
+}
+
 /// Barycentric coordinates `(b₁, b₂)` of a uniform point in a triangle, without a fold
 /// (Heitz 2019); area density 1 / area.
 ///

@@ -4,7 +4,9 @@ use std::path::{Path, PathBuf};
 
 use clap::{Arg, Args, ValueEnum};
 use fogbow::bytes::Crc;
-use fogbow::cache::{self, Asked, CachedRadiance, CachesError, Effort, Extrapolation, RadianceCaches, RaySettings};
+use fogbow::cache::{
+    self, Asked, Audit, CachedRadiance, CachesError, Effort, Extrapolation, Findings, RadianceCaches, RaySettings,
+};
 use fogbow::covariance::image_sampling::Plan;
 use fogbow::host::Medium;
 use fogbow::light::Light;
@@ -20,7 +22,7 @@ use fogbow_std::progress::Control;
 use fogbow_std::radiance_cache as files;
 use fogbow_std::stats::{CountingMedium, CountingScene, Seconds, Stopwatch};
 use fogbow_std::threads::{self, Threads};
-use fogbow_std::tiles::{self, Outcome};
+use fogbow_std::tiles::{self, Outcome, Reason};
 
 use super::defaults::{unit_outline, with_default};
 use super::image_sampling::is_computed;
@@ -54,8 +56,12 @@ pub struct CacheArguments {
     #[arg(long, value_enum)]
     pub extrapolation: Option<Carrying>,
     /// How light straight from the lights is scattered once.
-    #[arg(long, value_enum, default_value_t = Single::Auto)]
+    #[arg(long, value_enum, default_value_t = Single::Direct)]
     pub single: Single,
+    /// Eye rays along which the picture is compared with path tracing afterwards, to say how far it is off; 0 for no such comparison
+    /// [default: as many as take about a twentieth of the time].
+    #[arg(long, value_name = "N")]
+    pub audit: Option<u32>,
     /// Starts from the records in this file, and adds only what is missing: made by --cache-out for the same scene
     /// and the same options; the camera may be another.
     #[arg(long, value_name = "FILE")]
@@ -172,11 +178,9 @@ impl From<Kind> for cache::Kind {
 /// What becomes of single scattering.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum Single {
-    /// Cached where there are many lights.
-    Auto,
     /// Connections to the lights from every point: sharp shadows and peaked phase functions.
     Direct,
-    /// Cached.
+    /// Cached: for fog in which most points see no light; blurs what is close to lamps.
     Cached,
 }
 
@@ -226,6 +230,8 @@ pub(super) struct Cached {
     /// Time to read and write them.
     pub(super) files: [Seconds; 2],
     pub(super) render: Outcome,
+    /// How far the picture is off; `None` if nobody asked, or if the render was stopped.
+    pub(super) findings: Option<Findings>,
 }
 
 impl CacheJob<'_> {
@@ -234,9 +240,8 @@ impl CacheJob<'_> {
         let arguments = self.arguments;
         let preset = cache::Settings::for_outline(outline).for_pixels(self.film.width() * self.film.height());
         let mut settings = match arguments.single {
-            Single::Auto => preset,
-            Single::Direct => preset.with_single_cached(outline, false),
-            Single::Cached => preset.with_single_cached(outline, true),
+            Single::Direct => preset,
+            Single::Cached => preset.with_single_cached(outline),
         };
         if let Some(walks) = arguments.paths {
             settings = settings.with_walks(walks);
@@ -281,8 +286,9 @@ impl WithMedium for CacheJob<'_> {
         let loaded = clock.elapsed();
         let mut filling = caches.fill(Asked::View { ray, pixel: apart });
         let pool = Threads::new(self.settings.threads)?;
-        let filled = threads::run(&mut filling, &world, &pool, self.control, None, |_| {}).stages;
+        let mut filled = threads::run(&mut filling, &world, &pool, self.control, None, |_| {}).stages;
         let computed = cache::Kind::ALL.into_iter().map(|kind| filling.computed(kind)).sum();
+        let audit_rays = self.arguments.audit.unwrap_or_else(|| filling.audit_rays());
         let caches = filling.finish();
         let clock = Stopwatch::start();
         if let Some(file) = &self.arguments.cache_out {
@@ -325,6 +331,12 @@ impl WithMedium for CacheJob<'_> {
                 *total = seen.total();
             }
         })?;
-        Ok(Cached { caches, filled, computed, files, render })
+        let is_whole = render.reason == Reason::Done && self.paths.max_scatterings > 0;
+        let findings = (is_whole && audit_rays > 0).then(|| {
+            let mut audit = Audit::new(&caches, ray, audit_rays);
+            filled.extend(threads::run(&mut audit, &world, &pool, self.control, None, |_| {}).stages);
+            audit.findings()
+        });
+        Ok(Cached { caches, filled, computed, files, render, findings })
     }
 }

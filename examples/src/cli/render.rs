@@ -5,7 +5,7 @@ use core::time::Duration;
 use std::path::PathBuf;
 
 use clap::{Arg, Args, ValueEnum};
-use fogbow::cache::{self, Kind, RadianceCaches};
+use fogbow::cache::{self, Findings, Kind, RadianceCaches};
 use fogbow::covariance::image_sampling::Plan;
 use fogbow::covariance::{CovarianceGrid, GridView};
 use fogbow::host::Medium;
@@ -181,6 +181,8 @@ pub(crate) struct Rendered {
     pub(crate) caches: Option<RadianceCaches<'static>>,
     /// Of virtual lights, where it was asked for.
     pub(crate) audit: Option<Audit>,
+    /// How far a picture from caches is off.
+    pub(crate) findings: Option<Findings>,
 }
 
 pub(super) fn run(arguments: &RenderArguments) -> Result<Ending, Failure> {
@@ -193,14 +195,15 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<Ending, Failure> {
         }
         rendered => rendered?,
     };
-    let Rendered { mut film, outcome, mut statistics, audit, .. } = rendered;
+    let Rendered { mut film, outcome, mut statistics, audit, findings, .. } = rendered;
     if !arguments.aov && film.layers().len() > 1 {
         film = film.first(1)?;
     }
     statistics.time("write", || outputs.iter().try_for_each(|file| write_film(file, &film, arguments.exposure)))?;
 
     let size = (film.width(), film.height());
-    let report = Report { arguments, outputs: &outputs, outcome: &outcome, statistics: &statistics, size, audit };
+    let report =
+        Report { arguments, outputs: &outputs, outcome: &outcome, statistics: &statistics, size, audit, findings };
     if let Some(file) = &arguments.stats {
         std::fs::write(file, report.json()).map_err(|e| format!("{}: cannot be written: {e}", file.display()))?;
     }
@@ -297,7 +300,7 @@ pub(crate) fn render(arguments: &RenderArguments) -> Result<Rendered, Failure> {
         grid: grid.as_ref(),
         plan: plan.as_ref(),
     };
-    let (mut cached, mut audit) = (None, None);
+    let (mut cached, mut audit, mut findings) = (None, None, None);
     let outcome = match arguments.method {
         Method::Path => world.media().with(Job { shot, film: &mut film })?,
         Method::PhotonBeams => world.media().with(BeamJob { shot, film: &mut film, arguments: &arguments.beams })?,
@@ -346,10 +349,11 @@ pub(crate) fn render(arguments: &RenderArguments) -> Result<Rendered, Failure> {
             statistics.records.push((kind.name().to_owned(), cached.caches.records(kind).len() as u64));
         }
         statistics.records.push(("computed".to_owned(), cached.computed));
+        findings = cached.findings;
     }
     statistics.add("render", outcome.seconds);
     statistics.counters = outcome.counters;
-    Ok(Rendered { film, outcome, statistics, camera, caches: cached.map(|c| c.caches), audit })
+    Ok(Rendered { film, outcome, statistics, camera, caches: cached.map(|c| c.caches), audit, findings })
 }
 
 impl RenderArguments {

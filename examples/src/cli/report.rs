@@ -3,6 +3,7 @@
 use core::fmt::Write;
 use std::path::PathBuf;
 
+use fogbow::cache::{Deviation, Findings, Kind};
 use fogbow_std::progress::Progress;
 use fogbow_std::stats::Seconds;
 use fogbow_std::tiles::{Outcome, Reason};
@@ -66,6 +67,7 @@ pub(super) struct Report<'a> {
     pub(super) statistics: &'a Statistics,
     pub(super) size: (u32, u32),
     pub(super) audit: Option<Audit>,
+    pub(super) findings: Option<Findings>,
 }
 
 impl Report<'_> {
@@ -88,6 +90,18 @@ impl Report<'_> {
         eprintln!("{width} x {height} pixels, {} samples per pixel{ending}", self.samples_per_pixel());
         let cpu = cpu.map_or_else(String::new, |c| format!(", {} of processor time", clock(c)));
         eprintln!("{}{cpu}, {:.2} million rays per second", clock(wall), self.rays_per_second() * 1e-6);
+        if let Some(findings) = &self.findings {
+            eprintln!(
+                "bias {} of what is cached{}; {} of all light, by path tracing along {} eye rays",
+                percent(&findings.cached),
+                blamed(findings),
+                percent(&findings.all),
+                findings.rays,
+            );
+            if findings.all.exceeds(SERIOUS) || findings.cached.exceeds(SERIOUS) {
+                eprintln!("warning: the picture is off by more than {:.0} %; --method path is not", 100.0 * SERIOUS);
+            }
+        }
         if counters.non_finite > 0 {
             eprintln!("warning: {} samples were no finite numbers and count as black", counters.non_finite);
         }
@@ -135,13 +149,23 @@ impl Report<'_> {
                 recovered.join(", "),
             )
         });
+        let findings = self.findings.as_ref().map_or_else(String::new, |findings| {
+            let number = |x: f64| if x.is_finite() { format!("{x:.6e}") } else { "null".to_owned() };
+            let entry = |name: &str, found: &Deviation| {
+                format!("{}: {{\"bias\": {}, \"error\": {}}}", quoted(name), number(found.bias), number(found.error))
+            };
+            let parts = Kind::FINAL.into_iter().filter_map(|kind| Some(entry(kind.name(), &findings.of(kind)?)));
+            let all: Vec<String> =
+                [entry("all", &findings.all), entry("cached", &findings.cached)].into_iter().chain(parts).collect();
+            format!("\"audit\": {{\"rays\": {}, {}}},\n  ", findings.rays, all.join(", "))
+        });
         let (bytes, records) = (listed(&self.statistics.bytes), listed(&self.statistics.records));
         format!(
             "{{\n  \"scene\": {},\n  \"method\": \"{}\",\n  \"width\": {},\n  \"height\": {},\n  \
              \"samples_per_pixel\": {},\n  \"seed\": {},\n  \"ended\": \"{reason}\",\n  \
              \"seconds\": {{{phases}\n  }},\n  \"counts\": {{\"samples\": {}, \"rays\": {}, \"shadow_rays\": {}, \
              \"collisions\": {}, \"medium_lookups\": {}, \"medium_segments\": {}, \"cache_lookups\": {}, \"cache_misses\": {}, \"non_finite\": {}}},\n  \
-             {energy}\"records\": {{{records}}},\n  \"bytes\": {{{bytes}}}\n}}\n",
+             {energy}{findings}\"records\": {{{records}}},\n  \"bytes\": {{{bytes}}}\n}}\n",
             quoted(&self.arguments.scene.display().to_string()),
             match self.arguments.method {
                 Method::Path => "path",
@@ -166,6 +190,30 @@ impl Report<'_> {
         )
     }
 }
+
+/// Bias from which on a picture from caches comes with a warning.
+const SERIOUS: f64 = 0.02;
+
+/// `−0.3 ± 0.4 %`.
+fn percent(found: &Deviation) -> String {
+    if !found.error.is_finite() {
+        return "unknown".to_owned();
+    }
+    format!("{:+.1} ± {:.1} %", 100.0 * found.bias, 100.0 * found.error).replace('-', "−")
+}
+
+/// The caches that are certainly off, if the picture may be.
+fn blamed(findings: &Findings) -> String {
+    let parts = Kind::FINAL.into_iter().filter_map(|kind| Some((kind.name(), findings.of(kind)?)));
+    let names: Vec<String> = parts
+        .filter(|(_, found)| found.exceeds(0.0) && found.bias.abs() >= LITTLE)
+        .map(|(name, found)| format!("{name} {}", percent(&found)))
+        .collect();
+    if names.is_empty() { String::new() } else { format!(" (by cache: {})", names.join(", ")) }
+}
+
+/// Bias of a single cache, as a part of all light, that is worth a word.
+const LITTLE: f64 = 0.005;
 
 /// A string of JSON.
 fn quoted(text: &str) -> String {

@@ -90,7 +90,16 @@ const ROUND: usize = 8;
 #[must_use]
 pub fn cache_settings() -> cache::Settings {
     let limits = Limits { min: 1.5, max: 4.0 };
-    let effort = |degree| Some(Effort { tolerance: 1.0, samples: 16, degree, limits, clearance: f32::INFINITY });
+    let effort = |degree| {
+        Some(Effort {
+            tolerance: 1.0,
+            samples: 16,
+            degree,
+            limits,
+            clearance: f32::INFINITY,
+            free_paths: f32::INFINITY,
+        })
+    };
     cache::Settings {
         single: effort(DEGREE),
         surface: effort(DEGREE),

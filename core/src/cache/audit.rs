@@ -1,0 +1,250 @@
+//! How far pictures made from caches are off, measured against path tracing.
+//!
+//! Along eye rays drawn all over the picture, with random numbers of their own, the light that caches tell is compared with
+//! that of a path. The mean of the differences is the bias, whatever made it; their spread says how well it is known. To tell
+//! which cache is to blame, the same rays ask each of them, and at the same points an estimate that knows no cache.
+//!
+//! ```text
+//! b = Σ d_j / Σ t_j,   s² = J/(J − 1) Σ (d_j − b t_j)² / (Σ t_j)²
+//! ```
+//!
+//! over `J` groups of rays, of which `d_j` is the sum of the differences and `t_j` that of the light of paths: a ratio
+//! estimate with its standard error (Cochran 1977, *Sampling Techniques*, § 6.4).
+
+use core::ops::Range;
+
+use super::Estimator;
+use super::caches::RadianceCaches;
+use super::eye::{CachedRadiance, Caches, radiance};
+use super::kind::Kind;
+use super::slot::ByKind;
+use crate::host::{Medium, Scene};
+use crate::math::Ray;
+use crate::path;
+use crate::sampling::uniform::mix;
+use crate::sampling::{even2, independent};
+use crate::spectrum::Spectrum;
+use crate::work::Rounds;
+use crate::world::World;
+
+/// Eye rays of a group, and of a job.
+const GROUP: u32 = 16;
+
+/// Standard errors beyond which a difference is no chance.
+const SURE: f64 = 3.0;
+
+/// A relative deviation and how well it is known.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Deviation {
+    /// Of the mean light of the picture: −0.01 is one per cent too dark.
+    pub bias: f64,
+    /// Its standard error.
+    pub error: f64,
+}
+
+impl Deviation {
+    /// Whether it is certainly more than `most`: by three standard errors.
+    ///
+    /// ```
+    /// # use fogbow::cache::Deviation;
+    /// let dark = Deviation { bias: -0.05, error: 0.005 };
+    /// assert!(dark.exceeds(0.02) && !dark.exceeds(0.04));
+    /// ```
+    #[must_use]
+    pub fn exceeds(&self, most: f64) -> bool {
+        self.bias.abs() - SURE * self.error > most
+    }
+}
+
+/// What an [`Audit`] has found.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Findings {
+    /// Eye rays compared.
+    pub rays: u32,
+    /// Of all light together, against path tracing: whatever made it.
+    pub all: Deviation,
+    /// Of the light that is cached, as a part of all light, against estimates without caches at the same points: better known.
+    pub cached: Deviation,
+    /// Of the light that one cache holds, as a part of all light; `None` for a kind that is not cached.
+    parts: ByKind<Option<Deviation>>,
+}
+
+impl Findings {
+    /// Of the light of one kind ([`Kind::FINAL`]), as a part of all light; `None` if it is not cached.
+    #[must_use]
+    pub fn of(&self, kind: Kind) -> Option<Deviation> {
+        self.parts[kind]
+    }
+}
+
+/// Sums over groups of rays.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+struct Moments {
+    d: f64,
+    dd: f64,
+    dt: f64,
+}
+
+impl Moments {
+    fn add(&mut self, difference: f64, truth: f64) {
+        self.d += difference;
+        self.dd += difference * difference;
+        self.dt += difference * truth;
+    }
+
+    /// As a part of the sum `t` of `truth`, whose squares sum to `tt`, over `groups` groups.
+    fn deviation(&self, t: f64, tt: f64, groups: f64) -> Deviation {
+        if !(t > 0.0 && groups > 1.0) {
+            return Deviation { bias: 0.0, error: f64::INFINITY };
+        }
+        let bias = self.d / t;
+        let squares = (self.dd - 2.0 * bias * self.dt + bias * bias * tt).max(0.0);
+        Deviation { bias, error: libm::sqrt(squares * groups / (groups - 1.0)) / t }
+    }
+}
+
+/// What a job leaves.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Compared {
+    /// Rays, and the sum of the light of their paths.
+    rays: u32,
+    truth: f64,
+    all: f64,
+    parts: [f64; 4],
+}
+
+/// Compares [`RadianceCaches`] with path tracing, as [`Rounds`] of jobs of 16 eye rays: any number of them can be run, and what was
+/// found so far read at any time.
+///
+/// ```
+/// # #[cfg(feature = "alloc")] {
+/// # use fogbow::{cache::{Asked, Audit, Kind, RadianceCaches, Settings}, host::Empty, light::{Light, PointLight}};
+/// # use fogbow::{math::{Bounds, Ray, Vec3}, medium::Homogeneous, phase::Phase, spectrum::Spectrum};
+/// # use fogbow::{work::finish, world::{Outline, World}};
+/// # let fog = Homogeneous::new(Spectrum::ONE, Spectrum::ONE, Phase::ISOTROPIC)?;
+/// # let lamps = [Light::Point(PointLight::new(Vec3::ZERO, Spectrum::ONE)?)];
+/// # let world = World { medium: &fog, scene: &Empty, lights: &lamps };
+/// # let bounds = Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE };
+/// let settings = Settings { rays: 64, ..Settings::for_outline(&Outline::of(&world, bounds)).with_walks(64) };
+/// let camera = |at: [f32; 2]| Ray::new(2.0 * Vec3::Z, Vec3::new(at[0] - 0.5, at[1] - 0.5, -1.0).normalize());
+/// let caches = RadianceCaches::new(settings);
+/// let mut filling = caches.fill(Asked::View { ray: camera, pixel: 0.02 });
+/// finish(&mut filling, &world, &mut Default::default());
+/// let caches = filling.finish();
+/// let mut audit = Audit::new(&caches, camera, 4096);
+/// finish(&mut audit, &world, &mut Default::default());
+/// let found = audit.findings();
+/// assert!(found.all.error < 0.1 && !found.all.exceeds(0.1), "{found:?}");
+/// assert!(found.of(Kind::Multiple).is_some() && found.of(Kind::Single).is_none());
+/// # }
+/// # Ok::<(), Box<dyn core::error::Error>>(())
+/// ```
+#[derive(Debug)]
+pub struct Audit<'c, 's, F> {
+    caches: &'c RadianceCaches<'s>,
+    ray: F,
+    jobs: u32,
+    taken: u32,
+    rays: u32,
+    truth: [f64; 2],
+    all: Moments,
+    cached: Moments,
+    parts: [Moments; 4],
+}
+
+impl<'c, 's, F: Fn([f32; 2]) -> Ray> Audit<'c, 's, F> {
+    /// Of pictures whose pixels see along `ray(at)`, `at` in the unit square, by about `rays` of them. The more, the better the bias is known:
+    /// four times as many halve its error.
+    #[must_use]
+    pub fn new(caches: &'c RadianceCaches<'s>, ray: F, rays: u32) -> Self {
+        let jobs = rays.div_ceil(GROUP).max(2);
+        Self {
+            caches,
+            ray,
+            jobs,
+            taken: 0,
+            rays: 0,
+            truth: [0.0; 2],
+            all: Moments::default(),
+            cached: Moments::default(),
+            parts: [Moments::default(); 4],
+        }
+    }
+
+    /// What was found so far.
+    #[must_use]
+    pub fn findings(&self) -> Findings {
+        let ([t, tt], groups) = (self.truth, f64::from(self.taken));
+        let mut parts = ByKind([None; Kind::COUNT]);
+        for (kind, moments) in Kind::FINAL.into_iter().zip(&self.parts) {
+            let is_cached = self.caches.settings.effort(kind).is_some();
+            parts[kind] = is_cached.then(|| moments.deviation(t, tt, groups));
+        }
+        let [all, cached] = [self.all, self.cached].map(|moments| moments.deviation(t, tt, groups));
+        Findings { rays: self.rays, all, cached, parts }
+    }
+}
+
+/// Light by the cache that may hold it, in the order of [`Kind::FINAL`].
+fn by_kind(seen: &CachedRadiance) -> [Spectrum; 4] {
+    [seen.medium_single, seen.medium_surface, seen.medium_multiple, seen.surface_indirect]
+}
+
+impl<M, S, F> Rounds<World<'_, M, S>> for Audit<'_, '_, F>
+where
+    M: Medium + ?Sized,
+    S: Scene + ?Sized,
+    F: Fn([f32; 2]) -> Ray,
+{
+    type Output<'o> = Compared;
+
+    fn jobs(&self) -> Range<u32> {
+        self.taken..self.jobs
+    }
+
+    fn run(&self, job: u32, world: &World<'_, M, S>, output: &mut Compared) {
+        *output = Compared::default();
+        let settings = &self.caches.settings;
+        let cached = self.caches.estimator(world);
+        let alone = Estimator { surfaces: None, scattered: None, ..cached };
+        let seed = mix(settings.seed ^ 0x6175_6469_7421_0b5e);
+        for i in 0..GROUP {
+            let number = job * GROUP + i;
+            let ray = (self.ray)(even2(number));
+            // Both meet the same points, as they draw the same numbers.
+            let rng = |stream| independent(seed, u64::from(number), stream);
+            let told = radiance(&ray, &cached, &self.caches.reader(), &settings.eye, &mut rng(0));
+            let known = radiance(&ray, &alone, &Caches::default(), &settings.eye, &mut rng(0));
+            let truth = path::radiance(&ray, world, &settings.paths, &mut rng(1)).total();
+            // A sample that is no number says nothing.
+            if !(told.total().is_finite() && known.total().is_finite() && truth.is_finite()) {
+                continue;
+            }
+            output.rays += 1;
+            output.truth += f64::from(truth.mean());
+            output.all += f64::from(told.total().mean()) - f64::from(truth.mean());
+            for (sum, (told, known)) in output.parts.iter_mut().zip(by_kind(&told).into_iter().zip(by_kind(&known))) {
+                *sum += f64::from(told.mean()) - f64::from(known.mean());
+            }
+        }
+    }
+
+    fn accept(&mut self, output: &Compared) {
+        if self.taken >= self.jobs {
+            return;
+        }
+        self.taken += 1;
+        self.rays += output.rays;
+        self.truth[0] += output.truth;
+        self.truth[1] += output.truth * output.truth;
+        self.all.add(output.all, output.truth);
+        self.cached.add(output.parts.iter().sum(), output.truth);
+        for (moments, part) in self.parts.iter_mut().zip(output.parts) {
+            moments.add(part, output.truth);
+        }
+    }
+
+    fn stage(&self) -> &'static str {
+        "audit"
+    }
+}
