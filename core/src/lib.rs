@@ -19,7 +19,7 @@
 //! let ray = |at: [f32; 2]| Ray::new(Vec3::Z * 3.0, Vec3::new(0.8 * at[0] - 0.4, 0.8 * at[1] - 0.4, -1.0).normalize());
 //!
 //! let outline = Outline::of(&world, Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE });
-//! let settings = Settings::for_outline(&outline);
+//! let settings = Settings::for_outline(&outline, 0.02);
 //! # let settings = Settings { rays: 64, ..settings.with_walks(16) };
 //! let mut filling = RadianceCaches::new(settings).fill(Asked::View { ray, pixel: 0.005 });
 //! work::finish(&mut filling, &world, &mut FilledRecords::default()); // Or job by job, or on threads: see `work`.

@@ -125,7 +125,7 @@ pub struct Compared {
 /// # let lamps = [Light::Point(PointLight::new(Vec3::ZERO, Spectrum::ONE)?)];
 /// # let world = World { medium: &fog, scene: &Empty, lights: &lamps };
 /// # let bounds = Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE };
-/// let settings = Settings { rays: 64, ..Settings::for_outline(&Outline::of(&world, bounds)).with_walks(64) };
+/// let settings = Settings { rays: 64, ..Settings::for_outline(&Outline::of(&world, bounds), 0.02).with_walks(64) };
 /// let camera = |at: [f32; 2]| Ray::new(2.0 * Vec3::Z, Vec3::new(at[0] - 0.5, at[1] - 0.5, -1.0).normalize());
 /// let caches = RadianceCaches::new(settings);
 /// let mut filling = caches.fill(Asked::View { ray: camera, pixel: 0.02 });

@@ -27,7 +27,7 @@ use crate::world::World;
 /// let bounds = Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE };
 ///
 /// // Anywhere in a box: coarser than usual, so that this example is quick.
-/// let settings = Settings { rays: 200, ..Settings::for_outline(&Outline::of(&world, bounds)).with_walks(64) };
+/// let settings = Settings { rays: 200, ..Settings::for_outline(&Outline::of(&world, bounds), 0.02).with_walks(64) };
 /// let mut filling = RadianceCaches::new(settings).fill(Asked::<fn([f32; 2]) -> Ray>::Box(bounds));
 /// work::finish(&mut filling, &world, &mut FilledRecords::default());
 /// assert!(!filling.is_cut() && filling.computed(Kind::Multiple) > 0);

@@ -103,7 +103,7 @@ enum Round {
 /// # let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::ONE, Phase::ISOTROPIC)?;
 /// # let world = World { medium: &fog, scene: &Empty, lights: &[] };
 /// # let bounds = Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE };
-/// # let settings = Settings { rays: 20, ..Settings::for_outline(&Outline::of(&world, bounds)).with_walks(16) };
+/// # let settings = Settings { rays: 20, ..Settings::for_outline(&Outline::of(&world, bounds), 0.02).with_walks(16) };
 /// # let asked = Asked::<fn([f32; 2]) -> Ray>::Box(bounds);
 /// let mut filling = RadianceCaches::new(settings).fill_in(FillingMemory::default(), asked);
 /// let mut output = FilledRecords::default();
@@ -163,7 +163,7 @@ impl<'s> RadianceCaches<'s> {
     /// # let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::ONE, Phase::ISOTROPIC)?;
     /// # let world = World { medium: &fog, scene: &Empty, lights: &[] };
     /// # let bounds = Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE };
-    /// # let settings = Settings { rays: 20, ..Settings::for_outline(&Outline::of(&world, bounds)).with_walks(16) };
+    /// # let settings = Settings { rays: 20, ..Settings::for_outline(&Outline::of(&world, bounds), 0.02).with_walks(16) };
     /// # let asked = || Asked::<fn([f32; 2]) -> Ray>::Box(bounds);
     /// let mut output = FilledRecords::default();
     /// let mut filling = RadianceCaches::new(settings).fill_in(FillingMemory::default(), asked());

@@ -49,7 +49,7 @@ impl<'o> FilledRecords<'o> {
     /// # let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::ONE, Phase::ISOTROPIC)?;
     /// # let world = World { medium: &fog, scene: &Empty, lights: &[] };
     /// # let bounds = Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE };
-    /// # let settings = Settings { rays: 20, ..Settings::for_outline(&Outline::of(&world, bounds)).with_walks(16) };
+    /// # let settings = Settings { rays: 20, ..Settings::for_outline(&Outline::of(&world, bounds), 0.02).with_walks(16) };
     /// # let asked = || Asked::<fn([f32; 2]) -> Ray>::Box(bounds);
     /// let room = room_for(&settings, 2000, 100);
     /// let (mut wanted, mut open) = (vec![Wanted::default(); room.of_job_wanted], vec![0; room.of_job_open]);
@@ -94,7 +94,7 @@ impl<'s> FillingMemory<'s> {
     /// # let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::ONE, Phase::ISOTROPIC)?;
     /// # let world = World { medium: &fog, scene: &Empty, lights: &[] };
     /// # let bounds = Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE };
-    /// # let settings = Settings { rays: 20, ..Settings::for_outline(&Outline::of(&world, bounds)).with_walks(16) };
+    /// # let settings = Settings { rays: 20, ..Settings::for_outline(&Outline::of(&world, bounds), 0.02).with_walks(16) };
     /// # let asked = || Asked::<fn([f32; 2]) -> Ray>::Box(bounds);
     /// let room = room_for(&settings, 2000, 100);
     /// let mut wanted = vec![Wanted::default(); room.wanted];

@@ -3,6 +3,7 @@
 use super::kind::Kind;
 use super::radius::Limits;
 use super::settings::{Effort, LEAST_RAYS, MOST_RAYS, Settings};
+use crate::math::float;
 use crate::multiple_scatter::{self, Lengths};
 use crate::phase::Phase;
 use crate::sh;
@@ -66,16 +67,24 @@ const LEFT_OUT: f32 = 2.5e-4;
 /// Light of surfaces has an expansion of its own that falls off like this power of the degree: directions to walls are no points.
 const SURFACE_FALL_OFF: f32 = 1.5;
 
-/// Noise that a picture from caches is sampled to: of the size of that of its records. Less: samples for errors that records keep;
-/// more: edges and direct light are noisier than the rest.
-pub const USUAL_NOISE: f32 = 0.02;
+/// The relative error that pictures may have unless told otherwise, noise and bias together. All numbers of this file are for it.
+pub const USUAL_ERROR: f32 = 0.02;
+
+/// Bounds of the error asked for: below, records take hours; above, a picture tells nothing.
+const ERRORS: [f32; 2] = [1e-3, 0.5];
+
+/// Bounds of the factor of tolerances: beyond, gradients say nothing of what light does; below, records are more than they mend.
+const COARSEST: f32 = 1.5;
 
 /// The most samples per pixel for that. More: time at edges between black and a lamp, where noise falls no faster; fewer: jagged edges.
 pub const MOST_SAMPLES: u32 = 256;
 
 impl Settings {
-    /// What suits a world, at about 2 % of error where fog fills a room; seed 0. What each number does, and what happens when it
-    /// is larger or smaller, stands in `cache/presets.rs`; change fields at will.
+    /// What suits a world for pictures whose relative error is about `error` ([`USUAL_ERROR`]; within 0.001 and 0.5), noise and bias together;
+    /// seed 0. What each number does, and what happens when it is larger and smaller, stands in `cache/presets.rs`; change fields at will.
+    ///
+    /// Noise falls with the root of the number of samples, and what extrapolation gets wrong goes with the square of radii: so for `s`
+    /// times the error, samples are divided by `s²` and tolerances multiplied by `√s`. [`Audit`](super::Audit) tells what came of it.
     ///
     /// ```
     /// # use fogbow::{cache::Settings, host::Empty, light::{Light, PointLight}, math::{Bounds, Vec3}};
@@ -84,32 +93,40 @@ impl Settings {
     /// let lamps = [Light::Point(PointLight::new(Vec3::Z, Spectrum::ONE)?)];
     /// let world = World { medium: &fog, scene: &Empty, lights: &lamps };
     /// let bounds = Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE };
-    /// let settings = Settings::for_outline(&Outline::of(&world, bounds));
+    /// let settings = Settings::for_outline(&Outline::of(&world, bounds), 0.02);
     /// // One lamp is connected to; the sharper fog scatters, the finer are records of light scattered often.
     /// assert!(settings.single.is_none());
     /// assert!((settings.multiple.unwrap().tolerance - 0.4).abs() < 1e-6);
+    /// // Half the error: four times the walks.
+    /// let finer = Settings::for_outline(&Outline::of(&world, bounds), 0.01);
+    /// assert_eq!(finer.multiple.unwrap().samples, 4 * settings.multiple.unwrap().samples);
     /// # Ok::<(), Box<dyn core::error::Error>>(())
     /// ```
     #[must_use]
-    pub fn for_outline(outline: &Outline) -> Self {
+    pub fn for_outline(outline: &Outline, error: f32) -> Self {
+        // NaN becomes the least.
+        let scale = error.max(ERRORS[0]).min(ERRORS[1]) / USUAL_ERROR;
+        let coarser = float::sqrt(scale).min(COARSEST);
+        let walks = (f64::from(WALKS) / f64::from(scale * scale)) as u32;
         let size = outline.bounds.size().max_element();
         let phase = &outline.phase;
         let sharpness = f64::from(phase.mean_cosine().map(f32::abs).max_element());
         let breadth = (1.0 - sharpness).clamp(BREADTH[0], BREADTH[1]) as f32;
         let free_paths = |kind| match kind {
-            Kind::Surface => FREE_PATHS[0],
-            Kind::Multiple => FREE_PATHS[1],
+            Kind::Surface => FREE_PATHS[0] * coarser.min(1.0),
+            // What comes back with every scattering cannot be made up for.
+            Kind::Multiple => FREE_PATHS[1] * coarser.min(1.0),
             _ => f32::INFINITY,
         };
         let effort = |kind: Kind, tolerance: f32, degree: usize, most: f32, clearance: f32| Effort {
-            tolerance,
-            samples: samples(kind, WALKS),
+            tolerance: tolerance * coarser,
+            samples: samples(kind, walks),
             degree,
             limits: Limits { min: LEAST_REACH * size, max: most * size },
             clearance,
             free_paths: free_paths(kind),
         };
-        let degree = |power: u32, fall_off: f32| degree_for(phase, power, fall_off);
+        let degree = |power: u32, fall_off: f32| degree_for(phase, power, fall_off, LEFT_OUT * scale * scale);
         let multiple_reach = (breadth * MULTIPLE_REACH[0]).max(MULTIPLE_REACH[1]);
         Self {
             surface: Some(effort(Kind::Surface, TOLERANCES[1], degree(1, SURFACE_FALL_OFF), REACHES[1], CLEARANCES[1])),
@@ -134,7 +151,7 @@ impl Settings {
     /// # use fogbow::{cache::Settings, host::Empty, math::{Bounds, Vec3}, world::{Outline, World}};
     /// # let world = World { medium: &Empty, scene: &Empty, lights: &[] };
     /// # let outline = Outline::of(&world, Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE });
-    /// let settings = Settings::for_outline(&outline);
+    /// let settings = Settings::for_outline(&outline, 0.02);
     /// assert!(settings.single.is_none() && settings.with_single_cached(&outline).single.is_some());
     /// ```
     #[must_use]
@@ -143,7 +160,7 @@ impl Settings {
         let single = Effort {
             tolerance: TOLERANCES[0],
             samples: samples(Kind::Single, WALKS),
-            degree: degree_for(&outline.phase, 1, 0.0),
+            degree: degree_for(&outline.phase, 1, 0.0, LEFT_OUT),
             limits: Limits { min: LEAST_REACH * size, max: REACHES[0] * size },
             clearance: f32::INFINITY,
             free_paths: f32::INFINITY,
@@ -191,9 +208,9 @@ fn samples(kind: Kind, walks: u32) -> u32 {
     ((f64::from(walks) * share) as u32).max(1)
 }
 
-/// The least degree beyond which an expansion holds less than a sixtieth (in amplitude) of the phase function, applied
+/// The least degree beyond which an expansion holds less than `left_out` of the energy of the phase function, applied
 /// `power` times, to light whose own expansion falls off like `1/(l + 1)^fall_off`.
-fn degree_for(phase: &Phase, power: u32, fall_off: f32) -> usize {
+fn degree_for(phase: &Phase, power: u32, fall_off: f32, left_out: f32) -> usize {
     let energy = |l: usize| {
         let once = phase.moment(l).max_element().abs();
         let moment = (1..power).fold(once, |m, _| m * once) / libm::powf(l as f32 + 1.0, fall_off);
@@ -203,7 +220,7 @@ fn degree_for(phase: &Phase, power: u32, fall_off: f32) -> usize {
     let mut rest = total;
     for l in 0..=sh::MAX_DEGREE {
         rest -= energy(l);
-        if rest <= LEFT_OUT * total {
+        if rest <= left_out * total {
             return l;
         }
     }

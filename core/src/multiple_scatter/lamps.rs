@@ -6,39 +6,76 @@
 use glam::{Vec2, Vec3};
 
 use crate::light::Light;
-use crate::math::Frame;
+use crate::math::{Frame, float};
+use crate::phase::{Phase, PhaseSample, deflection};
 use crate::sampling::discrete::choose;
 use crate::sampling::warp::{steep_cone, steep_cone_pdf};
+use crate::sampling::{Generator, uniform, uniform2};
 
-/// Part of the directions of a walk that goes to lamps. Larger: walks learn less of everything else; smaller: the bound of a
-/// sample, which goes like one over it, is higher.
-pub(super) const SHARE: f32 = 0.25;
+/// Part of the directions of a walk that goes to lamps, where nothing dims them. Larger: walks learn less of everything else; smaller: the
+/// bound of a sample, which goes like one over it, is higher. With every vertex the variance of a walk grows by about this part:
+/// so from where fog hides the lamps next to none goes there.
+const SHARE: f32 = 0.25;
 
 /// Half angle of the cone around a lamp (rad). Farther from it nothing is steep.
 const WIDEST: f32 = 0.5;
 
-/// Weight of a lamp and the unit direction to it: in proportion to `I/r`, what rays about it collect together.
-fn aim(light: &Light<'_>, point: Vec3) -> Option<(f32, Vec3)> {
-    let field = light.steep_field().filter(|field| field.radius().is_none())?;
-    let offset = field.centre() - point;
-    let distance = offset.length();
-    let weight = light.importance(point) * distance;
-    // Written so that NaN fails, too.
-    (weight > 0.0 && weight < f32::INFINITY && distance > 0.0).then(|| (weight, offset / distance))
+/// A lamp as a vertex sees it.
+struct Aim {
+    /// Unit direction to it.
+    axis: Vec3,
+    /// In proportion to `I/r`, what rays about it collect together without fog.
+    weight: f32,
+    /// `e^{−σₜ r}`, as if the medium were the same all the way.
+    clear: f32,
 }
 
-/// A direction from `point` to the surroundings of one of the lamps; `None` if there are none.
-pub(super) fn sample(point: Vec3, lights: &[Light<'_>], u: f32, v: Vec2) -> Option<Vec3> {
-    let (axis, _) = choose(lights.iter().filter_map(|light| aim(light, point)), u)?;
-    Some(Frame::around(axis).to_world(steep_cone(v, WIDEST)).normalize())
+fn aims<'a>(point: Vec3, lights: &'a [Light<'_>], extinction: f32) -> impl Iterator<Item = Aim> + 'a {
+    lights.iter().filter_map(move |light| {
+        let field = light.steep_field().filter(|field| field.radius().is_none())?;
+        let offset = field.centre() - point;
+        let distance = offset.length();
+        let weight = light.importance(point) * distance;
+        let clear = float::exp(-extinction * distance);
+        // Written so that NaN fails, too.
+        let is_valid = weight > 0.0 && weight < f32::INFINITY && distance > 0.0 && clear > 0.0;
+        is_valid.then(|| Aim { axis: offset / distance, weight, clear })
+    })
 }
 
-/// Its density (sr⁻¹); `None` if there are no lamps.
-pub(super) fn pdf(point: Vec3, lights: &[Light<'_>], direction: Vec3) -> Option<f32> {
-    let (mut total, mut sum) = (0.0, 0.0);
-    for (weight, axis) in lights.iter().filter_map(|light| aim(light, point)) {
-        total += weight;
-        sum += weight * steep_cone_pdf(axis.cross(direction).length(), axis.dot(direction), WIDEST);
+/// The next direction of a walk at `point`, where the extinction (m⁻¹) is about `extinction`: by the phase function, and a part of them
+/// towards lamps.
+pub(super) fn turn(
+    (point, to_eye): (Vec3, Vec3),
+    phase: &Phase,
+    extinction: f32,
+    lights: &[Light<'_>],
+    rng: &mut Generator,
+) -> PhaseSample {
+    let mut turn = phase.sample(to_eye, uniform2(rng));
+    let (mut all, mut seen) = (0.0, 0.0);
+    for aim in aims(point, lights, extinction) {
+        all += aim.weight;
+        seen += aim.weight * aim.clear;
     }
-    (total > 0.0).then(|| sum / total)
+    if !(seen > 0.0 && all < f32::INFINITY) {
+        return turn;
+    }
+    let share = SHARE * (seen / all);
+    let (aimed, choice, on_cone) = (uniform(rng), uniform(rng), uniform2(rng));
+    let to_lamps = aims(point, lights, extinction).map(|aim| (aim.weight * aim.clear, aim.axis));
+    if aimed < share
+        && let Some((axis, _)) = choose(to_lamps, choice)
+    {
+        turn.to_light = Frame::around(axis).to_world(steep_cone(on_cone, WIDEST)).normalize();
+    }
+    let steep = |aim: Aim| {
+        let (across, along) = (aim.axis.cross(turn.to_light).length(), aim.axis.dot(turn.to_light));
+        aim.weight * aim.clear * steep_cone_pdf(across, along, WIDEST)
+    };
+    let pdf = aims(point, lights, extinction).map(steep).sum::<f32>() / seen;
+    let deflected = deflection(turn.to_light, to_eye);
+    turn.pdf = (1.0 - share) * phase.pdf(deflected) + share * pdf;
+    turn.weight = phase.value(deflected) / turn.pdf;
+    turn
 }

@@ -8,7 +8,7 @@ use super::weight::{Shift, Weight};
 use crate::host::{Hit, Medium, Properties, Rng, Scene};
 use crate::light::{Falloff, Light, sky};
 use crate::math::{Ray, float};
-use crate::phase::{Phase, PhaseSample, deflection};
+use crate::phase::{Phase, deflection};
 use crate::sampling::discrete::choose;
 use crate::sampling::{Generator, uniform, uniform2, warp};
 use crate::single_scatter::{Arrival, Contribution};
@@ -222,7 +222,8 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Walk<'_, M, S> {
                 break;
             }
 
-            let turn = self.turn(at, to_eye, &properties.phase, rng);
+            let extinction = properties.extinction().mean();
+            let turn = lamps::turn((at, to_eye), &properties.phase, extinction, lights, rng);
             let bend = (!properties.phase.is_isotropic()).then_some((to_eye, properties.phase));
             carried = Carried { weight, bend, kappa: turn.weight };
             ray = Ray { origin: at, direction: turn.to_light, length: f32::INFINITY };
@@ -243,26 +244,6 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Walk<'_, M, S> {
             (total.irradiance, total.gradient, total.turning) = (Spectrum::ZERO, Gradient::ZERO, Spectrum::ZERO);
         }
         total
-    }
-
-    /// The next direction: by the phase function, and where there are lamps without extent a part of them towards these.
-    fn turn(&self, at: Vec3, to_eye: Vec3, phase: &Phase, rng: &mut Generator) -> PhaseSample {
-        let lights = self.world.lights;
-        let mut turn = phase.sample(to_eye, uniform2(rng));
-        if !lights.iter().any(|light| light.steep_field().is_some_and(|field| field.radius().is_none())) {
-            return turn;
-        }
-        let (aimed, choice, on_cone) = (uniform(rng), uniform(rng), uniform2(rng));
-        if aimed < lamps::SHARE
-            && let Some(direction) = lamps::sample(at, lights, choice, on_cone)
-        {
-            turn.to_light = direction;
-        }
-        let Some(pdf) = lamps::pdf(at, lights, turn.to_light) else { return turn };
-        let deflected = deflection(turn.to_light, to_eye);
-        turn.pdf = (1.0 - lamps::SHARE) * phase.pdf(deflected) + lamps::SHARE * pdf;
-        turn.weight = phase.value(deflected) / turn.pdf;
-        turn
     }
 
     fn leg(&self, ray: Ray, end: Option<Hit>) -> Leg {

@@ -53,7 +53,7 @@ pub(crate) fn run() -> Result<(u64, u64), Box<dyn core::error::Error>> {
 
     // set-up {
     let outline = Outline::of(&world, BOUNDS);
-    let settings = Settings::for_outline(&outline).for_pixels(SIZE[0] * SIZE[1]);
+    let settings = Settings::for_outline(&outline, 0.02).for_pixels(SIZE[0] * SIZE[1]);
     // }
     let settings = quick(settings);
     // set-up {

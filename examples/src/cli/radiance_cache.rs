@@ -36,6 +36,9 @@ use crate::world::{WithMedium, World};
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Radiance caching", mut_args(told))]
 pub struct CacheArguments {
+    /// Relative error that the picture may have, noise and bias together: tolerances, walks and samples follow from it.
+    #[arg(long, value_name = "E", value_parser = output::positive, default_value_t = f64::from((1e4 * cache::USUAL_ERROR).round()) / 1e4)]
+    pub error: f64,
     /// Error tolerance of all caches: smaller is finer and slower.
     #[arg(long, value_name = "E", value_parser = output::positive)]
     pub tolerance: Option<f64>,
@@ -107,7 +110,7 @@ impl CacheArguments {
 fn told(option: Arg) -> Arg {
     let usual = |phase: Lobe| {
         let outline = Outline { phase: phase.into(), ..unit_outline() };
-        cache::Settings::for_outline(&outline).with_single_cached(&outline, true)
+        cache::Settings::for_outline(&outline, cache::USUAL_ERROR).with_single_cached(&outline)
     };
     let (even, sharp) = (usual(Lobe::Isotropic), usual(Lobe::HenyeyGreenstein { g: 0.999 }));
     let tolerance = |effort: Option<Effort>| effort.map_or(0.0, |effort| effort.tolerance);
@@ -238,7 +241,8 @@ impl CacheJob<'_> {
     /// What suits the world, with what the user says otherwise.
     fn settings(&self, outline: &Outline) -> cache::Settings {
         let arguments = self.arguments;
-        let preset = cache::Settings::for_outline(outline).for_pixels(self.film.width() * self.film.height());
+        let preset = cache::Settings::for_outline(outline, arguments.error as f32)
+            .for_pixels(self.film.width() * self.film.height());
         let mut settings = match arguments.single {
             Single::Direct => preset,
             Single::Cached => preset.with_single_cached(outline),

@@ -114,8 +114,7 @@ fn told(option: Arg) -> Arg {
         "spp" => with_default(
             option,
             format!(
-                "what the scene says, for radiance caching as --noise {} wants, at most {}, for virtual lights one pass; with --time, as many as fit",
-                cache::USUAL_NOISE,
+                "what the scene says, for radiance caching as --error wants, at most {}, for virtual lights one pass; with --time, as many as fit",
                 cache::MOST_SAMPLES,
             ),
         ),
@@ -365,7 +364,7 @@ impl RenderArguments {
     /// Samples of a pixel at most, given what the scene names, and the noise at which fewer are enough.
     fn samples(&self, named: u32) -> (u32, Option<f64>) {
         let is_free = self.spp.is_none() && self.time.is_none();
-        let usual = (is_free && self.method == Method::RadianceCache).then_some(f64::from(cache::USUAL_NOISE));
+        let usual = (is_free && self.method == Method::RadianceCache).then_some(self.cache.error);
         let samples = match (self.spp, self.time, self.method) {
             (Some(spp), ..) => spp,
             (None, Some(_), _) => u32::MAX,

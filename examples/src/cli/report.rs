@@ -98,8 +98,9 @@ impl Report<'_> {
                 percent(&findings.all),
                 findings.rays,
             );
-            if findings.all.exceeds(SERIOUS) || findings.cached.exceeds(SERIOUS) {
-                eprintln!("warning: the picture is off by more than {:.0} %; --method path is not", 100.0 * SERIOUS);
+            let most = self.arguments.cache.error;
+            if findings.all.exceeds(most) || findings.cached.exceeds(most) {
+                eprintln!("warning: the picture is off by more than the {} % of --error", 100.0 * most);
             }
         }
         if counters.non_finite > 0 {
@@ -190,9 +191,6 @@ impl Report<'_> {
         )
     }
 }
-
-/// Bias from which on a picture from caches comes with a warning.
-const SERIOUS: f64 = 0.02;
 
 /// `−0.3 ± 0.4 %`.
 fn percent(found: &Deviation) -> String {
