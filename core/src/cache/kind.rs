@@ -129,7 +129,7 @@ pub(super) const STEPS: [Step; 14] = {
     [
         make(CoarseIrradiance, None),
         make(Surface, None),
-        make(CoarseMultiple, Some(CoarseMultiple)),
+        make(CoarseMultiple, None),
         again(CoarseIrradiance, 0, 1.0, CoarseMultiple),
         again(Surface, 1, 1.0, CoarseMultiple),
         again(CoarseMultiple, 2, 1.0, CoarseMultiple),

@@ -3,7 +3,7 @@
 //! A ray that passes such a lamp at the distance `D` collects light in proportion to `1/D`, however the point on it is
 //! drawn: a walk that happens to go straight for one has no bound. So a part of the directions is drawn like `1/D`, too.
 
-use glam::{Vec2, Vec3};
+use glam::Vec3;
 
 use crate::light::Light;
 use crate::math::{Frame, float};
