@@ -248,3 +248,96 @@ where
         "audit"
     }
 }
+
+#[cfg(all(test, feature = "alloc"))]
+mod tests {
+    use super::*;
+    use crate::cache::slot::Slot;
+    use crate::cache::{Asked, Settings};
+    use crate::light::{Light, PointLight};
+    use crate::math::{Bounds, Vec3};
+    use crate::medium::{Homogeneous, Placed, Region};
+    use crate::phase::Phase;
+    use crate::work::finish;
+    use crate::world::Outline;
+
+    const RAYS: u32 = 1 << 14;
+
+    /// Findings in a ball of fog under a sky, with a lamp inside, after `spoil`.
+    fn audited(change: impl Fn(Settings) -> Settings, spoil: impl Fn(&mut RadianceCaches<'_>)) -> Findings {
+        let fog = Homogeneous::new(Spectrum::splat(0.2), Spectrum::splat(1.8), Phase::ISOTROPIC).unwrap();
+        let ball = Placed::new(fog, Region::sphere(Vec3::ZERO, 1.0).unwrap());
+        let lamp = PointLight::new(Vec3::new(0.2, 0.1, -0.3), Spectrum::ONE).unwrap();
+        let lights = [Light::Point(lamp), Light::Constant(Spectrum::splat(0.3))];
+        let world = World { medium: &ball, scene: &crate::host::Empty, lights: &lights };
+        let bounds = Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE };
+        let camera = |at: [f32; 2]| Ray::new(3.0 * Vec3::Z, Vec3::new(at[0] - 0.5, at[1] - 0.5, -2.0).normalize());
+        let settings = Settings::for_outline(&Outline::of(&world, bounds), 0.02).with_walks(256);
+        let settings = change(Settings { rays: 4096, ..settings });
+        let mut filling = RadianceCaches::new(settings).fill(Asked::View { ray: camera, pixel: 0.02 });
+        finish(&mut filling, &world, &mut Default::default());
+        let mut caches = filling.finish();
+        spoil(&mut caches);
+        let mut audit = Audit::new(&caches, camera, RAYS);
+        finish(&mut audit, &world, &mut Compared::default());
+        audit.findings()
+    }
+
+    fn scaled(caches: &mut RadianceCaches<'_>, kind: Kind, factor: f32) {
+        let Slot::Volume(cache) = &mut caches.slots[kind] else { return };
+        for number in 0..cache.len() as u32 {
+            let record = cache.records()[number as usize];
+            cache.revise(number, record.value * factor, &(record.gradient * factor), &[]).unwrap();
+        }
+    }
+
+    #[test]
+    fn what_is_right_is_found_right() {
+        let found = audited(|settings| settings, |_| {});
+        assert_eq!(found.rays, RAYS);
+        assert!(found.all.error < 0.04 && found.cached.error < 0.005, "{found:?}");
+        assert!(!found.all.exceeds(0.02) && !found.cached.exceeds(0.02), "{found:?}");
+        assert!(found.of(Kind::Irradiance).is_some() && found.of(Kind::CoarseMultiple).is_none());
+    }
+
+    #[test]
+    fn the_cache_that_is_wrong_is_named() {
+        for (kind, other) in [(Kind::Multiple, Kind::Surface), (Kind::Surface, Kind::Multiple)] {
+            let found = audited(|settings| settings, |caches| scaled(caches, kind, 0.8));
+            let [wrong, right] = [kind, other].map(|kind| found.of(kind).unwrap());
+            assert!(wrong.exceeds(0.01) && wrong.bias < 0.0, "{kind:?} {found:?}");
+            assert!(!right.exceeds(0.015) && found.cached.exceeds(0.02), "{kind:?} {found:?}");
+        }
+    }
+
+    #[test]
+    fn walks_that_are_cut_are_found() {
+        let cut = |mut settings: Settings| {
+            settings.walk.max_vertices = 1;
+            settings
+        };
+        let found = audited(cut, |_| {});
+        assert!(found.all.bias < -0.02 && found.all.exceeds(0.0), "{found:?}");
+    }
+
+    #[test]
+    fn one_wild_record_is_found() {
+        let found = audited(
+            |settings| settings,
+            |caches| {
+                let Slot::Volume(cache) = &mut caches.slots[Kind::Multiple] else { return };
+                let record = cache.records()[0];
+                cache.revise(0, record.value * 100.0, &record.gradient, &[]).unwrap();
+            },
+        );
+        assert!(found.of(Kind::Multiple).unwrap().exceeds(0.01), "{found:?}");
+    }
+
+    #[test]
+    fn nothing_compared_says_nothing() {
+        let caches = RadianceCaches::new(Settings::default());
+        let found = Audit::new(&caches, |_| Ray::new(Vec3::ZERO, Vec3::Z), 1).findings();
+        assert_eq!(found.all.error, f64::INFINITY);
+        assert!(!found.all.exceeds(0.0));
+    }
+}

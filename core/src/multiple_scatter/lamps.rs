@@ -79,3 +79,62 @@ pub(super) fn turn(
     turn.weight = phase.value(deflected) / turn.pdf;
     turn
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::light::{Light, PointLight, Sun};
+    use crate::phase::Lobe;
+    use crate::spectrum::Spectrum;
+
+    fn lamp(at: Vec3) -> Light<'static> {
+        Light::Point(PointLight::new(at, Spectrum::ONE).unwrap())
+    }
+
+    /// What a ray collects from a lamp that it passes goes like `1/sin θ`: times the weight it has a bound, whatever the directions, and
+    /// means are what they are without lamps.
+    #[test]
+    fn light_collected_past_a_lamp_has_a_bound_and_no_bias() {
+        for lobe in [Lobe::Isotropic, Lobe::HenyeyGreenstein { g: 0.8 }, Lobe::HenyeyGreenstein { g: -0.6 }] {
+            let phase = Phase::from(lobe);
+            let lights = [lamp(Vec3::Z), lamp(Vec3::new(0.5, -1.0, 0.2))];
+            let (rng, to_eye, count) = (&mut Generator::new(5), Vec3::new(0.6, 0.0, -0.8), 200_000);
+            let (mut most, mut sum, mut squares) = (0.0_f32, [0.0_f64; 2], [0.0_f64; 2]);
+            for _ in 0..count {
+                let turn = turn((Vec3::ZERO, to_eye), &phase, 0.2, &lights, rng);
+                assert!((turn.to_light.length() - 1.0).abs() < 1e-5 && turn.pdf > 0.0);
+                let collected = |light: &Light<'_>| {
+                    let axis = light.steep_field().unwrap().centre().normalize();
+                    let across = axis.cross(turn.to_light).length().max(f32::MIN_POSITIVE);
+                    // Rays that go the other way do not pass it.
+                    if axis.dot(turn.to_light) > 0.0 { 1.0 / across } else { 1.0 }
+                };
+                most = most.max(turn.weight[0] * lights.iter().map(collected).sum::<f32>());
+                for (i, f) in [1.0, turn.to_light.dot(to_eye)].into_iter().enumerate() {
+                    let value = f64::from(turn.weight[0] * f);
+                    sum[i] += value;
+                    squares[i] += value * value;
+                }
+            }
+            assert!(most < 40.0, "{lobe:?}: {most}");
+            let expected = [1.0, -f64::from(phase.mean_cosine()[0])];
+            for i in 0..2 {
+                let n = f64::from(count);
+                let (mean, error) = (sum[i] / n, libm::sqrt((squares[i] / n - (sum[i] / n) * (sum[i] / n)) / n));
+                assert!((mean - expected[i]).abs() < 4.0 * error + 1e-6, "{lobe:?}: {mean} {} {error}", expected[i]);
+            }
+        }
+    }
+
+    #[test]
+    fn lamps_that_fog_hides_and_the_sun_change_next_to_nothing() {
+        let sample = |lights: &[Light<'_>], extinction| {
+            turn((Vec3::ZERO, Vec3::X), &Phase::ISOTROPIC, extinction, lights, &mut Generator::new(2))
+        };
+        let plain = Phase::ISOTROPIC.sample(Vec3::X, uniform2(&mut Generator::new(2)));
+        assert_eq!(sample(&[Light::Sun(Sun::new(Vec3::Z, Spectrum::ONE).unwrap())], 1.0), plain);
+        let hidden = sample(&[lamp(Vec3::Z)], 20.0);
+        assert_eq!(hidden.to_light, plain.to_light);
+        assert!((hidden.weight[0] - 1.0).abs() < 1e-6);
+    }
+}
