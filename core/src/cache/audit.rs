@@ -71,6 +71,15 @@ pub struct Findings {
 
 impl Findings {
     /// Of the light of one kind ([`Kind::FINAL`]), as a part of all light; `None` if it is not cached.
+    ///
+    /// ```
+    /// # #[cfg(feature = "alloc")] {
+    /// # use fogbow::{cache::{Audit, Kind, RadianceCaches, Settings}, math::{Ray, Vec3}};
+    /// let caches = RadianceCaches::new(Settings::default()); // none at all
+    /// let audit = Audit::new(&caches, |_| Ray::new(Vec3::ZERO, Vec3::Z), 64);
+    /// assert!(audit.findings().of(Kind::Multiple).is_none());
+    /// # }
+    /// ```
     #[must_use]
     pub fn of(&self, kind: Kind) -> Option<Deviation> {
         self.parts[kind]

@@ -104,8 +104,8 @@ impl Settings {
     /// ```
     #[must_use]
     pub fn for_outline(outline: &Outline, error: f32) -> Self {
-        // NaN becomes the least.
-        let scale = error.max(ERRORS[0]).min(ERRORS[1]) / USUAL_ERROR;
+        let error = if error.is_nan() { USUAL_ERROR } else { error };
+        let scale = error.clamp(ERRORS[0], ERRORS[1]) / USUAL_ERROR;
         let coarser = float::sqrt(scale).min(COARSEST);
         let walks = (f64::from(WALKS) / f64::from(scale * scale)) as u32;
         let size = outline.bounds.size().max_element();
