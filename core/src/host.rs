@@ -116,7 +116,30 @@ pub struct Face {
     pub jump: Spectrum,
 }
 
-/// A participating medium, as the host knows it.
+/// A participating medium, as the host knows it. Two methods are enough for one that is smooth, does not glow and is some metres large:
+///
+/// ```
+/// # use fogbow::{host::{MajorantSegment, Medium, Properties}, math::{Ray, Vec3}, spectrum::Spectrum};
+/// # use fogbow::transmittance::thickness::{Marching, transmittance};
+/// /// Fog that thins out with height: extinction `e^{−z}` above the ground.
+/// struct Mist;
+/// impl Medium for Mist {
+///     fn properties(&self, point: Vec3) -> Properties {
+///         Properties { scattering: Spectrum::splat((-point.z.max(0.0)).exp()), ..Properties::VACUUM }
+///     }
+///     fn majorant_segment(&self, _: &Ray, _: f32) -> MajorantSegment {
+///         MajorantSegment { until: f32::INFINITY, minorant: Spectrum::ZERO, majorant: Spectrum::ONE }
+///     }
+/// }
+/// // Straight up, three metres: the optical thickness is 1 − e⁻³.
+/// let through = transmittance(&Ray::between(Vec3::ZERO, 3.0 * Vec3::Z), &Mist, Marching::midpoints(64));
+/// assert!((through[0] - (-(1.0 - (-3.0f32).exp())).exp()).abs() < 1e-4);
+/// ```
+///
+/// Bounds must hold, `minorant ≤ σₜ ≤ majorant` up to `until`, and equal ones say that all properties are constant: nothing checks them. A medium
+/// that glows must say so ([`Medium::is_emissive`]), or its emission is left out; one of another size, its [`Medium::resolution`]; one with a
+/// sharp border, its [`Medium::faces`], or it is written without a border and put into a [`Placed`](crate::medium::Placed), which tells
+/// them:
 ///
 /// ```
 /// # use fogbow::{host::{MajorantSegment, Medium}, math::{Ray, Vec3}, medium::{Homogeneous, Placed, Region}, phase::Phase};
@@ -243,7 +266,7 @@ pub trait Medium {
         false
     }
 
-    /// Whether the medium may emit light.
+    /// Whether the medium may emit light. Where it says no, as the default does, the emission of its properties is left out.
     fn is_emissive(&self) -> bool {
         false
     }

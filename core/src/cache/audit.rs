@@ -22,7 +22,7 @@ use crate::host::{Medium, Scene};
 use crate::math::Ray;
 use crate::path;
 use crate::sampling::uniform::mix;
-use crate::sampling::{even2, independent};
+use crate::sampling::{even2, independent, uniform2};
 use crate::spectrum::Spectrum;
 use crate::work::Rounds;
 use crate::world::World;
@@ -131,7 +131,7 @@ pub struct Compared {
 /// # use fogbow::{math::{Bounds, Ray, Vec3}, medium::Homogeneous, phase::Phase, spectrum::Spectrum};
 /// # use fogbow::{work::finish, world::{Outline, World}};
 /// # let fog = Homogeneous::new(Spectrum::ONE, Spectrum::ONE, Phase::ISOTROPIC)?;
-/// # let lamps = [Light::Point(PointLight::new(Vec3::ZERO, Spectrum::ONE)?)];
+/// # let lamps = [Light::Point(PointLight::new(Vec3::new(0.1, 0.7, -4.0), Spectrum::ONE)?)];
 /// # let world = World { medium: &fog, scene: &Empty, lights: &lamps };
 /// # let bounds = Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE };
 /// let settings = Settings { rays: 64, ..Settings::for_outline(&Outline::of(&world, bounds), 0.02).with_walks(64) };
@@ -217,9 +217,15 @@ where
         let cached = self.caches.estimator(world);
         let alone = Estimator { surfaces: None, scattered: None, ..cached };
         let seed = mix(settings.seed ^ 0x6175_6469_7421_0b5e);
+        let shift = uniform2(&mut independent(seed, 0, 2)).to_array();
         for i in 0..GROUP {
             let number = job * GROUP + i;
-            let ray = (self.ray)(even2(number));
+            // Shifted: the sequence begins in the very middle, where symmetric worlds have their lamps.
+            let at = even2(number).map(f64::from);
+            let ray = (self.ray)([0, 1].map(|axis| {
+                let moved = at[axis] + f64::from(shift[axis]);
+                ((moved - libm::floor(moved)) as f32).min(1.0 - f32::EPSILON)
+            }));
             // Both meet the same points, as they draw the same numbers.
             let rng = |stream| independent(seed, u64::from(number), stream);
             let told = radiance(&ray, &cached, &self.caches.reader(), &settings.eye, &mut rng(0));
@@ -281,7 +287,7 @@ mod tests {
         let world = World { medium: &ball, scene: &crate::host::Empty, lights: &lights };
         let bounds = Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE };
         let camera = |at: [f32; 2]| Ray::new(3.0 * Vec3::Z, Vec3::new(at[0] - 0.5, at[1] - 0.5, -2.0).normalize());
-        let settings = Settings::for_outline(&Outline::of(&world, bounds), 0.02).with_walks(256);
+        let settings = Settings::for_outline(&Outline::of(&world, bounds), 0.02).with_walks(1024);
         let settings = change(Settings { rays: 4096, ..settings });
         let mut filling = RadianceCaches::new(settings).fill(Asked::View { ray: camera, pixel: 0.02 });
         finish(&mut filling, &world, &mut Default::default());

@@ -153,8 +153,13 @@ impl RadianceCaches<'_> {
         light
     }
 
-    /// In-scattered radiance at `point` in spherical harmonics: what a probe stores. See [`VolumeCache::expansion`] for the
-    /// coefficients. The sum over the parts that are cached; `false`, and zeros, where one of them has no record.
+    /// In-scattered radiance at `point` in spherical harmonics: what a probe in fog stores. See [`VolumeCache::expansion`] for the
+    /// coefficients, to be evaluated in the direction from `point` to the eye. The phase function is in them, σₛ is not: they light fog, not
+    /// surfaces (for these, see [`RadianceCaches::irradiance`]).
+    ///
+    /// The sum over the parts that are cached; `false`, and zeros, where one of them has no record. Light straight from the lights is
+    /// among them only with [`Settings::with_single_cached`](super::Settings::with_single_cached); else add it yourself. Caches for
+    /// probes are filled by [`Asked::Box`](super::Asked::Box), see the example at [`RadianceCaches`].
     #[doc(alias("probe", "spherical harmonics", "light probe"))]
     pub fn in_scattered_sh(&self, point: Vec3, coefficients: &mut [Spectrum]) -> bool {
         coefficients.fill(Spectrum::ZERO);

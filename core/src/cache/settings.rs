@@ -14,8 +14,9 @@ use crate::transmittance::thickness::Steps;
 pub struct Effort {
     /// `ε` of J's Eq. 34: larger is coarser.
     pub tolerance: f32,
-    /// Directions or random walks of each of the two estimates of a record; fewer where it reaches less far than
-    /// others do, and in the second up to four times as many where they differ much.
+    /// Directions or random walks of each estimate of a record (more than one, because noise must not choose both radius and value:
+    /// decision 13); fewer where it reaches less far than
+    /// others do, and in later ones up to four times as many where they differ much.
     pub samples: u32,
     /// Degree of the expansions; 0 in isotropic media and on surfaces.
     pub degree: usize,

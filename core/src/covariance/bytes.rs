@@ -238,8 +238,11 @@ pub fn read_into(bytes: &[u8], tag: u64, voxels: &mut [Voxel]) -> Result<(), Gri
     let all = || bytes[HEADER_BYTES..].chunks_exact(size_of::<Voxel>()).map(element::<Voxel>);
     let is_valid = |voxel: &Voxel| {
         let Voxel { sum, weight } = voxel;
-        let diagonal = [sum.xx, sum.yy, sum.zz, *weight];
-        sum.to_upper().iter().all(|x| x.is_finite()) && diagonal.iter().all(|&x| x.is_finite() && x >= 0.0)
+        let diagonal = [sum.xx, sum.yy, sum.zz];
+        // Where light varies in other directions alone, a sum of variances of 0 keeps a rounding error.
+        let rounding = diagonal.iter().map(|x| x.abs()).sum::<f32>() * f32::EPSILON + f32::MIN_POSITIVE;
+        let is_finite = weight.is_finite() && sum.to_upper().iter().all(|x| x.is_finite());
+        is_finite && *weight >= 0.0 && diagonal.iter().all(|&x| x >= -rounding)
     };
     if let Some(index) = all().position(|voxel| !is_valid(&voxel)) {
         return Err(GridBytesError::Voxel(index));

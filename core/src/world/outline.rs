@@ -17,8 +17,8 @@ const LOOKS: u32 = 24;
 /// Rays that look for surfaces and at the course of a medium. Fewer: small mirrors are missed.
 const RAYS: u32 = 1024;
 
-/// MajorantSegmentes of a ray that are asked for: what changes has changed by then.
-const MOST_STRETCHES: u32 = 64;
+/// Majorant segments of a ray that are asked for: what changes has changed by then.
+const MOST_SEGMENTS: u32 = 64;
 
 /// How many lights there are, of which kinds; a light may be of several.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -236,7 +236,7 @@ impl Matter {
 
 fn is_constant_along(medium: &(impl Medium + ?Sized), ray: &Ray) -> bool {
     let mut at = 0.0;
-    for _ in 0..MOST_STRETCHES {
+    for _ in 0..MOST_SEGMENTS {
         let segment = medium.majorant_segment(ray, at);
         if !segment.is_constant() {
             return false;

@@ -3,7 +3,7 @@
 use core::sync::atomic::{AtomicU32, Ordering};
 
 use fogbow::bytes::Crc;
-use fogbow::cache::{Asked, RadianceCaches, Settings};
+use fogbow::cache::{Asked, RadianceCaches, Settings, USUAL_ERROR};
 use fogbow::picture::{self, Sample, Tiles};
 use fogbow::sampling::{Generator, Independent};
 use fogbow::spectrum::Spectrum;
@@ -53,7 +53,7 @@ pub(crate) fn run() -> Result<(u64, u64), Box<dyn core::error::Error>> {
 
     // set-up {
     let outline = Outline::of(&world, BOUNDS);
-    let settings = Settings::for_outline(&outline, 0.02).for_pixels(SIZE[0] * SIZE[1]);
+    let settings = Settings::for_outline(&outline, USUAL_ERROR).for_pixels(SIZE[0] * SIZE[1]);
     // }
     let settings = quick(settings);
     // set-up {
