@@ -112,7 +112,7 @@ enum Round {
 /// }
 /// // What there is by now can be read at any time.
 /// assert!(!filling.is_cut() && filling.audit_rays() >= 4096);
-/// assert!( filling.computed(Kind::Single) == 0 && filling.caches().reader().single.is_none());
+/// assert!(filling.computed(Kind::Single) == 0 && filling.caches().reader().single.is_none());
 /// let caches = filling.finish();
 /// # }
 /// # Ok::<(), Box<dyn core::error::Error>>(())

@@ -77,7 +77,7 @@ pub use index::{Block, Index, IndexNode};
 pub use kind::Kind;
 pub use lookup::{Basis, Reading, TURNING_DEGREE, TurningBasis};
 pub use memory::{Estimate, FilledRecords, FillingMemory};
-pub use presets::{MOST_SAMPLES, USUAL_ERROR};
+pub use presets::{ERROR_BOUNDS, MOST_SAMPLES, USUAL_ERROR};
 pub use radius::{Limits, clamp_gradient, clearance, log_gradient_radius, neighbour_clamped, valid_radius};
 pub use readers::ScatteredLight;
 pub use record::{Attachment, Facing, Record};

@@ -71,7 +71,7 @@ const SURFACE_FALL_OFF: f32 = 1.5;
 pub const USUAL_ERROR: f32 = 0.02;
 
 /// Bounds of the error asked for: below, records take hours; above, a picture tells nothing.
-const ERRORS: [f32; 2] = [1e-3, 0.5];
+pub const ERROR_BOUNDS: [f32; 2] = [1e-3, 0.5];
 
 /// Bounds of the factor of tolerances: beyond, gradients say nothing of what light does; below, records are more than they mend.
 const COARSEST: f32 = 1.5;
@@ -80,7 +80,7 @@ const COARSEST: f32 = 1.5;
 pub const MOST_SAMPLES: u32 = 256;
 
 impl Settings {
-    /// What suits a world for pictures whose relative error is about `error` ([`USUAL_ERROR`]; within 0.001 and 0.5), noise and bias together;
+    /// What suits a world for pictures whose relative error is about `error` ([`USUAL_ERROR`]; within [`ERROR_BOUNDS`]), noise and bias together;
     /// seed 0. What each number does, and what happens when it is larger and smaller, stands in `cache/presets.rs`; change fields at will.
     ///
     /// Noise falls with the root of the number of samples, and what extrapolation gets wrong goes with the square of radii: so for `s`
@@ -105,7 +105,7 @@ impl Settings {
     #[must_use]
     pub fn for_outline(outline: &Outline, error: f32) -> Self {
         let error = if error.is_nan() { USUAL_ERROR } else { error };
-        let scale = error.clamp(ERRORS[0], ERRORS[1]) / USUAL_ERROR;
+        let scale = error.clamp(ERROR_BOUNDS[0], ERROR_BOUNDS[1]) / USUAL_ERROR;
         let coarser = float::sqrt(scale).min(COARSEST);
         let walks = (f64::from(WALKS) / f64::from(scale * scale)) as u32;
         let size = outline.bounds.size().max_element();

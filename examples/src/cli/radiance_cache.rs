@@ -37,8 +37,8 @@ use crate::world::{WithMedium, World};
 #[command(next_help_heading = "Radiance caching", mut_args(told))]
 pub struct CacheArguments {
     /// Relative error that the picture may have, noise and bias together: tolerances, walks and samples follow from it.
-    #[arg(long, value_name = "E", value_parser = output::positive, default_value_t = f64::from((1e4 * cache::USUAL_ERROR).round()) / 1e4)]
-    pub error: f64,
+    #[arg(long, value_name = "E", value_parser = error_asked, default_value_t = cache::USUAL_ERROR)]
+    pub error: f32,
     /// Error tolerance of all caches: smaller is finer and slower.
     #[arg(long, value_name = "E", value_parser = output::positive)]
     pub tolerance: Option<f64>,
@@ -187,6 +187,13 @@ pub enum Single {
     Cached,
 }
 
+/// An error that can be asked for.
+fn error_asked(text: &str) -> Result<f32, String> {
+    let [least, most] = cache::ERROR_BOUNDS;
+    let error = text.parse::<f32>().ok().filter(|error| (least..=most).contains(error));
+    error.ok_or_else(|| format!("must be a number from {least} to {most}"))
+}
+
 /// `CACHE=E`.
 fn named(text: &str) -> Result<(Kind, f64), String> {
     let (kind, value) = text.split_once('=').ok_or("must look like multiple=0.2")?;
@@ -241,8 +248,8 @@ impl CacheJob<'_> {
     /// What suits the world, with what the user says otherwise.
     fn settings(&self, outline: &Outline) -> cache::Settings {
         let arguments = self.arguments;
-        let preset = cache::Settings::for_outline(outline, arguments.error as f32)
-            .for_pixels(self.film.width() * self.film.height());
+        let preset =
+            cache::Settings::for_outline(outline, arguments.error).for_pixels(self.film.width() * self.film.height());
         let mut settings = match arguments.single {
             Single::Direct => preset,
             Single::Cached => preset.with_single_cached(outline),

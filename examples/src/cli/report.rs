@@ -99,7 +99,7 @@ impl Report<'_> {
                 findings.rays,
             );
             let most = self.arguments.cache.error;
-            if findings.all.exceeds(most) || findings.cached.exceeds(most) {
+            if findings.all.exceeds(f64::from(most)) || findings.cached.exceeds(f64::from(most)) {
                 eprintln!("warning: the picture is off by more than the {} % of --error", 100.0 * most);
             }
         }

@@ -105,6 +105,10 @@ const FEW_PER_CENT: f64 = 0.05;
 fn options_out_of_range_are_errors() {
     let folder = Folder::new("cache-options");
     let cases: &[(&[&str], &str)] = &[
+        (&["--error", "0"], "from 0.001 to 0.5"),
+        (&["--error", "nan"], "from 0.001 to 0.5"),
+        (&["--error", "0.6"], "from 0.001 to 0.5"),
+        (&["--audit=-1"], "--audit"),
         (&["--tolerance", "0"], "greater than 0"),
         (&["--tolerance=-0.5"], "greater than 0"),
         (&["--tolerance", "nan"], "greater than 0"),
@@ -132,6 +136,32 @@ fn options_out_of_range_are_errors() {
         assert!(!said(&output).contains("panicked"));
     }
     assert!(folder.names().is_empty());
+}
+
+/// The audit is in the summary and in the statistics, whatever the number of threads; the picture does not depend on it.
+#[test]
+fn every_picture_from_caches_says_how_far_it_is_off() {
+    let folder = Folder::new("cache-audit");
+    std::fs::write(folder.0.join("scene.xml"), World::of(&[FOG, CONTAINER, WALLS, LAMP]).text()).unwrap();
+    let render = |options: &[&str]| {
+        let common =
+            ["render", "scene.xml", "--method", "radiance-cache", "--paths", "128", "--spp", "1", "-o", "a.pfm"];
+        let output = folder.run(&[&common[..], &["--stats", "s.json"], options].concat());
+        assert_eq!(output.status.code(), Some(0), "{options:?}: {}", said(&output));
+        let statistics = std::fs::read_to_string(folder.0.join("s.json")).unwrap();
+        let audit = statistics.lines().find(|line| line.contains("\"audit\": {\"rays\"")).map(str::to_owned);
+        (said(&output), audit, std::fs::read(folder.0.join("a.pfm")).unwrap())
+    };
+    let (told, audit, image) = render(&["--threads", "1"]);
+    assert!(told.contains("% of what is cached") && told.contains("along 4096 eye rays"), "{told}");
+    let found = audit.clone().unwrap();
+    for name in ["all", "cached", "surface", "multiple", "irradiance"] {
+        assert!(found.contains(&format!("\"{name}\": {{\"bias\": ")), "{found}");
+    }
+    let (_, again, same) = render(&["--threads", "3"]);
+    assert!(again == audit && same == image);
+    let (told, none, same) = render(&["--audit", "0"]);
+    assert!(none.is_none() && !told.contains("bias") && same == image, "{told}");
 }
 
 #[test]
