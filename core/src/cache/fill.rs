@@ -10,6 +10,7 @@
 use core::ops::Range;
 
 use super::asked::{Asked, Wanted};
+use super::audit::rays_for;
 use super::caches::RadianceCaches;
 use super::eye::Place;
 use super::guide::{Guide, Guided, Looks};
@@ -65,16 +66,6 @@ const LEAST_SAMPLES: u32 = 16;
 
 /// Records that reach less far than usual take a share of the samples down to this.
 const LEAST_SHARE: f32 = 0.25;
-
-/// Walks and directions of a fill for each eye ray of an audit. An audited ray is compared at some eight points by whole walks and with a whole
-/// path, which takes as long as some sixty of those that end at records; and a twentieth of the time is to be spent.
-const WALKS_PER_AUDIT_RAY: u64 = 1200;
-
-/// Eye rays of an audit at least and at most. Fewer cannot tell ten per cent from chance; more tell less than a tenth of a per cent.
-const LEAST_AUDIT_RAYS: u32 = 4096;
-
-/// See [`LEAST_AUDIT_RAYS`].
-const MOST_AUDIT_RAYS: u32 = 1 << 18;
 
 /// What the jobs of a round do.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -254,13 +245,13 @@ impl<'s, F> Filling<'s, F> {
         self.all_computed[kind]
     }
 
-    /// Eye rays for an [`Audit`](super::Audit) that takes about a twentieth of the time of this fill, and at least enough to see whether a
-    /// picture is grossly wrong.
+    /// Eye rays for an [`Audit`](super::Audit) that takes about a twentieth of the time of this fill, in dense fog a tenth, and at least
+    /// enough to see whether a picture is grossly wrong.
     #[must_use]
     pub fn audit_rays(&self) -> u32 {
         let samples = |kind: Kind| self.settings().effort(kind).map_or(0, |effort| u64::from(effort.samples));
         let walks: u64 = Kind::ALL.into_iter().map(|kind| self.computed(kind) * samples(kind)).sum();
-        u32::try_from(walks / WALKS_PER_AUDIT_RAY).unwrap_or(u32::MAX).clamp(LEAST_AUDIT_RAYS, MOST_AUDIT_RAYS)
+        rays_for(walks)
     }
 
     fn settings(&self) -> &Settings {

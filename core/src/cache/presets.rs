@@ -73,7 +73,8 @@ pub const USUAL_ERROR: f32 = 0.02;
 /// Bounds of the error asked for: below, records take hours; above, a picture tells nothing.
 pub const ERROR_BOUNDS: [f32; 2] = [1e-3, 0.5];
 
-/// Bounds of the factor of tolerances: beyond, gradients say nothing of what light does; below, records are more than they mend.
+/// Greatest factor of tolerances, however large an error is asked for. Larger: gradients say nothing of what light does there; smaller: time
+/// that rough pictures do not repay.
 const COARSEST: f32 = 1.5;
 
 /// The most samples per pixel for that. More: time at edges between black and a lamp, where noise falls no faster; fewer: jagged edges.

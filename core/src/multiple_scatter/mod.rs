@@ -20,6 +20,7 @@
 //!   may be held constant within a small distance ([`Settings::closest`]);
 //! - Eq. 34 takes norms of sums over walks that start in one of 24 cones, not of single walks;
 //! - a walk may end where its host knows the rest of the light ([`Walk::along`]);
+//! - a part of the directions is drawn towards lamps without extent, which bounds samples that pass them;
 //! - the light of surfaces enters through the direction in which the walk goes on anyway.
 //!
 //! `L_m` does not contain `σₛ` of the point itself. The light a surface sends straight to that

@@ -62,7 +62,7 @@ pub struct CacheArguments {
     #[arg(long, value_enum, default_value_t = Single::Direct)]
     pub single: Single,
     /// Eye rays along which the picture is compared with path tracing afterwards, to say how far it is off; 0 for no such comparison
-    /// [default: as many as take about a twentieth of the time].
+    /// [default: as many as take about a twentieth of the time, a tenth in dense fog].
     #[arg(long, value_name = "N")]
     pub audit: Option<u32>,
     /// Starts from the records in this file, and adds only what is missing: made by --cache-out for the same scene
