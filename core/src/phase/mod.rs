@@ -10,6 +10,7 @@
 //! | [`draine`](mod@draine) | Draine 2003, and the fog and cloud fit of Jendersie and d'Eon 2023 |
 //! | `lobe` | [`Lobe`]: the closed set of simple phase functions |
 //! | `mixture` | [`Phase`]: one lobe or a coloured mixture of several, what a medium carries |
+//! | `words` | lobes as plain numbers, there and back |
 
 pub mod draine;
 pub mod henyey_greenstein;
@@ -17,6 +18,7 @@ mod lobe;
 mod mixture;
 pub mod rayleigh;
 pub mod schlick;
+mod words;
 
 use glam::Vec3;
 
@@ -24,6 +26,7 @@ pub use henyey_greenstein::henyey_greenstein;
 pub use lobe::{Lobe, LobeError, MAX_ANISOTROPY};
 pub use mixture::{MAX_LOBES, Phase, PhaseSample, TooManyLobes};
 pub use schlick::schlick;
+pub use words::LOBE_WORDS;
 
 /// The deflection of light at a scattering event: `cos θ` with its distances from both poles,
 /// which peaked phase functions need without cancellation.

@@ -6,7 +6,7 @@ use glam::Vec3;
 use super::bound::{Bound, geometry};
 use super::scatterer::{Receiver, Scatterer, origin};
 use crate::math::Ray;
-use crate::phase::{Lobe, MAX_LOBES, Phase};
+use crate::phase::{LOBE_WORDS, Lobe, MAX_LOBES, Phase};
 use crate::spectrum::Spectrum;
 use crate::surface::Surface;
 use crate::world::short_of_end;
@@ -18,8 +18,11 @@ mod kind {
     pub(super) const PHONG: u32 = 0x101;
 }
 
+/// Floats of a lobe with its weight.
+const WEIGHTED_LOBE: usize = LOBE_WORDS + 3;
+
 /// Floats that describe what scatters.
-const WORDS: usize = 6 * MAX_LOBES;
+const WORDS: usize = WEIGHTED_LOBE * MAX_LOBES;
 
 /// A vertex of a light's path, from which light is scattered on: a virtual point light, in a medium or on a surface. 140
 /// bytes.
@@ -39,7 +42,7 @@ pub struct VirtualLight {
     pub scatterings: u32,
     /// Number of lobes of the phase function; for surfaces one of [`kind`]'s.
     kind: u32,
-    /// Lobes: kind, two parameters, weight of three channels each. Surfaces: normal, reflectances, exponent.
+    /// Lobes: [`Lobe::to_words`], weight of three channels each. Surfaces: normal, reflectances, exponent.
     scatterer: [f32; WORDS],
 }
 
@@ -55,15 +58,9 @@ impl VirtualLight {
     #[must_use]
     pub fn in_medium(position: Vec3, incoming: Vec3, flux: Spectrum, scatterings: u32, phase: &Phase) -> Self {
         let mut light = Self { position, incoming, flux, scatterings, kind: 0, scatterer: [0.0; WORDS] };
-        for (words, (lobe, weight)) in light.scatterer.chunks_exact_mut(6).zip(phase.lobes()) {
-            let (tag, a, b) = match lobe {
-                Lobe::Isotropic => (0.0, 0.0, 0.0),
-                Lobe::HenyeyGreenstein { g } => (1.0, g, 0.0),
-                Lobe::Schlick { k } => (2.0, k, 0.0),
-                Lobe::Rayleigh => (3.0, 0.0, 0.0),
-                Lobe::Draine { g, alpha } => (4.0, g, alpha),
-            };
-            words.copy_from_slice(&[tag, a, b, weight[0], weight[1], weight[2]]);
+        for (words, (lobe, weight)) in light.scatterer.chunks_exact_mut(WEIGHTED_LOBE).zip(phase.lobes()) {
+            words[..LOBE_WORDS].copy_from_slice(&lobe.to_words());
+            words[LOBE_WORDS..].copy_from_slice(&weight.0);
             light.kind += 1;
         }
         light
@@ -129,7 +126,8 @@ impl VirtualLight {
         self.kind >= kind::LAMBERT
     }
 
-    /// How it scatters its flux; a medium's `σₛ` counts as 1, because the flux holds it.
+    /// How it scatters its flux; a medium's `σₛ` counts as 1, because the flux holds it. Bytes from elsewhere that are no
+    /// virtual light's scatter nothing.
     ///
     /// ```
     /// # use fogbow::{math::Vec3, phase::{Lobe, Phase}, spectrum::Spectrum, vpl::{Scatterer, VirtualLight}};
@@ -152,20 +150,16 @@ impl VirtualLight {
                 surface: Surface::Phong { diffuse: colour(3), specular: colour(6), exponent: words[9] },
             },
             count => {
-                let lobe = |at: usize| match words[at] as u32 {
-                    1 => Lobe::HenyeyGreenstein { g: words[at + 1] },
-                    2 => Lobe::Schlick { k: words[at + 1] },
-                    3 => Lobe::Rayleigh,
-                    4 => Lobe::Draine { g: words[at + 1], alpha: words[at + 2] },
-                    _ => Lobe::Isotropic,
+                let part = |i: usize| {
+                    let (lobe, weight) = words.get(i * WEIGHTED_LOBE..)?.split_first_chunk()?;
+                    Some((Spectrum(*weight.first_chunk()?), Phase::from(Lobe::from_words(*lobe)?)))
                 };
-                let phase = if count == 1 {
-                    Phase::from(lobe(0))
-                } else {
-                    // What was one phase function is one again.
-                    let lobes =
-                        (0..MAX_LOBES.min(count as usize)).map(|i| (colour(6 * i + 3), Phase::from(lobe(6 * i))));
-                    Phase::mix(lobes).unwrap_or(Phase::ISOTROPIC)
+                // What was one phase function is one again.
+                let mut known = 0;
+                let mut parts = (0..count).map_while(|i| part(i as usize)).inspect(|_| known += 1);
+                let phase = if count == 1 { parts.next().map(|(_, phase)| phase) } else { Phase::mix(parts).ok() };
+                let Some(phase) = phase.filter(|_| known == count) else {
+                    return Scatterer::Medium { scattering: Spectrum::ZERO, phase: Phase::ISOTROPIC };
                 };
                 Scatterer::Medium { scattering: Spectrum::ONE, phase }
             }
@@ -265,5 +259,27 @@ impl Connection {
     #[must_use]
     pub fn shadow_ray(&self) -> Ray {
         short_of_end(&self.way)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bytes_of_no_virtual_light_scatter_nothing() {
+        let phase = Phase::droplets(10.0).unwrap();
+        let light = VirtualLight::in_medium(Vec3::ZERO, Vec3::Z, Spectrum::ONE, 1, &phase);
+        let Scatterer::Medium { phase: read, .. } = light.scatterer() else { panic!("on a surface") };
+        assert!(read.lobes().eq(phase.lobes()));
+        let nothing = Scatterer::Medium { scattering: Spectrum::ZERO, phase: Phase::ISOTROPIC };
+        for lobe in 0..2 {
+            let mut other = light;
+            other.scatterer[lobe * WEIGHTED_LOBE] = 99.0;
+            assert_eq!(other.scatterer(), nothing, "lobe {lobe}");
+        }
+        for kind in [MAX_LOBES as u32 + 1, kind::PHONG + 1, u32::MAX] {
+            assert_eq!(VirtualLight { kind, ..light }.scatterer(), nothing, "{kind:#x}");
+        }
     }
 }
