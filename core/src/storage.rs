@@ -221,6 +221,14 @@ impl<T: Copy> List<'_, T> {
     }
 }
 
+impl<'s, T> List<'s, T> {
+    /// What a lent slice holds already, as its elements.
+    pub(crate) fn holding(slots: &'s mut [T]) -> Self {
+        let used = slots.len();
+        Self(Storage::Lent { slots, used })
+    }
+}
+
 impl<'s, T> From<&'s mut [T]> for List<'s, T> {
     fn from(slots: &'s mut [T]) -> Self {
         Self(Storage::Lent { slots, used: 0 })

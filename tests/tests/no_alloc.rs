@@ -7,6 +7,7 @@ use std::process::{Command, Output};
 
 use fogbow::beams;
 use fogbow::cache::RadianceCaches;
+use fogbow::picture::Tiles;
 use fogbow::sampling::Independent;
 use fogbow::vpl;
 use fogbow::work::Rounds;
@@ -61,9 +62,10 @@ fn the_core_links_and_runs_without_an_allocator() {
 }
 
 /// Does `work` on two threads, in memory that grows: as the program does it.
-fn driven<'w, R>(mut work: R, world: &Foggy<'w>) -> R
+fn driven<W, R>(mut work: R, world: &W) -> R
 where
-    R: Rounds<Foggy<'w>> + Sync,
+    W: Sync + ?Sized,
+    R: Rounds<W> + Sync,
     R::Output<'static>: Default + Send,
 {
     let ran = run(&mut work, world, &Threads::new(2).unwrap(), &Control::default(), None, |_| {});
@@ -101,5 +103,10 @@ fn hosts_give_the_bits_that_the_program_gives() {
         let pass = vpl::VplPass::new(&lent::light_settings(world), 0, Independent, &witnesses);
         lent::see_lights(out, driven(pass, world).finish().unwrap().as_slice(), world);
     });
-    assert_eq!([cache, beams, vpl], ["cache", "beams", "vpl"].map(of_kernel));
+    let picture = folded(|out, world| {
+        let tiles = driven(Tiles::new(lent::PICTURE, Independent), &lent::pixel(world));
+        let (sums, counts) = tiles.into_sums();
+        lent::see_picture(out, &sums, &counts);
+    });
+    assert_eq!([cache, beams, vpl, picture], ["cache", "beams", "vpl", "picture"].map(of_kernel));
 }

@@ -5,7 +5,7 @@
 //!
 //! | file | holds |
 //! |---|---|
-//! | `tiles` | [`Tiles`]: passes over all pixels |
+//! | `tiles` | [`Tiles`]: passes over all pixels, in memory that grows or is lent |
 //! | `noise` | [`Goal`]: how many samples are enough, by the noise they still have |
 //! | `budget` | [`affordable`]: samples that the time left allows |
 //! | `counting` | [`Queries`]: how often the world is asked |
@@ -17,5 +17,5 @@ mod tiles;
 
 pub use budget::{affordable, whole_passes};
 pub use counting::{Counters, CountingMedium, CountingScene, Queries};
-pub use noise::{Goal, LEAST_SAMPLES, MOST_SAMPLES};
-pub use tiles::{Counts, Integrand, Sample, Settings, Tally, TileOutput, Tiles, accumulate};
+pub use noise::{Goal, LEAST_SAMPLES, MOST_SAMPLES, PixelNoise, TileNoise};
+pub use tiles::{Counts, Integrand, Sample, Settings, Tally, TileOutput, TileRoom, TileSlots, Tiles, accumulate};

@@ -1,8 +1,6 @@
 //! How many samples are enough, by the noise they still have.
 
-#[cfg(feature = "alloc")]
-use crate::storage::Full;
-use crate::storage::List;
+use crate::storage::{Full, List};
 
 /// Share of the picture's mean that is added, in square, to what a pixel's noise is measured against: black
 /// corners need not be known to their own precision.
@@ -60,14 +58,15 @@ impl Part {
     }
 }
 
-/// What a pixel had before some passes, and has after them.
+/// What a pixel had before some passes, and has after them: memory that is lent for a [`Goal`], see
+/// [`TileSlots`](super::TileSlots).
 #[derive(Debug, Clone, Copy, Default)]
-struct Pixel {
+pub struct PixelNoise {
     before: Part,
     after: Part,
 }
 
-impl Pixel {
+impl PixelNoise {
     /// Variance of the mean after them: if a sample has variance `σ²`, the two parts' means are apart by
     /// `σ² (1/n + 1/m)` in square, and the whole's varies by `σ²/(n + m)`.
     fn error_squared(&self) -> f64 {
@@ -86,9 +85,9 @@ impl Pixel {
     }
 }
 
-/// What is known of a tile.
+/// What is known of a tile: memory that is lent for a [`Goal`], see [`TileSlots`](super::TileSlots).
 #[derive(Debug, Clone, Copy, Default)]
-struct Tile {
+pub struct TileNoise {
     is_enough: bool,
     /// Its pixels: from, and to.
     pixels: [u32; 2],
@@ -106,31 +105,32 @@ const BLACK: u32 = 8;
 #[derive(Debug)]
 pub(super) struct Noise<'s> {
     goal: Goal,
-    tiles: List<'s, Tile>,
-    pixels: List<'s, Pixel>,
+    tiles: List<'s, TileNoise>,
+    pixels: List<'s, PixelNoise>,
 }
 
-#[cfg(feature = "alloc")]
-impl Noise<'_> {
-    pub(super) fn new(goal: Goal) -> Self {
-        Self { goal, tiles: List::default(), pixels: List::default() }
+impl<'s> Noise<'s> {
+    /// Of no tile yet, in such memory.
+    pub(super) fn new(
+        goal: Goal,
+        tiles: impl Into<List<'s, TileNoise>>,
+        pixels: impl Into<List<'s, PixelNoise>>,
+    ) -> Self {
+        Self { goal, tiles: tiles.into(), pixels: pixels.into() }
     }
-}
 
-impl Noise<'_> {
     pub(super) fn is_enough(&self, tile: u32) -> bool {
         self.tiles.as_slice().get(tile as usize).is_some_and(|tile| tile.is_enough)
     }
 
     /// Adds the next tile, with so many pixels.
-    #[cfg(feature = "alloc")]
     pub(super) fn add_tile(&mut self, count: u32) -> Result<(), Full> {
         let from = self.pixels.len() as u32;
-        (0..count).try_for_each(|_| self.pixels.push(Pixel::default()))?;
-        self.tiles.push(Tile { pixels: [from, from + count], ..Tile::default() })
+        (0..count).try_for_each(|_| self.pixels.push(PixelNoise::default()))?;
+        self.tiles.push(TileNoise { pixels: [from, from + count], ..TileNoise::default() })
     }
 
-    fn pixels_of(&mut self, tile: u32) -> (&mut [Pixel], bool) {
+    fn pixels_of(&mut self, tile: u32) -> (&mut [PixelNoise], bool) {
         let Some(tile) = self.tiles.as_slice().get(tile as usize) else { return (&mut [], true) };
         let ([from, to], is_enough) = (tile.pixels, tile.is_enough);
         (&mut self.pixels.as_mut_slice()[from as usize..to as usize], is_enough)
@@ -143,7 +143,7 @@ impl Noise<'_> {
         let mut parts = parts.peekable();
         let is_new = pixels.first().is_some_and(|pixel| pixel.after.count == 0);
         if !is_enough && (is_new || parts.peek().is_some_and(|part| part.count.is_power_of_two())) {
-            pixels.iter_mut().zip(parts).for_each(|(pixel, before)| *pixel = Pixel { before, after: before });
+            pixels.iter_mut().zip(parts).for_each(|(pixel, before)| *pixel = PixelNoise { before, after: before });
         }
     }
 
@@ -161,9 +161,9 @@ impl Noise<'_> {
         let pixels = self.pixels.as_slice();
         let total: f64 = pixels.iter().map(|pixel| pixel.after.mean()).sum();
         let floor = FLOOR * total.abs() / pixels.len().max(1) as f64;
-        let of = |tile: &Tile| &pixels[tile.pixels[0] as usize..tile.pixels[1] as usize];
-        let noise_of = |tile: &Tile| {
-            let of_pixel = |pixel: &Pixel| match pixel.error_squared() {
+        let of = |tile: &TileNoise| &pixels[tile.pixels[0] as usize..tile.pixels[1] as usize];
+        let noise_of = |tile: &TileNoise| {
+            let of_pixel = |pixel: &PixelNoise| match pixel.error_squared() {
                 0.0 => 0.0,
                 error => error / (pixel.after.mean() * pixel.after.mean() + floor * floor),
             };
@@ -172,7 +172,7 @@ impl Noise<'_> {
         };
         let (mut last, mut now) = (0.0, 0.0);
         for tile in self.tiles.as_mut_slice().iter_mut().filter(|tile| !tile.is_enough) {
-            if of(tile).iter().all(Pixel::is_doubled) {
+            if of(tile).iter().all(PixelNoise::is_doubled) {
                 let noise = noise_of(tile);
                 if let Some(before) = tile.when_doubled.replace(noise) {
                     last += before;
@@ -187,7 +187,7 @@ impl Noise<'_> {
         for tile in self.tiles.as_mut_slice().iter_mut().filter(|tile| !tile.is_enough) {
             let pixels = of(tile);
             let is_known = samples / BLACK >= self.goal.least || pixels.iter().any(|pixel| pixel.after.sum != 0.0);
-            let evenness = if pixels.iter().all(Pixel::is_doubled) { evenness } else { 1.0 };
+            let evenness = if pixels.iter().all(PixelNoise::is_doubled) { evenness } else { 1.0 };
             tile.is_enough = is_known && noise_of(tile) <= goal * goal * evenness;
         }
         self.tiles.as_slice().iter().all(|tile| tile.is_enough)
@@ -199,7 +199,7 @@ mod tests {
     use super::*;
 
     fn noise(goal: Goal, tiles: &[u32]) -> Noise<'static> {
-        let mut noise = Noise::new(goal);
+        let mut noise = Noise::new(goal, List::default(), List::default());
         tiles.iter().for_each(|count| noise.add_tile(*count).unwrap());
         noise
     }
@@ -257,7 +257,7 @@ mod tests {
         for _ in 0..runs {
             let before = Part { sum: draw(6), count: 6 };
             let after = Part { sum: before.sum + draw(3), count: 9 };
-            total += Pixel { before, after }.error_squared();
+            total += PixelNoise { before, after }.error_squared();
         }
         let ratio = total / f64::from(runs) * 12.0 * 9.0;
         // Relative standard deviation of a square of a normal number: √2.

@@ -2,10 +2,10 @@
 
 use core::ops::Range;
 
-use super::noise::{Goal, Noise, Part};
+use super::noise::{Goal, Noise, Part, PixelNoise, TileNoise};
 use crate::sampling::{GeneratorSource, pixel_key};
 use crate::spectrum::Spectrum;
-use crate::storage::List;
+use crate::storage::{Full, List};
 use crate::work::Rounds;
 
 /// How a picture is sampled.
@@ -132,7 +132,71 @@ pub struct TileOutput<'o, T> {
     colours: List<'o, Spectrum>,
     counts: Counts,
     tally: T,
+    is_cut: bool,
 }
+
+impl<'o, T: Default> TileOutput<'o, T> {
+    /// In lent memory: for the sums of a job's pixels, and for the colours of a sample. [`Settings::room`] says how many; where that is
+    /// too small, [`Tiles::is_cut`] says so.
+    ///
+    /// ```
+    /// use fogbow::picture::{Sample, Settings, TileOutput, TileSlots, Tiles};
+    /// use fogbow::{sampling::{Generator, Independent}, spectrum::Spectrum, storage::Full, work};
+    /// let settings = Settings { size: [4, 1], layers: 1, samples: 8, goal: None, seed: 0, tile: 8 };
+    /// let white = |_: &Sample<'_, ()>, _: &mut Generator, layers: &mut [Spectrum]| layers[0] = Spectrum::ONE;
+    /// let (mut sums, mut counts) = ([[0.0; 3]; 4], [0; 4]);
+    /// let slots = TileSlots { sums: &mut sums, counts: &mut counts, ..TileSlots::default() };
+    /// let mut tiles = Tiles::lent(settings, Independent, slots)?;
+    /// let (mut of_job, mut colours) = ([[0.0; 3]; 8], [Spectrum::ZERO; 1]);
+    /// assert!(of_job.len() >= settings.room().of_job_sums && colours.len() == settings.room().of_job_colours);
+    /// work::finish(&mut tiles, &white, &mut TileOutput::lent(&mut of_job, &mut colours));
+    /// assert!(!tiles.is_cut() && tiles.counts().samples == 4 * 8);
+    /// # Ok::<(), Full>(())
+    /// ```
+    #[must_use]
+    pub fn lent(sums: &'o mut [[f64; 3]], colours: &'o mut [Spectrum]) -> Self {
+        Self {
+            sums: sums.into(),
+            colours: colours.into(),
+            counts: Counts::default(),
+            tally: T::default(),
+            is_cut: false,
+        }
+    }
+}
+
+/// Lengths of the slices that a picture in lent memory needs: [`Settings::room`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct TileRoom {
+    /// [`TileSlots::sums`].
+    pub sums: usize,
+    /// [`TileSlots::counts`].
+    pub counts: usize,
+    /// [`TileSlots::tiles`].
+    pub tiles: usize,
+    /// [`TileSlots::pixels`].
+    pub pixels: usize,
+    /// Sums of a job's pixels: the first of [`TileOutput::lent`].
+    pub of_job_sums: usize,
+    /// Colours of a sample: the second.
+    pub of_job_colours: usize,
+}
+
+/// Lent memory of a picture, as long as [`Settings::room`] says. None is [`TileSlots::default`].
+#[derive(Debug, Default)]
+pub struct TileSlots<'s> {
+    /// Sums of samples: pixel by pixel from the top left, within each layer by layer.
+    pub sums: &'s mut [[f64; 3]],
+    /// Numbers of samples of the pixels.
+    pub counts: &'s mut [u32],
+    /// What is known of the noise of tiles: only for a [`Settings::goal`].
+    pub tiles: &'s mut [TileNoise],
+    /// What is known of the noise of pixels: only for a [`Settings::goal`].
+    pub pixels: &'s mut [PixelNoise],
+}
+
+/// Most pixels of a job.
+const PIXELS_PER_JOB: u32 = 8;
 
 /// Samples per pixel of the longest pass: longer ones would keep a picture that was left uneven.
 const LONGEST_PASS: u32 = 32;
@@ -196,6 +260,83 @@ pub struct Tiles<'s, Q, C = ()> {
     total: C,
     is_by_pass: bool,
     is_enough: bool,
+    is_cut: bool,
+}
+
+impl<'s, Q, C: Default> Tiles<'s, Q, C> {
+    /// Goes on with what lent memory holds: with zeros, a black picture; with the sums and numbers of samples of a picture
+    /// that was left, that one. When it is dropped, they are the host's again.
+    ///
+    /// # Errors
+    /// [`Full`] if there is less memory than [`Settings::room`] says.
+    ///
+    /// ```
+    /// use fogbow::picture::{Goal, PixelNoise, Sample, Settings, TileNoise, TileOutput, TileRoom, TileSlots, Tiles};
+    /// use fogbow::{sampling::{Generator, Independent, uniform}, spectrum::Spectrum, storage::Full, work};
+    ///
+    /// // Known beforehand, so that everything may lie in arrays, or be `static`.
+    /// const SETTINGS: Settings = Settings {
+    ///     size: [16, 8], layers: 1, samples: 4096, goal: Some(Goal { noise: 0.05, least: 8 }), seed: 0, tile: 8,
+    /// };
+    /// const ROOM: TileRoom = SETTINGS.room();
+    /// let (mut sums, mut counts) = ([[0.0; 3]; ROOM.sums], [0; ROOM.counts]);
+    /// let (mut noise, mut pixels) = ([TileNoise::default(); ROOM.tiles], [PixelNoise::default(); ROOM.pixels]);
+    /// let slots = TileSlots { sums: &mut sums, counts: &mut counts, tiles: &mut noise, pixels: &mut pixels };
+    /// let mut tiles = Tiles::lent(SETTINGS, Independent, slots)?;
+    ///
+    /// // Even on the left, noisy on the right.
+    /// let ramp = |sample: &Sample<'_, ()>, rng: &mut Generator, layers: &mut [Spectrum]| {
+    ///     layers[0] = Spectrum::splat(if sample.x < 8 { 1.0 } else { 2.0 * uniform(rng) });
+    /// };
+    /// let (mut of_job, mut colours) = ([[0.0; 3]; ROOM.of_job_sums], [Spectrum::ZERO; ROOM.of_job_colours]);
+    /// work::finish(&mut tiles, &ramp, &mut TileOutput::lent(&mut of_job, &mut colours));
+    /// assert!(tiles.is_done() && !tiles.is_cut());
+    /// assert!(counts[0] == 8 && counts[15] > 100 && counts[15] < 4096, "{counts:?}");
+    /// assert_eq!(sums[0], [8.0; 3]);
+    /// # Ok::<(), Full>(())
+    /// ```
+    pub fn lent(settings: Settings, source: Q, slots: TileSlots<'s>) -> Result<Self, Full> {
+        let room = settings.room();
+        let TileSlots { sums, counts, tiles, pixels } = slots;
+        let sums = List::holding(sums.get_mut(..room.sums).ok_or(Full)?);
+        let counts = List::holding(counts.get_mut(..room.counts).ok_or(Full)?);
+        let noise = settings.goal.map(|goal| Noise::new(goal, tiles, pixels));
+        Self::start(settings, source, (sums, counts), noise)
+    }
+
+    /// Begins the first pass over a picture of which there are sums and numbers of samples; of the noise nothing is known.
+    fn start(
+        settings: Settings,
+        source: Q,
+        (sums, counts): (List<'s, [f64; 3]>, List<'s, u32>),
+        mut noise: Option<Noise<'s>>,
+    ) -> Result<Self, Full> {
+        if let Some(noise) = &mut noise {
+            let [columns, rows] = settings.grid();
+            for tile in 0..columns * rows {
+                let [x, y] = settings.span(tile);
+                noise.add_tile((x.end - x.start) * (y.end - y.start))?;
+            }
+        }
+        let mut tiles = Self {
+            settings,
+            source,
+            sums,
+            counts,
+            noise,
+            until: 0,
+            pixels_per_job: 1,
+            taken: 0,
+            taken_samples: Counts::default(),
+            total: C::default(),
+            is_by_pass: false,
+            is_enough: settings.samples == 0,
+            is_cut: false,
+        };
+        let done = tiles.least_count();
+        tiles.begin(done.saturating_add(1));
+        Ok(tiles)
+    }
 }
 
 #[cfg(feature = "alloc")]
@@ -203,9 +344,8 @@ impl<Q, C: Default> Tiles<'static, Q, C> {
     /// A black picture.
     #[must_use]
     pub fn new(settings: Settings, source: Q) -> Self {
-        let pixels = settings.size[0] as usize * settings.size[1] as usize;
-        let sums = alloc::vec![[0.0; 3]; pixels * settings.layers as usize];
-        Self::of(settings, source, sums, alloc::vec![0; pixels])
+        let room = settings.room();
+        Self::of(settings, source, alloc::vec![[0.0; 3]; room.sums], alloc::vec![0; room.counts])
     }
 
     /// Goes on with a picture of which there are sums (pixel by pixel from the top left, within each layer by layer) and
@@ -230,35 +370,11 @@ impl<Q, C: Default> Tiles<'static, Q, C> {
     /// ```
     #[must_use]
     pub fn of(settings: Settings, source: Q, sums: alloc::vec::Vec<[f64; 3]>, counts: alloc::vec::Vec<u32>) -> Self {
-        let pixels = settings.size[0] as usize * settings.size[1] as usize;
-        assert!(counts.len() == pixels && sums.len() == pixels * settings.layers as usize, "sums of another picture");
-        let noise = settings.goal.map(|goal| {
-            let mut noise = Noise::new(goal);
-            let [columns, rows] = settings.grid();
-            for tile in 0..columns * rows {
-                let [x, y] = settings.span(tile);
-                // Growing storage is never full.
-                let _ = noise.add_tile((x.end - x.start) * (y.end - y.start));
-            }
-            noise
-        });
-        let mut tiles = Self {
-            settings,
-            source,
-            sums: sums.into(),
-            counts: counts.into(),
-            noise,
-            until: 0,
-            pixels_per_job: 1,
-            taken: 0,
-            taken_samples: Counts::default(),
-            total: C::default(),
-            is_by_pass: false,
-            is_enough: settings.samples == 0,
-        };
-        let done = tiles.least_count();
-        tiles.begin(done.saturating_add(1));
-        tiles
+        let room = settings.room();
+        assert!(counts.len() == room.counts && sums.len() == room.sums, "sums of another picture");
+        let noise = settings.goal.map(|goal| Noise::new(goal, List::default(), List::default()));
+        // Growing storage is never full.
+        Self::start(settings, source, (sums.into(), counts.into()), noise).unwrap_or_else(|Full| unreachable!())
     }
 
     /// Sums and numbers of samples, as [`Tiles::of`] takes them.
@@ -279,9 +395,37 @@ impl<Q, C: Default> Tiles<'static, Q, C> {
 }
 
 impl Settings {
+    /// How much lent memory a picture needs: see [`Tiles::lent`].
+    ///
+    /// ```
+    /// # use fogbow::picture::{Goal, Settings};
+    /// let settings = Settings { size: [17, 8], layers: 2, samples: 64, goal: None, seed: 0, tile: 8 };
+    /// let room = settings.room();
+    /// assert_eq!((room.counts, room.sums, room.tiles, room.pixels), (17 * 8, 2 * 17 * 8, 0, 0));
+    /// let room = Settings { goal: Some(Goal { noise: 0.1, least: 8 }), ..settings }.room();
+    /// assert_eq!((room.tiles, room.pixels), (3, 17 * 8));   // only a goal wants to know of noise
+    /// ```
+    #[must_use]
+    pub const fn room(&self) -> TileRoom {
+        let [columns, rows] = self.grid();
+        let (pixels, layers) = (self.size[0] as usize * self.size[1] as usize, self.layers as usize);
+        let (of_tiles, of_pixels) =
+            if self.goal.is_some() { (columns as usize * rows as usize, pixels) } else { (0, 0) };
+        let of_job = if pixels < PIXELS_PER_JOB as usize { pixels } else { PIXELS_PER_JOB as usize };
+        TileRoom {
+            sums: pixels * layers,
+            counts: pixels,
+            tiles: of_tiles,
+            pixels: of_pixels,
+            of_job_sums: of_job * layers,
+            of_job_colours: layers,
+        }
+    }
+
     /// Columns and rows of tiles.
-    fn grid(&self) -> [u32; 2] {
-        self.size.map(|side| side.div_ceil(self.tile.max(1)))
+    const fn grid(&self) -> [u32; 2] {
+        let side = if self.tile == 0 { 1 } else { self.tile };
+        [self.size[0].div_ceil(side), self.size[1].div_ceil(side)]
     }
 
     /// Columns and rows of pixels of a tile.
@@ -313,7 +457,7 @@ impl<Q, C> Tiles<'_, Q, C> {
         }
         let from = self.least_count();
         self.until = until.min(self.settings.samples);
-        self.pixels_per_job = (SAMPLES_PER_JOB / self.until.saturating_sub(from).max(1)).clamp(1, 8);
+        self.pixels_per_job = (SAMPLES_PER_JOB / self.until.saturating_sub(from).max(1)).clamp(1, PIXELS_PER_JOB);
         self.taken = 0;
         if let Some(noise) = &mut self.noise {
             each_tile(&self.settings, self.sums.as_slice(), self.counts.as_slice(), |tile, parts| {
@@ -332,6 +476,25 @@ impl<Q, C> Tiles<'_, Q, C> {
     #[must_use]
     pub fn is_done(&self) -> bool {
         self.is_enough
+    }
+
+    /// Whether a job's lent [`TileOutput`] was too small: its pixels lack samples.
+    ///
+    /// ```
+    /// # use fogbow::picture::{Sample, Settings, TileOutput, TileSlots, Tiles};
+    /// # use fogbow::{sampling::{Generator, Independent}, spectrum::Spectrum, storage::Full, work};
+    /// # let settings = Settings { size: [2, 1], layers: 1, samples: 1, goal: None, seed: 0, tile: 8 };
+    /// # let white = |_: &Sample<'_, ()>, _: &mut Generator, layers: &mut [Spectrum]| layers[0] = Spectrum::ONE;
+    /// let (mut sums, mut counts) = ([[0.0; 3]; 2], [0; 2]);
+    /// let slots = TileSlots { sums: &mut sums, counts: &mut counts, ..TileSlots::default() };
+    /// let mut tiles = Tiles::lent(settings, Independent, slots)?;
+    /// work::finish(&mut tiles, &white, &mut TileOutput::lent(&mut [], &mut []));
+    /// assert!(tiles.is_cut() && tiles.count(0, 0) == 0);
+    /// # Ok::<(), Full>(())
+    /// ```
+    #[must_use]
+    pub fn is_cut(&self) -> bool {
+        self.is_cut
     }
 
     /// The smallest number of samples of any pixel.
@@ -474,11 +637,14 @@ where
         output.colours.clear();
         (output.counts, output.tally) = (Counts::default(), I::Tally::default());
         let layers = self.settings.layers as usize;
-        for _ in 0..layers {
-            let _ = output.colours.push(Spectrum::ZERO);
+        let pixels = self.pixels_of(job);
+        output.is_cut =
+            output.sums.room() < pixels.len() * layers || output.colours.reset(layers, Spectrum::ZERO).is_err();
+        if output.is_cut {
+            return;
         }
-        let TileOutput { sums: new, colours, counts, tally } = output;
-        for pixel in self.pixels_of(job) {
+        let TileOutput { sums: new, colours, counts, tally, .. } = output;
+        for pixel in pixels {
             let (x, y) = (pixel % self.settings.size[0], pixel / self.settings.size[0]);
             let from = pixel as usize * layers;
             let start = new.len();
@@ -505,6 +671,7 @@ where
         if !self.is_running() {
             return;
         }
+        self.is_cut |= output.is_cut;
         let layers = self.settings.layers as usize;
         let pixels = self.pixels_of(self.taken);
         for (pixel, sums) in pixels.zip(output.sums.as_slice().chunks_exact(layers.max(1))) {

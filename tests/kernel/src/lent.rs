@@ -1,4 +1,4 @@
-//! Methods that fill memory nobody knows the size of beforehand, in lent memory: radiance caches, beams, virtual lights.
+//! Methods that fill memory, in lent memory: radiance caches, beams, virtual lights, pictures.
 //!
 //! The world, the settings and the questions are public, so that hosts with memory that grows can ask the same.
 
@@ -11,8 +11,10 @@ use fogbow::host::{Hit, Scene};
 use fogbow::light::{Light, PointLight, SphereLight};
 use fogbow::math::{Bounds, Ray, Vec3};
 use fogbow::medium::{Homogeneous, Placed, Region};
+use fogbow::path;
 use fogbow::phase::{Lobe, Phase};
-use fogbow::sampling::{Generator, Independent};
+use fogbow::picture::{self, Goal, Integrand, PixelNoise, Sample, TileNoise, TileOutput, TileRoom, TileSlots, Tiles};
+use fogbow::sampling::{Generator, Independent, uniform};
 use fogbow::sh::{Coefficient, coefficient_count};
 use fogbow::spectrum::Spectrum;
 use fogbow::storage::List;
@@ -383,6 +385,54 @@ pub(crate) fn lights(out: &mut Digest) {
     out.int(u64::from(made.is_some()));
 }
 
+// ---------------------------------------------------------------------------------------------
+// Pictures
+
+/// A small picture, whose tiles end as they have little noise.
+pub const PICTURE: picture::Settings = picture::Settings {
+    size: [8, 6],
+    layers: 2,
+    samples: 64,
+    goal: Some(Goal { noise: 0.3, least: 8 }),
+    seed: 23,
+    tile: 4,
+};
+const ROOM: TileRoom = PICTURE.room();
+
+/// A sample by path tracing: all light, and what the medium scattered.
+#[must_use]
+pub fn pixel(world: &Foggy<'_>) -> impl Integrand<Generator, Tally = ()> + Sync {
+    |sample: &Sample<'_, ()>, rng: &mut Generator, layers: &mut [Spectrum]| {
+        let mut at = |index, count| (index as f32 + uniform(rng)) / count as f32;
+        let [x, y] = [(sample.x, PICTURE.size[0]), (sample.y, PICTURE.size[1])].map(|(index, count)| at(index, count));
+        let seen = path::radiance(&eye_ray([x, y]), world, &path::Settings::default(), rng);
+        layers.copy_from_slice(&[seen.total(), seen.medium_single + seen.medium_multiple]);
+    }
+}
+
+/// Folds the sums and numbers of samples of a picture.
+pub fn see_picture(out: &mut Digest, sums: &[[f64; 3]], counts: &[u32]) {
+    sums.iter().flatten().for_each(|sum| out.int(sum.to_bits()));
+    counts.iter().for_each(|count| out.int(u64::from(*count)));
+}
+
+/// Renders in lent memory.
+fn rendered(world: &Foggy<'_>, see: impl FnOnce(&[[f64; 3]], &[u32])) {
+    let (mut sums, mut counts) = ([[0.0; 3]; ROOM.sums], [0; ROOM.counts]);
+    let (mut noise, mut pixels) = ([TileNoise::default(); ROOM.tiles], [PixelNoise::default(); ROOM.pixels]);
+    let slots = TileSlots { sums: &mut sums, counts: &mut counts, tiles: &mut noise, pixels: &mut pixels };
+    if let Ok(mut tiles) = Tiles::lent(PICTURE, Independent, slots) {
+        let (mut of_job, mut colours) = ([[0.0; 3]; ROOM.of_job_sums], [Spectrum::ZERO; ROOM.of_job_colours]);
+        work::finish(&mut tiles, &pixel(world), &mut TileOutput::lent(&mut of_job, &mut colours));
+    }
+    see(&sums, &counts);
+}
+
+pub(crate) fn picture(out: &mut Digest) {
+    let made = with_world(|world| rendered(world, |sums, counts| see_picture(out, sums, counts)));
+    out.int(u64::from(made.is_some()));
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -396,6 +446,11 @@ mod tests {
             });
             shot(world, |beams| assert!(beams.unwrap().pieces().len() > 100));
             made(world, |lights| assert!(lights.unwrap().len() > 40));
+            rendered(world, |sums, counts| {
+                let [least, most] = [counts.iter().min(), counts.iter().max()].map(|count| *count.unwrap());
+                assert!(least >= 8 && least < most && most <= 64, "{counts:?}");
+                assert!(sums.iter().flatten().all(|sum| sum.is_finite()) && sums.iter().any(|sum| sum[0] > 0.0));
+            });
         })
         .unwrap();
     }

@@ -35,6 +35,7 @@ pub const SECTIONS: &[Section] = &[
     Section { name: "cache", run: lent::caches },
     Section { name: "beams", run: lent::beams },
     Section { name: "vpl", run: lent::lights },
+    Section { name: "picture", run: lent::picture },
 ];
 
 /// Inputs of each section: enough to pass through every branch, few enough for a browser.
