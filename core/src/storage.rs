@@ -1,7 +1,10 @@
 //! Layer 0: storage whose size nobody knows beforehand.
 //!
 //! Who knows the bound owns the memory. Where nobody does (cache records, beams),
-//! a [`List`] takes either a slice lent by the host or, with feature `alloc`, a growing `Vec`.
+//! a [`List`] takes either a slice lent by the host or, with feature `alloc`, a growing `Vec`. What takes several lists lays
+//! them out by itself in one lent slice of [`Chunk`]s.
+
+use bytemuck::{Pod, Zeroable};
 
 /// A sequence in lent memory, or in a growing `Vec` with feature `alloc`.
 ///
@@ -23,6 +26,49 @@ enum Storage<'s, T> {
     },
     #[cfg(feature = "alloc")]
     Grown(alloc::vec::Vec<T>),
+}
+
+/// 64 bytes of lent memory, aligned for everything that the library keeps in it.
+///
+/// ```
+/// # use fogbow::storage::Chunk;
+/// let memory = [Chunk::default(); 4];
+/// assert_eq!((size_of_val(&memory), align_of::<Chunk>()), (256, 64));
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
+#[repr(C, align(64))]
+pub struct Chunk([u8; 64]);
+
+impl Default for Chunk {
+    fn default() -> Self {
+        Self([0; 64])
+    }
+}
+
+/// Chunks that so many elements take.
+pub(crate) const fn chunks_for<T>(count: usize) -> usize {
+    (count * size_of::<T>()).div_ceil(size_of::<Chunk>())
+}
+
+/// Takes room for so many elements from the front of `memory`; for as many as there is room.
+pub(crate) fn carve<'s, T: Pod>(memory: &mut &'s mut [Chunk], count: usize) -> &'s mut [T] {
+    const { assert!(align_of::<T>() <= align_of::<Chunk>()) };
+    let all = core::mem::take(memory);
+    let (taken, rest) = all.split_at_mut(chunks_for::<T>(count).min(all.len()));
+    *memory = rest;
+    let bytes: &mut [u8] = bytemuck::cast_slice_mut(taken);
+    let count = count.min(bytes.len() / size_of::<T>());
+    bytemuck::cast_slice_mut(&mut bytes[..count * size_of::<T>()])
+}
+
+/// The most of something that fit, of which `n` take `needed(n)` chunks, each at least one.
+pub(crate) fn most_within(chunks: usize, needed: impl Fn(usize) -> usize) -> usize {
+    let (mut fit, mut too_many) = (0, chunks + 1);
+    while too_many - fit > 1 {
+        let middle = fit + (too_many - fit) / 2;
+        *(if needed(middle) <= chunks { &mut fit } else { &mut too_many }) = middle;
+    }
+    fit
 }
 
 /// A lent slice has no room left.
@@ -264,5 +310,31 @@ impl<T> Default for List<'_, T> {
 impl<T> From<alloc::vec::Vec<T>> for List<'_, T> {
     fn from(vec: alloc::vec::Vec<T>) -> Self {
         Self(Storage::Grown(vec))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn chunks_are_divided_as_they_are_counted() {
+        let mut memory = [Chunk::default(); 5];
+        let mut rest = &mut memory[..];
+        let floats: &mut [f32] = carve(&mut rest, 17);
+        assert_eq!((floats.len(), chunks_for::<f32>(17)), (17, 2));
+        let triples: &mut [[u64; 3]] = carve(&mut rest, 100);
+        // 192 bytes are left.
+        assert_eq!((triples.len(), chunks_for::<[u64; 3]>(100)), (8, 38));
+        assert!(rest.is_empty() && carve::<u8>(&mut rest, 1).is_empty());
+    }
+
+    #[test]
+    fn as_many_fit_as_their_sizes_say() {
+        let needed = |n| if n == 0 { 0 } else { 3 * n + 2 };
+        for chunks in 0..100 {
+            let most = most_within(chunks, needed);
+            assert!(needed(most) <= chunks && needed(most + 1) > chunks, "{chunks}: {most}");
+        }
     }
 }

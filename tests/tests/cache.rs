@@ -1,15 +1,15 @@
 //! The radiance cache: radii, records, mixtures and look-ups. What fills it: `cache_light.rs`.
 
 use fogbow::cache::{
-    Basis, Blend, Cache, Extrapolation, Facing, Index, InsertError, Limits, Reading, Record, SurfaceCache,
-    TurningBasis, VolumeCache, clamp_gradient, exponent_limit, log_gradient_radius, neighbour_clamped, valid_radius,
-    weight,
+    Basis, Blend, Cache, Extrapolation, Facing, InsertError, Limits, Reading, Record, SurfaceCache, TurningBasis,
+    VolumeCache, clamp_gradient, exponent_limit, log_gradient_radius, neighbour_clamped, valid_radius, weight,
 };
 use fogbow::math::Vec3;
 use fogbow::sampling::{Generator, uniform};
 use fogbow::sh::Coefficient;
 use fogbow::single_scatter::{Contribution, Sums};
 use fogbow::spectrum::{Gradient, Spectrum};
+use fogbow::storage::Chunk;
 use proptest::prelude::*;
 
 const KINDS: [Extrapolation; 4] =
@@ -244,11 +244,10 @@ fn attachments_that_are_no_numbers_or_of_another_number_are_refused() {
 /// No room for a third: neither its neighbours nor anything else may know that it was there.
 #[test]
 fn a_full_cache_is_as_before() {
-    for (room, attachments) in [(2, 9), (3, 8)] {
-        let (mut records, mut higher) = ([record(Vec3::ZERO, 1.0); 3], [Coefficient::ZERO; 9]);
-        let index = || Index::new(Vec::new(), Vec::new(), Vec::new(), Vec::new());
-        let mut cache: VolumeCache<'_> =
-            Cache::new(&mut records[..room], &mut higher[..attachments], index(), index(), 3);
+    for spare in [0, 1] {
+        // A chunk more is not enough for a third record.
+        let mut memory = vec![Chunk::default(); VolumeCache::chunks(2, 3) + spare];
+        let mut cache = VolumeCache::lent(&mut memory, 3);
         for x in [0.0, 3.0] {
             cache.insert(record(Vec3::X * x, 5.0), &[Coefficient::ZERO; 3]).unwrap();
         }

@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 use fogbow::bytes::Crc;
 use fogbow::cache::bytes::{self, Attachment, BytesError, HEADER_BYTES, Header, RecordKind, byte_count, read_into};
 use fogbow::cache::{
-    Asked, Basis, Block, Cache, CachesError, Effort, Facing, FilledRecords, Index, IndexNode, Kind, Limits,
-    RadianceCaches, Reading, Record, Settings, SurfaceCache, VolumeCache,
+    Asked, Basis, Cache, CachesError, Effort, Facing, FilledRecords, Kind, Limits, RadianceCaches, Reading, Record,
+    Settings, SurfaceCache, VolumeCache,
 };
 use fogbow::light::{Light, PointLight};
 use fogbow::math::{Ray, Vec3};
@@ -15,6 +15,7 @@ use fogbow::medium::Homogeneous;
 use fogbow::phase::Lobe;
 use fogbow::sh::Coefficient;
 use fogbow::spectrum::{Gradient, Spectrum};
+use fogbow::storage::Chunk;
 use fogbow::surface::Surface;
 use fogbow::work::finish;
 use fogbow::world::World;
@@ -250,12 +251,8 @@ fn a_refused_file_changes_nothing() {
 fn lent_storage_is_filled_or_said_to_be_too_small() {
     let whole = to_bytes(&volume(8, 0, 3));
     for (slots, expected) in [(8, Ok(())), (7, Err(BytesError::Full))] {
-        let (mut records, mut none) = (vec![record(&mut random(1)); slots], [Coefficient::ZERO; 0]);
-        let lent = || ([IndexNode::default(); 32], [0_u32; 256], [[0.0_f32; 4]; 8], [Block::default(); 64]);
-        let (mut a, mut b) = (lent(), lent());
-        let index = Index::new(&mut a.0[..], &mut a.1[..], &mut a.2[..], &mut a.3[..]);
-        let wide = Index::new(&mut b.0[..], &mut b.1[..], &mut b.2[..], &mut b.3[..]);
-        let mut cache: VolumeCache<'_> = Cache::new(&mut records[..], &mut none[..], index, wide, 0);
+        let mut memory = vec![Chunk::default(); VolumeCache::chunks(slots, 0)];
+        let mut cache = VolumeCache::lent(&mut memory, 0);
         assert_eq!(read_into(&whole, TAG, &mut cache), expected);
         assert_eq!(cache.len(), if expected.is_ok() { 8 } else { 0 });
     }

@@ -3,9 +3,8 @@
 use core::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 use fogbow::cache::{
-    Asked, Block, Effort, Estimate, Facing, FilledRecords, Filling, FillingMemory, Guide, Index, IndexNode, IndexRoom,
-    Kind, KindSlots, Limits, Place, RadianceCaches, RaySettings, Reading, Record, Room as Lengths, Settings, Slots,
-    Wanted, clearance, places, room_for,
+    Asked, Effort, Estimate, FilledRecords, Filling, FillingMemory, Guide, Kind, Limits, Place, RadianceCaches,
+    RaySettings, Reading, Record, Room as Lengths, Settings, Slots, Wanted, clearance, places, room_for,
 };
 use fogbow::host::{Gradients, MajorantSegment, Medium, Properties};
 use fogbow::light::{Light, PointLight};
@@ -15,6 +14,7 @@ use fogbow::phase::Lobe;
 use fogbow::sampling::{Generator, uniform};
 use fogbow::sh::Coefficient;
 use fogbow::spectrum::Spectrum;
+use fogbow::storage::Chunk;
 use fogbow::surface::Surface;
 use fogbow::transmittance::thickness::Steps;
 use fogbow::work::{Rounds, finish};
@@ -397,44 +397,12 @@ fn an_estimate_of_nothing_fills_no_radius() {
     }
 }
 
-/// What an index lies in.
-struct OfIndex {
-    nodes: Vec<IndexNode>,
-    entries: Vec<u32>,
-    spheres: Vec<[f32; 4]>,
-    blocks: Vec<Block>,
-}
-
-impl OfIndex {
-    fn new(room: IndexRoom) -> Self {
-        Self {
-            nodes: vec![IndexNode::default(); room.nodes],
-            entries: vec![0; room.entries],
-            spheres: vec![[0.0; 4]; room.spheres],
-            blocks: vec![Block::default(); room.blocks],
-        }
-    }
-
-    fn index(&mut self) -> Index<'_> {
-        Index::new(&mut self.nodes[..], &mut self.entries[..], &mut self.spheres[..], &mut self.blocks[..])
-    }
-}
-
 /// A fill in memory of just these lengths: the bytes of the caches, whether it was cut, and how many records there are.
 fn filled_in(room: &Lengths) -> (Vec<u8>, bool, [usize; 6]) {
     let (fog, walls, lights) = (fog(), self::room(), [lamp()]);
     let world = World { medium: &fog, scene: &walls, lights: &lights };
-    let mut records = room.kinds.map(|kind| vec![Record::default(); kind.records]);
-    let mut higher = room.kinds.map(|kind| vec![Coefficient::ZERO; kind.higher]);
-    let mut facings = room.kinds.map(|kind| vec![Facing::default(); kind.facings]);
-    let mut indices = room.kinds.map(|kind| [OfIndex::new(kind.index), OfIndex::new(kind.wide)]);
-    let mut parts = records.iter_mut().zip(&mut higher).zip(facings.iter_mut().zip(&mut indices));
-    let kinds = Kind::ALL.map(|_| {
-        let ((records, higher), (facings, [index, wide])) = parts.next().unwrap();
-        KindSlots { records, higher, facings, index: index.index(), wide: wide.index() }
-    });
-    let mut views = [0; 1];
-    let caches = RadianceCaches::lent(settings(), &mut views[..], kinds);
+    let (mut memory, mut views) = (vec![Chunk::default(); room.chunks], [0; 1]);
+    let caches = RadianceCaches::lent(settings(), &mut views[..], &mut memory);
 
     let mut wanted = vec![Wanted::default(); room.wanted];
     let [mut open, mut still_open] = [vec![0; room.open], vec![0; room.open]];
@@ -473,14 +441,14 @@ fn a_fill_in_lent_memory_has_the_bits_of_one_that_grows_or_says_that_it_was_cut(
     assert!(!is_cut && bytes == stored(&grown));
 
     // Too little of one thing after the other.
-    let mut kinds = ample.kinds;
-    kinds[Kind::Multiple as usize].records = 7;
-    let (_, is_cut, fewer) = filled_in(&Lengths { kinds, ..ample });
-    assert!(is_cut && fewer[Kind::Multiple as usize] == 7 && fewer[Kind::Single as usize] == counts[0]);
-    let mut kinds = ample.kinds;
-    kinds[Kind::Surface as usize].index.blocks = 3;
-    kinds[Kind::Multiple as usize].wide.nodes = 0;
-    assert!(filled_in(&Lengths { kinds, ..ample }).1);
+    let seven = room_for(&settings(), 20_000, 7).chunks;
+    for chunks in [seven, seven + 1, seven + 17] {
+        let (_, is_cut, fewer) = filled_in(&Lengths { chunks, ..ample });
+        assert!(
+            is_cut && fewer.into_iter().zip(counts).all(|(fewer, count)| fewer == count.min(7)),
+            "{chunks}: {fewer:?}"
+        );
+    }
     for room in [
         Lengths { wanted: 100, ..ample },
         Lengths { open: 50, ..ample },

@@ -3,13 +3,13 @@
 use super::eye::{CachedRadiance, Caches, Reader, radiance, radiance_beyond};
 use super::kind::Kind;
 use super::record::Record;
-use super::room::{KindSlots, stride_of};
+use super::room::{chunks_of, stride_of};
 use super::settings::Settings;
 use super::slot::{ByKind, Slot};
 use super::{Estimator, SurfaceCache, VolumeCache};
 use crate::host::{Medium, Rng, Scene};
 use crate::math::Ray;
-use crate::storage::List;
+use crate::storage::{Chunk, List, most_within};
 use crate::world::World;
 
 /// The caches of a world, by kind. They may be filled again for another view ([`RadianceCaches::fill`]), and then gain
@@ -94,35 +94,26 @@ impl RadianceCaches<'static> {
 }
 
 impl<'s> RadianceCaches<'s> {
-    /// Empty caches in lent memory, kind by kind in the order of [`Kind::ALL`]; that of kinds that the settings do not use is not
-    /// touched. `views` has room for a number for each view that they are to be filled for.
-    /// [`room_for`](super::room_for) tells how much is needed. Where there is too little, places have no record, and eye rays
-    /// sample what is missing: [`Filling::is_cut`](super::Filling::is_cut).
+    /// Empty caches in lent memory, with room for as many records of every kind that the settings use. `views` has room for
+    /// a number for each view that they are to be filled for.
+    ///
+    /// [`room_for`](super::room_for) tells how much is needed: [`Room::chunks`](super::Room::chunks). Where there is too little,
+    /// places have no record, and eye rays sample what is missing: [`Filling::is_cut`](super::Filling::is_cut).
     ///
     /// ```
     /// # use fogbow::cache::*;
-    /// # use fogbow::{host::Empty, math::{Bounds, Ray, Vec3}, medium::Homogeneous, phase::Phase, sh::Coefficient};
+    /// # use fogbow::{host::Empty, math::{Bounds, Ray, Vec3}, medium::Homogeneous, phase::Phase, storage::Chunk};
     /// # use fogbow::{spectrum::Spectrum, work, world::{Outline, World}};
     /// # let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::ONE, Phase::ISOTROPIC)?;
     /// # let world = World { medium: &fog, scene: &Empty, lights: &[] };
     /// # let bounds = Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE };
     /// # let limits = Limits { min: 0.1, max: 1.0 };
     /// # let effort = Effort { tolerance: 0.5, samples: 16, degree: 1, limits, clearance: f32::INFINITY, free_paths: f32::INFINITY };
-    /// const RECORDS: usize = 48;
     /// let settings = Settings { surface: Some(effort), rays: 16, ..Settings::default() };
-    /// let (mut records, mut higher) = ([Record::default(); RECORDS], [Coefficient::ZERO; 3 * RECORDS]);
-    /// let (mut nodes, mut entries) = ([[IndexNode::default(); 4 * RECORDS]; 2], [[0; 24 * RECORDS]; 2]);
-    /// let (mut spheres, mut blocks) = ([[[0.0; 4]; RECORDS]; 2], [[Block::default(); 14 * RECORDS]; 2]);
-    /// let mut parts = nodes.iter_mut().zip(&mut entries).zip(spheres.iter_mut().zip(&mut blocks));
-    /// let mut index = || {
-    ///     let ((nodes, entries), (spheres, blocks)) = parts.next().unwrap();
-    ///     Index::new(&mut nodes[..], &mut entries[..], &mut spheres[..], &mut blocks[..])
-    /// };
-    /// let mut kinds: [KindSlots<'_>; Kind::COUNT] = Default::default();
-    /// kinds[Kind::Surface as usize] =
-    ///     KindSlots { records: &mut records, higher: &mut higher, facings: &mut [], index: index(), wide: index() };
-    /// let mut views = [0; 1];
-    /// let caches = RadianceCaches::lent(settings, &mut views[..], kinds);
+    /// // One cache of 48 records with three coefficients each.
+    /// let (mut memory, mut views) = ([Chunk::default(); VolumeCache::chunks(48, 3)], [0; 1]);
+    /// assert_eq!(room_for(&settings, 1000, 48).chunks, memory.len());
+    /// let caches = RadianceCaches::lent(settings, &mut views[..], &mut memory);
     ///
     /// // As much for the fill and for its jobs; here there is none, so that no place is even looked for.
     /// let asked = Asked::<fn([f32; 2]) -> Ray>::Box(bounds);
@@ -132,18 +123,14 @@ impl<'s> RadianceCaches<'s> {
     /// # Ok::<(), fogbow::medium::MediumError>(())
     /// ```
     #[must_use]
-    pub fn lent(settings: Settings, views: impl Into<List<'s, u64>>, kinds: [KindSlots<'s>; Kind::COUNT]) -> Self {
-        let mut number = 0;
-        let slots = kinds.map(|KindSlots { records, higher, facings, index, wide }| {
-            let kind = Kind::ALL[number];
-            number += 1;
-            match stride_of(&settings, kind) {
-                None => Slot::Off,
-                Some(stride) if kind.is_on_surfaces() => {
-                    Slot::Surface(SurfaceCache::new(records, facings, index, wide, stride))
-                }
-                Some(stride) => Slot::Volume(VolumeCache::new(records, higher, index, wide, stride)),
-            }
+    pub fn lent(settings: Settings, views: impl Into<List<'s, u64>>, memory: &'s mut [Chunk]) -> Self {
+        let needed = |records| Kind::ALL.into_iter().map(|kind| chunks_of(&settings, kind, records)).sum::<usize>();
+        let records = most_within(memory.len(), needed);
+        let mut rest = memory;
+        let slots = Kind::ALL.map(|kind| match stride_of(&settings, kind) {
+            None => Slot::Off,
+            Some(stride) if kind.is_on_surfaces() => Slot::Surface(SurfaceCache::carved(&mut rest, records, stride)),
+            Some(stride) => Slot::Volume(VolumeCache::carved(&mut rest, records, stride)),
         });
         let mut views = views.into();
         views.clear();

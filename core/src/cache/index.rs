@@ -19,7 +19,7 @@ use bytemuck::{Pod, Zeroable};
 use glam::Vec4;
 
 use crate::math::{Vec3, float};
-use crate::storage::{Full, List};
+use crate::storage::{Chunk, Full, List, carve, chunks_for};
 
 /// Halvings of the root cell, at most.
 ///
@@ -243,6 +243,12 @@ pub(super) fn holds(centre: Vec3, radius: f32) -> bool {
     radius >= SMALLEST && centre.abs().cmple(Vec3::splat(FARTHEST - radius)).all()
 }
 
+/// Nodes, entries and blocks for so many spheres. Blocks have a bound that does not depend on how wide spheres are.
+const fn lengths(spheres: usize, wider: usize) -> [usize; 3] {
+    let few = if spheres == 0 { 0 } else { 16 };
+    [wider * spheres + few, 6 * wider * spheres + few, 4 * spheres + few]
+}
+
 impl<'s> Index<'s> {
     /// An empty index in storage lent or growing.
     ///
@@ -279,6 +285,26 @@ impl<'s> Index<'s> {
         };
         index.clear();
         index
+    }
+
+    /// Chunks of memory with room for so many spheres, some `wider` times as large as those of records mostly are.
+    pub(super) const fn chunks(spheres: usize, wider: usize) -> usize {
+        let [nodes, entries, blocks] = lengths(spheres, wider);
+        chunks_for::<IndexNode>(nodes)
+            + chunks_for::<u32>(entries)
+            + chunks_for::<[f32; 4]>(spheres)
+            + chunks_for::<Block>(blocks)
+    }
+
+    /// An empty index in the first [`Index::chunks`] of `memory`.
+    pub(super) fn lent(memory: &mut &'s mut [Chunk], spheres: usize, wider: usize) -> Self {
+        let [nodes, entries, blocks] = lengths(spheres, wider);
+        Self::new(
+            carve::<IndexNode>(memory, nodes),
+            carve::<u32>(memory, entries),
+            carve::<[f32; 4]>(memory, spheres),
+            carve::<Block>(memory, blocks),
+        )
     }
 
     /// Number of spheres it was built over, those left out included.

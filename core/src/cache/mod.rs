@@ -81,7 +81,7 @@ pub use presets::{ERROR_BOUNDS, MOST_SAMPLES, USUAL_ERROR};
 pub use radius::{Limits, clamp_gradient, clearance, log_gradient_radius, neighbour_clamped, valid_radius};
 pub use readers::ScatteredLight;
 pub use record::{Attachment, Facing, Record};
-pub use room::{IndexRoom, KindRoom, KindSlots, Room, Slots, room_for};
+pub use room::{Room, Slots, room_for};
 pub use set_bytes::CachesError;
 pub use settings::{Effort, Settings};
 pub use store::{Cache, InsertError, SurfaceCache, VolumeCache};

@@ -2,54 +2,17 @@
 
 use super::fill::{PLACES_OF_JOB, PLACES_PER_JOB};
 use super::guide::Guide;
-use super::index::Index;
 use super::kind::Kind;
 use super::record::MAX_STRIDE;
 use super::settings::Settings;
-use super::{Estimate, Facing, Record, Wanted};
+use super::{Estimate, SurfaceCache, VolumeCache, Wanted};
 use crate::sh::{Coefficient, coefficient_count};
 
-/// Lengths of the slices that a kind of caches lies in: [`KindSlots`].
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct KindRoom {
-    /// Records.
-    pub records: usize,
-    /// Coefficients of expansions: none on surfaces.
-    pub higher: usize,
-    /// What records on surfaces have besides: none in the medium.
-    pub facings: usize,
-    /// What its index lies in.
-    pub index: IndexRoom,
-    /// What the index of its wider spheres lies in.
-    pub wide: IndexRoom,
-}
-
-/// Lengths of the slices that an [`Index`] lies in.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct IndexRoom {
-    /// Inner nodes.
-    pub nodes: usize,
-    /// Entries.
-    pub entries: usize,
-    /// Spheres.
-    pub spheres: usize,
-    /// Blocks of four spheres.
-    pub blocks: usize,
-}
-
-impl IndexRoom {
-    /// For so many spheres, which are so many times as large as usual. Blocks have a bound that does not depend on it.
-    const fn of(spheres: usize, wider: usize) -> Self {
-        let few = if spheres == 0 { 0 } else { 16 };
-        Self { nodes: wider * spheres + few, entries: 6 * wider * spheres + few, spheres, blocks: 4 * spheres + few }
-    }
-}
-
-/// Lengths of all slices that a fill of lent caches needs.
+/// Lengths of all lent memory that caches and their filling need.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Room {
-    /// Of each kind, in the order of [`Kind::ALL`]: see [`RadianceCaches::lent`](super::RadianceCaches::lent).
-    pub kinds: [KindRoom; Kind::COUNT],
+    /// Of all caches together: see [`RadianceCaches::lent`](super::RadianceCaches::lent).
+    pub chunks: usize,
     /// [`Slots::wanted`].
     pub wanted: usize,
     /// Each of [`Slots::open`].
@@ -75,14 +38,13 @@ pub struct Room {
 /// [`Filling::is_cut`](super::Filling::is_cut).
 ///
 /// ```
-/// # use fogbow::cache::{Effort, Kind, Limits, Settings, room_for};
+/// # use fogbow::cache::{Effort, Kind, Limits, Settings, VolumeCache, room_for};
 /// let limits = Limits { min: 0.1, max: 1.0 };
 /// let effort = Effort { tolerance: 0.5, samples: 32, degree: 2, limits, clearance: f32::INFINITY, free_paths: f32::INFINITY };
 /// let room = room_for(&Settings { surface: Some(effort), ..Settings::default() }, 1000, 50);
-/// let [surface, multiple] = [Kind::Surface, Kind::Multiple].map(|kind| room.kinds[kind as usize]);
-/// // Nine coefficients, the mean of which is the record itself.
-/// assert_eq!((surface.records, surface.higher, surface.facings), (50, 400, 0));
-/// assert_eq!((multiple.records, room.wanted), (0, 1000));
+/// // One cache. Of nine coefficients the mean is the record itself.
+/// assert_eq!(room.chunks, VolumeCache::chunks(50, 8));
+/// assert_eq!((room.wanted, room.guides[Kind::Surface as usize], room.guides[Kind::Multiple as usize]), (1000, 50, 0));
 /// ```
 #[must_use]
 pub fn room_for(settings: &Settings, places: usize, records: usize) -> Room {
@@ -90,18 +52,12 @@ pub fn room_for(settings: &Settings, places: usize, records: usize) -> Room {
     let mut stride = 0;
     for (i, kind) in Kind::ALL.into_iter().enumerate() {
         let Some(of_kind) = stride_of(settings, kind) else { continue };
-        room.kinds[i] = KindRoom {
-            records,
-            higher: if kind.is_on_surfaces() { 0 } else { records * of_kind },
-            facings: if kind.is_on_surfaces() { records } else { 0 },
-            index: IndexRoom::of(records, 1),
-            wide: IndexRoom::of(records, 3),
-        };
         room.guides[i] = records;
         if !kind.is_on_surfaces() {
             stride = of_kind.max(stride);
         }
     }
+    room.chunks = Kind::ALL.into_iter().map(|kind| chunks_of(settings, kind, records)).sum();
     room.wanted = places;
     room.open = places;
     room.chosen = settings.round as usize;
@@ -119,26 +75,12 @@ pub(super) fn stride_of(settings: &Settings, kind: Kind) -> Option<usize> {
     Some(if kind.is_on_surfaces() { 1 } else { (coefficient_count(effort.degree) - 1).min(MAX_STRIDE) })
 }
 
-/// Lent memory of the caches of one kind, as long as [`KindRoom`] says. None is [`KindSlots::default`].
-#[derive(Debug)]
-pub struct KindSlots<'s> {
-    /// For records.
-    pub records: &'s mut [Record],
-    /// For coefficients of expansions: in the medium only.
-    pub higher: &'s mut [Coefficient],
-    /// For what records on surfaces have besides: there only.
-    pub facings: &'s mut [Facing],
-    /// Finds records.
-    pub index: Index<'s>,
-    /// Finds records by spheres twice as large.
-    pub wide: Index<'s>,
-}
-
-impl Default for KindSlots<'_> {
-    /// No memory.
-    fn default() -> Self {
-        let index = || Index::new(&mut [][..], &mut [][..], &mut [][..], &mut [][..]);
-        Self { records: &mut [], higher: &mut [], facings: &mut [], index: index(), wide: index() }
+/// Chunks of a cache of a kind with room for so many records; none if the settings do not use it.
+pub(super) fn chunks_of(settings: &Settings, kind: Kind, records: usize) -> usize {
+    match stride_of(settings, kind) {
+        None => 0,
+        Some(stride) if kind.is_on_surfaces() => SurfaceCache::chunks(records, stride),
+        Some(stride) => VolumeCache::chunks(records, stride),
     }
 }
 

@@ -10,7 +10,7 @@ use super::record::{Attachment, Facing, MAX_STRIDE, Record};
 use crate::math::float;
 use crate::sh::Coefficient;
 use crate::spectrum::{Gradient, Spectrum};
-use crate::storage::{Full, List};
+use crate::storage::{Chunk, Full, List, carve, chunks_for, most_within};
 
 /// Records not yet in the index: looked at one by one, so only few; but every rebuild costs as much as
 /// a few hundred records.
@@ -27,16 +27,11 @@ const MAX_RECORDS: usize = 1 << 28;
 /// any number of threads may read.
 ///
 /// ```
-/// # use fogbow::cache::{Block, Cache, Index, IndexNode, Record};
-/// # use fogbow::{bytemuck::Zeroable, math::Vec3, sh::Coefficient, spectrum::{Gradient, Spectrum}};
-/// # let (mut nodes, mut entries, mut spheres) = ([IndexNode::default(); 1], [0; 6], [[0.0; 4]; 1]);
-/// # let (mut wide_nodes, mut wide_entries, mut wide_spheres) = (nodes, entries, spheres);
-/// # let (mut blocks, mut wide_blocks) = ([Block::default(); 20], [Block::default(); 20]);
-/// # let index = Index::new(&mut nodes[..], &mut entries[..], &mut spheres[..], &mut blocks[..]);
-/// # let wide = Index::new(&mut wide_nodes[..], &mut wide_entries[..], &mut wide_spheres[..], &mut wide_blocks[..]);
-/// let (mut records, mut attached) = ([Record::zeroed(); 1], [Coefficient::ZERO; 3]);
+/// # use fogbow::cache::{Record, VolumeCache};
+/// # use fogbow::{math::Vec3, sh::Coefficient, spectrum::{Gradient, Spectrum}, storage::Chunk};
 /// // Room for one record with an expansion of degree 1: three coefficients besides the mean.
-/// let mut cache = Cache::new(&mut records[..], &mut attached[..], index, wide, 3);
+/// let mut memory = [Chunk::default(); VolumeCache::chunks(1, 3)];
+/// let mut cache = VolumeCache::lent(&mut memory, 3);
 /// assert!(cache.is_empty() && cache.stride() == 3);
 /// let record = Record { position: Vec3::ZERO, radius: 1.0, value: Spectrum::ONE, gradient: Gradient::ZERO };
 /// let higher = [Coefficient { value: Spectrum::splat(0.5), gradient: Gradient::ZERO }; 3];
@@ -64,6 +59,10 @@ pub struct Cache<'s, E> {
     wide: Index<'s>,
     stride: usize,
 }
+
+/// Nodes and entries of the index of wider spheres, in those of the other: a sphere that is twice as large lies in more
+/// cells.
+const WIDER: usize = 3;
 
 /// By how much spheres are widened: in the medium for points that none contains, on surfaces against noise.
 pub(super) const WIDE: f32 = 2.0;
@@ -166,22 +165,57 @@ pub type VolumeCache<'s> = Cache<'s, Coefficient>;
 pub type SurfaceCache<'s> = Cache<'s, Facing>;
 
 impl<'s, E: Attachment> Cache<'s, E> {
-    /// An empty cache in lent or growing storage, with `stride` attachments per record, those of an expansion of
-    /// [`MAX_DEGREE`](crate::sh::MAX_DEGREE) at most: more are cut to as many. `wide` is the
-    /// index that [`Cache::finish`] makes of spheres twice as large; it needs two to three times the room of `index`.
+    /// An empty cache in lent memory, with `stride` attachments per record: for as many records as there is room, see
+    /// [`Cache::chunks`]. A stride is at most that of an expansion of [`MAX_DEGREE`](crate::sh::MAX_DEGREE); more are cut
+    /// to as many.
+    ///
+    /// Lend more where records come in crowds within crowds: their index may want more. Without room for it, records
+    /// are looked at one by one, and [`Cache::finish`] says so.
+    ///
+    /// ```
+    /// # use fogbow::cache::{InsertError, Record, VolumeCache};
+    /// # use fogbow::{math::Vec3, spectrum::{Gradient, Spectrum}, storage::Chunk};
+    /// let mut memory = [Chunk::default(); VolumeCache::chunks(8, 0)];
+    /// let mut cache = VolumeCache::lent(&mut memory, 0);
+    /// let at = |i: f32| Record { position: i * Vec3::X, radius: 1.0, value: Spectrum::ONE, gradient: Gradient::ZERO };
+    /// for i in 0..8 {
+    ///     cache.insert(at(i as f32), &[])?;
+    /// }
+    /// assert_eq!(cache.insert(at(8.0), &[]), Err(InsertError::Full));
+    /// cache.finish()?;
+    /// # Ok::<(), Box<dyn core::error::Error>>(())
+    /// ```
     #[must_use]
-    pub fn new(
-        records: impl Into<List<'s, Record>>,
-        attached: impl Into<List<'s, E>>,
-        index: Index<'s>,
-        wide: Index<'s>,
-        stride: usize,
-    ) -> Self {
+    pub fn lent(memory: &'s mut [Chunk], stride: usize) -> Self {
+        let records = most_within(memory.len(), |records| Self::chunks(records, stride));
+        Self::carved(&mut { memory }, records, stride)
+    }
+
+    /// In the first [`Cache::chunks`] of `memory`.
+    pub(super) fn carved(memory: &mut &'s mut [Chunk], records: usize, stride: usize) -> Self {
         let stride = stride.min(MAX_STRIDE);
-        let mut cache = Self { records: records.into(), attached: attached.into(), index, wide, stride };
-        cache.records.clear();
-        cache.attached.clear();
-        cache
+        let index = Index::lent(memory, records, 1);
+        let wide = Index::lent(memory, records, WIDER);
+        let attached = carve::<E>(memory, records * stride);
+        Self { records: carve::<Record>(memory, records).into(), attached: attached.into(), index, wide, stride }
+    }
+
+    /// Chunks of memory that `records` with `stride` attachments each take, their indices included.
+    ///
+    /// ```
+    /// # use fogbow::cache::{SurfaceCache, VolumeCache};
+    /// assert_eq!(VolumeCache::chunks(0, 3), 0);
+    /// // Some 1.1 kB a record without an expansion, most of it for the worst that indices may want.
+    /// assert!((1080..1120).contains(&(64 * VolumeCache::chunks(1000, 0) / 1000)));
+    /// assert!(SurfaceCache::chunks(1000, 1) > VolumeCache::chunks(1000, 0));
+    /// ```
+    #[must_use]
+    pub const fn chunks(records: usize, stride: usize) -> usize {
+        let stride = if stride < MAX_STRIDE { stride } else { MAX_STRIDE };
+        Index::chunks(records, 1)
+            + Index::chunks(records, WIDER)
+            + chunks_for::<E>(records * stride)
+            + chunks_for::<Record>(records)
     }
 
     /// All records, in the order of their insertion.
@@ -440,7 +474,7 @@ impl<'s, E: Attachment> Cache<'s, E> {
 
 #[cfg(feature = "alloc")]
 impl<E: Attachment> Cache<'_, E> {
-    /// An empty cache that grows as needed; `stride` as for [`Cache::new`].
+    /// An empty cache that grows as needed; `stride` as for [`Cache::lent`].
     ///
     /// ```
     /// # use fogbow::{cache::{Cache, Record, VolumeCache}, math::Vec3, spectrum::{Gradient, Spectrum}};
@@ -456,7 +490,13 @@ impl<E: Attachment> Cache<'_, E> {
     pub fn growing(stride: usize) -> Self {
         use alloc::vec::Vec;
         let index = || Index::new(Vec::new(), Vec::new(), Vec::new(), Vec::new());
-        Self::new(Vec::new(), Vec::new(), index(), index(), stride)
+        Self {
+            records: List::default(),
+            attached: List::default(),
+            index: index(),
+            wide: index(),
+            stride: stride.min(MAX_STRIDE),
+        }
     }
 }
 

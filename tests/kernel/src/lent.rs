@@ -4,8 +4,8 @@
 
 use fogbow::beams::{self, Beams};
 use fogbow::cache::{
-    self, Asked, Block, Effort, Estimate, Facing, FillingMemory, Guide, Index, IndexNode, Kind, KindSlots, Limits,
-    Place, RadianceCaches, Record, Slots, TurningBasis, Wanted,
+    self, Asked, Effort, Estimate, FillingMemory, Guide, Kind, Limits, Place, RadianceCaches, Slots, SurfaceCache,
+    TurningBasis, VolumeCache, Wanted,
 };
 use fogbow::host::{Hit, Scene};
 use fogbow::light::{Light, PointLight, SphereLight};
@@ -17,7 +17,7 @@ use fogbow::picture::{self, Goal, Integrand, PixelNoise, Sample, TileNoise, Tile
 use fogbow::sampling::{Generator, Independent, uniform};
 use fogbow::sh::{Coefficient, coefficient_count};
 use fogbow::spectrum::Spectrum;
-use fogbow::storage::List;
+use fogbow::storage::{Chunk, List};
 use fogbow::surface::Surface;
 use fogbow::vpl::{self, Receiver, VirtualLight};
 use fogbow::work;
@@ -119,60 +119,13 @@ pub fn cache_settings() -> cache::Settings {
 /// Where light is asked for.
 pub const ASKED: Asked = Asked::View { ray: eye_ray, pixel: 0.05 };
 
-/// Room for an index.
-struct IndexSlots {
-    nodes: [IndexNode; 3 * RECORDS + 16],
-    entries: [u32; 18 * RECORDS + 16],
-    spheres: [[f32; 4]; RECORDS],
-    blocks: [Block; 4 * RECORDS + 16],
-}
-
-impl IndexSlots {
-    fn new() -> Self {
-        Self {
-            nodes: [IndexNode::default(); 3 * RECORDS + 16],
-            entries: [0; 18 * RECORDS + 16],
-            spheres: [[0.0; 4]; RECORDS],
-            blocks: [Block::default(); 4 * RECORDS + 16],
-        }
-    }
-
-    fn index(&mut self) -> Index<'_> {
-        Index::new(&mut self.nodes[..], &mut self.entries[..], &mut self.spheres[..], &mut self.blocks[..])
-    }
-}
-
-/// Room for the caches of one kind.
-struct KindArrays {
-    records: [Record; RECORDS],
-    higher: [Coefficient; STRIDE * RECORDS],
-    facings: [Facing; RECORDS],
-    near: IndexSlots,
-    far: IndexSlots,
-}
-
-impl KindArrays {
-    fn new() -> Self {
-        Self {
-            records: [Record::default(); RECORDS],
-            higher: [Coefficient::ZERO; STRIDE * RECORDS],
-            facings: [Facing::default(); RECORDS],
-            near: IndexSlots::new(),
-            far: IndexSlots::new(),
-        }
-    }
-
-    fn lend(&mut self) -> KindSlots<'_> {
-        let Self { records, higher, facings, near, far } = self;
-        KindSlots { records, higher, facings, index: near.index(), wide: far.index() }
-    }
-}
+/// Room for the caches of all kinds.
+const CHUNKS: usize = 4 * VolumeCache::chunks(RECORDS, STRIDE) + 2 * SurfaceCache::chunks(RECORDS, 1);
 
 /// Fills caches in lent memory and calls `read` with them and with whether the memory was too small.
 fn filled(world: &Foggy<'_>, read: impl FnOnce(&RadianceCaches<'_>, bool)) {
-    let mut kinds = [(); Kind::COUNT].map(|()| KindArrays::new());
-    let mut views = [0; 1];
-    let caches = RadianceCaches::lent(cache_settings(), &mut views[..], kinds.each_mut().map(KindArrays::lend));
+    let (mut memory, mut views) = ([Chunk::default(); CHUNKS], [0; 1]);
+    let caches = RadianceCaches::lent(cache_settings(), &mut views[..], &mut memory);
 
     let mut wanted = [[Wanted::default(); PLACES]; 2];
     let mut open = [[0; PLACES]; 3];
@@ -461,14 +414,6 @@ mod tests {
         assert_eq!((room.wanted, room.open, room.of_job_wanted, room.of_job_open), (PLACES, PLACES, PLACES, PLACES));
         assert_eq!((room.chosen, room.estimates, room.higher), (ROUND, RECORDS, STRIDE * RECORDS));
         assert_eq!((room.of_job_higher, room.guides), (STRIDE, [RECORDS; Kind::COUNT]));
-        let arrays = KindArrays::new();
-        for kind in room.kinds {
-            assert_eq!(kind.records, arrays.records.len());
-            assert!(kind.higher <= arrays.higher.len() && kind.facings <= arrays.facings.len());
-            for (room, slots) in [(kind.index, &arrays.near), (kind.wide, &arrays.far)] {
-                assert!(room.nodes <= slots.nodes.len() && room.entries <= slots.entries.len());
-                assert!(room.spheres <= slots.spheres.len() && room.blocks <= slots.blocks.len());
-            }
-        }
+        assert_eq!(room.chunks, CHUNKS);
     }
 }
