@@ -204,8 +204,9 @@ pub trait Medium {
         1e-2
     }
 
-    /// `∇σₜ` and `∇σₛ` (m⁻²) inside the medium. The default takes central differences over a
-    /// hundredth of [`Medium::resolution`].
+    /// `∇σₜ` and `∇σₛ` (m⁻²) inside the medium. The default takes central differences over about a
+    /// hundredth of [`Medium::resolution`]: far from the origin, where single precision tells no such steps apart, over up to
+    /// all of it, and over more only where points lie farther apart than that.
     ///
     /// ```
     /// # use fogbow::{host::Medium, math::Vec3, medium::{FractalNoise, Noise}, phase::Phase, spectrum::Spectrum};
@@ -218,7 +219,8 @@ pub trait Medium {
     /// # Ok::<(), fogbow::medium::MediumError>(())
     /// ```
     fn gradients(&self, point: Vec3) -> Gradients {
-        let step = 1e-2 * self.resolution();
+        let resolution = self.resolution();
+        let step = difference_step(point, 1e-2 * resolution, resolution);
         let difference = |axis: Vec3| {
             let (a, b) = (self.properties(point + axis * step), self.properties(point - axis * step));
             let scale = 0.5 / step;
@@ -228,10 +230,11 @@ pub trait Medium {
         Gradients { extinction: Gradient { x: x.0, y: y.0, z: z.0 }, scattering: Gradient { x: x.1, y: y.1, z: z.1 } }
     }
 
-    /// Hessian of extinction (m⁻³) inside the medium. The default takes second differences over
-    /// [`Medium::resolution`].
+    /// Hessian of extinction (m⁻³) inside the medium. The default takes second differences over about
+    /// [`Medium::resolution`], and over more only where single precision tells points no better apart.
     fn extinction_hessian(&self, point: Vec3) -> Hessian {
-        let h = self.resolution();
+        let resolution = self.resolution();
+        let h = difference_step(point, resolution, resolution);
         let at = |offset: Vec3| self.extinction(point + offset * h);
         let centre = at(Vec3::ZERO);
         let second = |a: Vec3| (at(a) + at(-a) - centre * 2.0) / (h * h);
@@ -270,6 +273,20 @@ pub trait Medium {
     fn is_emissive(&self) -> bool {
         false
     }
+}
+
+/// Roundings of a coordinate that a step of differences should have. Fewer: what a medium makes of its own rounding of
+/// points shows; more: details blur sooner.
+const ROUNDINGS: f32 = 256.0;
+
+/// A step (m) for differences around `point`: `usual`, or more where that is few roundings of the coordinates, but then at
+/// most `most`; no less than four roundings in any case. Rounded up to a power of two: then points and steps add up without
+/// rounding.
+fn difference_step(point: Vec3, usual: f32, most: f32) -> f32 {
+    let rounding = f32::EPSILON * point.abs().max_element();
+    let step = usual.max((ROUNDINGS * rounding).min(most)).max(4.0 * rounding).max(f32::MIN_POSITIVE);
+    // The mantissa goes.
+    f32::from_bits((step.to_bits() + 0x007f_ffff) & 0xff80_0000)
 }
 
 impl<M: Medium + ?Sized> Medium for &M {
@@ -392,5 +409,70 @@ impl Medium for Empty {
     }
     fn is_grey(&self) -> bool {
         true
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Extinction rises with x, from 1 at `start`.
+    struct Slope {
+        start: f32,
+        resolution: f32,
+    }
+
+    const SLOPE: f32 = 0.3;
+
+    impl Medium for Slope {
+        fn properties(&self, point: Vec3) -> Properties {
+            let scattering = Spectrum::splat(1.0 + SLOPE * (point.x - self.start));
+            Properties { scattering, ..Properties::VACUUM }
+        }
+        fn majorant_segment(&self, _: &Ray, _: f32) -> MajorantSegment {
+            MajorantSegment { until: f32::INFINITY, minorant: Spectrum::ZERO, majorant: Spectrum::splat(2.0) }
+        }
+        fn resolution(&self) -> f32 {
+            self.resolution
+        }
+    }
+
+    #[test]
+    fn default_gradients_are_right_far_from_the_origin() {
+        for (start, resolution) in
+            [(0.0, 1e-2), (100.0, 1e-2), (1_000.0, 1e-2), (10_000.0, 1e-2), (1e6, 1e-2), (1e4, 10.0)]
+        {
+            let (medium, point) = (Slope { start, resolution }, Vec3::new(start, -0.3 * start, 7.0));
+            let Gradients { extinction, scattering } = medium.gradients(point);
+            // Steps are sums of powers of two: what is left is the rounding of two values near 1, over a step of at
+            // least a sixteenth of a thousandth.
+            let most = 2.0 * f32::EPSILON / 6e-5;
+            assert!((extinction.x[0] - SLOPE).abs() < most, "at {start}: {}", extinction.x[0]);
+            assert!(scattering == extinction && extinction.y.is_black() && extinction.z.is_black());
+        }
+    }
+
+    /// Extinction that bends.
+    struct Bowl(f32);
+
+    impl Medium for Bowl {
+        fn properties(&self, point: Vec3) -> Properties {
+            let x = point.x - self.0;
+            Properties { scattering: Spectrum::splat(1.0 + x + 20.0 * x * x), ..Properties::VACUUM }
+        }
+        fn majorant_segment(&self, _: &Ray, _: f32) -> MajorantSegment {
+            MajorantSegment { until: f32::INFINITY, minorant: Spectrum::ZERO, majorant: Spectrum::splat(2.0) }
+        }
+    }
+
+    #[test]
+    fn default_hessians_are_right_far_from_the_origin() {
+        for start in [0.0, 100.0, 1_000.0, 10_000.0] {
+            let hessian = Bowl(start).extinction_hessian(Vec3::new(start, 1.0, 0.0));
+            // The rounding of four values near 1, over the square of a step of a hundredth.
+            let most = 4.0 * f32::EPSILON / 1e-4;
+            assert!((hessian.xx[0] - 40.0).abs() < most, "at {start}: {}", hessian.xx[0]);
+            assert!(hessian.xy[0].abs() < most && hessian.yy.is_black(), "at {start}: {hessian:?}");
+        }
     }
 }
