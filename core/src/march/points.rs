@@ -50,7 +50,8 @@ pub fn scattering_points(
     let spacing = 1.0 / density.max(1e-3);
     // Share of opacity at the next point, and the mean thickness there.
     let mut next = u * spacing;
-    let mut due = -float::ln_1p(-next);
+    let due_at = |share: f32| if share < 1.0 { -float::ln_1p(-share) } else { f32::INFINITY };
+    let mut due = due_at(next);
     let mut emitted = Spectrum::ZERO;
     let mut thickness = Spectrum::ZERO;
     let emissive = medium.is_emissive();
@@ -95,7 +96,7 @@ pub fn scattering_points(
                     let transmittance = (thickness + extinction * (distance - at)).transmitted();
                     visit(distance, &properties, transmittance * (spacing / ((1.0 - next) * mean)));
                     next += spacing;
-                    due = if next < 1.0 { -float::ln_1p(-next) } else { f32::INFINITY };
+                    due = due_at(next);
                 }
             }
             if emissive && !properties.emission.is_black() {

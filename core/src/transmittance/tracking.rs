@@ -191,7 +191,11 @@ fn coloured(medium: &(impl Medium + ?Sized), ray: &Ray, throughput: Spectrum, u:
                     let density = mixture(relative * majorant);
                     emission += properties.emission * relative / density;
                 }
-                let extinction = properties.extinction();
+                let mut extinction = properties.extinction();
+                // At a face the point may be rounded to its other side; what was promised is what counts.
+                if is_sure && !(extinction[channel] > 0.0) {
+                    extinction = majorant;
+                }
                 if is_sure || uniform(rng) * bound < extinction[channel] {
                     relative = bounded(relative * (extinction / extinction[channel]));
                     span.extend(from, t);
@@ -328,4 +332,39 @@ fn coloured_transmittance(medium: &(impl Medium + ?Sized), ray: &Ray, rng: &mut 
         }
     }
     ratio * closed.transmitted()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::host::MajorantSegment;
+    use crate::math::Vec3;
+
+    /// Says that it is even fog and is vacuum where it is looked at: as at a face, where a point is rounded to the other side.
+    struct Face;
+
+    const EXTINCTION: Spectrum = Spectrum::new(0.5, 1.0, 2.0);
+
+    impl Medium for Face {
+        fn properties(&self, _: Vec3) -> Properties {
+            Properties::VACUUM
+        }
+        fn majorant_segment(&self, _: &Ray, _: f32) -> MajorantSegment {
+            MajorantSegment { until: f32::INFINITY, minorant: EXTINCTION, majorant: EXTINCTION }
+        }
+    }
+
+    #[test]
+    fn collisions_on_a_face_weigh_what_those_beside_it_do() {
+        let (ray, rng) = (Ray::new(Vec3::ZERO, Vec3::X), &mut Generator::new(1));
+        for _ in 0..1000 {
+            let u = uniform(rng);
+            let flown = flight(&Face, &ray, Spectrum::ONE, u, rng);
+            // Transmittance times extinction over its mean, which is the density.
+            let here = EXTINCTION * (EXTINCTION * flown.distance).transmitted();
+            let expected = here / here.mean();
+            assert!(flown.collision.is_some());
+            assert!((flown.weight - expected).map(f32::abs).max_element() < 1e-5, "{flown:?} {expected:?}");
+        }
+    }
 }
