@@ -25,6 +25,7 @@ mod photon_beams;
 mod photons;
 mod radiance_cache;
 mod sampling;
+mod scale;
 mod sh;
 mod shift;
 mod threads;

@@ -19,8 +19,8 @@ fn check(position: Vec3, axis: Vec3, intensity: Spectrum) -> Result<Vec3, LightE
 }
 
 fn inverse_square(position: Vec3, from: Vec3) -> f32 {
-    // The light itself must not become infinitely important.
-    1.0 / position.distance_squared(from).max(1e-12)
+    // The light itself must not become infinitely important; nor may a length be one that a world in other units has.
+    1.0 / position.distance_squared(from).max(1e-30)
 }
 
 /// A light that shines the same in all directions.

@@ -95,7 +95,7 @@ pub fn steps(
         let (until, constant) = (segment.until, segment.is_constant());
         let (mut at, before) = (entry, thickness);
         // A host's step of 0 or NaN must still lead on.
-        let least = if until.is_finite() { (until - at) * 1e-6 } else { 1e-6 };
+        let least = 1e-6 * if until.is_finite() { until - at } else { 1.0 / segment.majorant.max_element() };
         while at < until {
             let transmittance = thickness.transmitted();
             if left == 0 {

@@ -182,8 +182,13 @@ const LEFT: f32 = 0.25;
 /// The radius of [`usual_bound`] in thin media, as a part of the diagonal of what there is: surfaces lose light, too.
 const THIN: f32 = 0.09;
 
+/// The radius of [`usual_bound`] where bounds say nothing, at most, in mean free paths: beyond, a step of compensation sees
+/// hardly anything.
+const MOST_FREE_PATHS: f32 = 8.0;
+
 /// A bound that works: within a radius at which a step of compensation leaves a quarter, `κ_B(σ̄, d) = 0.25`, so that two
-/// bring back nearly all; never beyond 0.09 of the diagonal of the bounds.
+/// bring back nearly all; never beyond 0.09 of the diagonal of the bounds. Where these have no size, or no end, and there is
+/// no fog either, a metre.
 ///
 /// Larger radii clamp more, and leave smoother light to the virtual lights; but more has to be brought back. `σ̄` is the
 /// extinction where light collides ([`Outline::extinction`]). Engelhardt et al. 2012 leave the bound to the user.
@@ -197,10 +202,12 @@ const THIN: f32 = 0.09;
 #[must_use]
 pub fn usual_bound(outline: &Outline) -> Bound {
     let diagonal = outline.bounds.size().length();
-    if !(diagonal > 0.0 && diagonal.is_finite()) {
+    // Where nothing says how large the world is, its fog does.
+    let most =
+        if diagonal > 0.0 && diagonal.is_finite() { THIN * diagonal } else { MOST_FREE_PATHS / outline.extinction };
+    if !(most > 0.0 && most.is_finite()) {
         return Bound(1.0);
     }
-    let most = THIN * diagonal;
     let radius =
         if outline.extinction > 0.0 { radius_for(LEFT, outline.extinction, outline.albedo, most) } else { most };
     Bound::within(radius).unwrap_or(Bound(1.0))

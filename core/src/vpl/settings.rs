@@ -207,6 +207,9 @@ fn solid(bounds: &Bounds) -> Bounds {
     if size.min_element() < 0.0 {
         return Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE };
     }
-    let margin = Vec3::splat((1e-3 * size.max_element()).max(1e-3));
+    // A thousandth of its size, or of its place if it has none, so that neither is lost in rounding.
+    let lengths = [size.max_element(), bounds.max.abs().max(bounds.min.abs()).max_element(), 1.0];
+    let length = lengths.into_iter().find(|length| *length > 0.0).unwrap_or(1.0);
+    let margin = Vec3::splat(1e-3 * length);
     Bounds { min: bounds.min - margin, max: bounds.max + margin }
 }
