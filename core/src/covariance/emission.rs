@@ -53,7 +53,7 @@ pub fn emitted(light: &Light<'_>, ray: &Ray, normal: Option<Vec3>, point_radius:
         Light::Spot(light) => {
             let angle = float::acos(light.axis.dot(ray.direction));
             // The light varies across its border over the distance to it, but not faster than it fades.
-            let scale = (light.cutoff - angle).abs().max(0.5 * (light.cutoff - light.beam)).max(1e-3);
+            let scale = (light.cutoff() - angle).abs().max(0.5 * (light.cutoff() - light.beam())).max(1e-3);
             let radial = -light.axis;
             let (a, b) = (radial.dot(frame.u), radial.dot(frame.v));
             let length2 = a * a + b * b;
@@ -61,7 +61,7 @@ pub fn emitted(light: &Light<'_>, ray: &Ray, normal: Option<Vec3>, point_radius:
                 let variance = PER_HESSIAN / (scale * scale * length2);
                 Symmetric2::new(variance * a * a, variance * a * b, variance * b * b)
             } else {
-                let variance = PER_HESSIAN / (light.cutoff * light.cutoff);
+                let variance = PER_HESSIAN / (light.cutoff() * light.cutoff());
                 Symmetric2::diagonal(variance, variance)
             };
             Symmetric4::separable(point, angular)

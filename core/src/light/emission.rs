@@ -89,9 +89,9 @@ impl Light<'_> {
                 Some(Emission::from_point(light.position, around(light.axis, local), light.power()))
             }
             Self::Spot(light) => {
-                let below = 1.0 - libm::cosf(light.cutoff);
+                let below = 1.0 - libm::cosf(light.cutoff());
                 let local = warp::uniform_cone(direction, below);
-                let power = light.intensity * (spot(local.z, light.beam, light.cutoff) * 2.0 * PI * below);
+                let power = light.intensity * (spot(local.z, light.beam(), light.cutoff()) * 2.0 * PI * below);
                 Some(Emission::from_point(light.position, around(light.axis, local), power))
             }
             Self::Quad(light) => {

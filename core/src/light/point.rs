@@ -149,10 +149,10 @@ pub struct SpotLight {
     pub position: Vec3,
     /// Axis of the cone (unit).
     pub axis: Vec3,
-    /// Half angle within which intensity is full (rad).
-    pub beam: f32,
-    /// Half angle at which light ends (rad); between, intensity falls linearly in the angle.
-    pub cutoff: f32,
+    /// Half angle within which intensity is full (rad). Private, as the other: what is known of the cone goes with both.
+    beam: f32,
+    /// Half angle at which light ends (rad).
+    cutoff: f32,
     /// Radiant intensity on the axis (W/sr).
     pub intensity: Spectrum,
     /// Cosine a little beyond the cut-off, so that rounding cannot hide a point that is still lit.
@@ -172,6 +172,35 @@ impl SpotLight {
         }
         let outer_cosine = libm::cosf((cutoff + 1e-3).min(PI)) - 1e-6;
         Ok(Self { position, axis, beam, cutoff: cutoff.min(PI), intensity, outer_cosine })
+    }
+
+    /// Half angle within which intensity is full (rad).
+    ///
+    /// ```
+    /// # use fogbow::{light::SpotLight, math::Vec3, spectrum::Spectrum};
+    /// let spot = SpotLight::new(Vec3::ZERO, Vec3::Z, 0.2, 0.5, Spectrum::ONE)?;
+    /// assert_eq!((spot.beam(), spot.cutoff()), (0.2, 0.5));
+    /// # Ok::<(), fogbow::light::LightError>(())
+    /// ```
+    #[inline]
+    #[must_use]
+    pub fn beam(&self) -> f32 {
+        self.beam
+    }
+
+    /// Half angle at which light ends (rad); between both, intensity falls linearly in the angle.
+    ///
+    /// ```
+    /// # use fogbow::{light::SpotLight, math::{Vec3, float::PI}, spectrum::Spectrum};
+    /// let spot = SpotLight::new(Vec3::ZERO, Vec3::Z, 0.0, PI, Spectrum::ONE)?;
+    /// let sideways = spot.source().incident(Vec3::X).unwrap();
+    /// assert!((sideways.irradiance[0] - 0.5).abs() < 1e-6 && spot.cutoff() == PI);
+    /// # Ok::<(), fogbow::light::LightError>(())
+    /// ```
+    #[inline]
+    #[must_use]
+    pub fn cutoff(&self) -> f32 {
+        self.cutoff
     }
 
     /// Radiant power (W): `2π I ∫ f(γ) sin γ dγ`.
