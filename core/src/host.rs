@@ -338,7 +338,8 @@ pub struct Hit {
     pub normal: Vec3,
     /// What the surface does to light, textures already looked up.
     pub surface: Surface,
-    /// Index of the area light this surface belongs to, if any.
+    /// Index of the area light this surface belongs to, if any. Every area light of a [`World`](crate::world::World) must be
+    /// found so, or part of its light is lost: see [`World::lights`](crate::world::World::lights).
     pub light: Option<u32>,
 }
 

@@ -113,6 +113,10 @@ impl CachedRadiance {
     }
 }
 
+/// Eye rays end where less than this of the light beyond would be seen. Larger: glimpses of what is very bright behind dense
+/// fog are lost; smaller: more look-ups that nobody sees.
+const INVISIBLE: f32 = 1e-5;
+
 /// What an eye ray meets.
 trait Sight {
     /// A segment of it, the throughput at its start, and a sample's random numbers for it.
@@ -157,7 +161,7 @@ fn look<M: Medium + ?Sized, S: Scene + ?Sized>(
         });
         sight.emitted(throughput * seen.radiance);
         throughput *= seen.transmittance;
-        if throughput.max_element() < 1e-5 {
+        if throughput.max_element() < INVISIBLE {
             return;
         }
         let Some(hit) = hit else {
@@ -294,7 +298,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized, F: FnMut(Place)> Sight for Wanted<'_
 /// lights within whose [`Light::steep_field`] it lies by an equiangular connection per segment.
 /// Where a cache has no record at a point, one sample of what it would hold takes its place, so that
 /// gaps make noise and no holes. `estimator` brings the world; its surface cache is what such
-/// samples use.
+/// samples use. The ray ends where less than 10⁻⁵ of the light behind would be seen, and what is behind is left out.
 ///
 /// ```
 /// # use fogbow::{cache::{Basis, Cache, Caches, Estimator, RaySettings, Reader, Reading, Record, VolumeCache, radiance}};

@@ -102,6 +102,7 @@ pub(super) fn fly(
             let factor = thickness.value.transmitted() / pdf;
             let properties = medium.properties(ray.at(distance));
             let collision = Collision { distance, properties, factor, thickness };
+            // Never: uniform numbers of 24 bits reach 17 free paths at most, where the density is 10⁻⁸ of the rate.
             return Flown { collision: factor.is_finite().then_some(collision), whole };
         }
     }

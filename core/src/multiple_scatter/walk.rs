@@ -160,6 +160,10 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Walk<'_, M, S> {
     /// connect to (those that are no sky) that is scattered towards `to_eye` at a collision (W·m⁻²·sr⁻¹), with its gradients as the point moves
     /// and as `to_eye` turns: then the path ends there. `outgoing` as for [`Walk::path`].
     ///
+    /// A path ends where its weight is no number, and brings nothing at all if the light it has found is none: a lamp or a
+    /// surface within rounding of a vertex may leave the range of `f32`. That darkens by what such paths would bring, which no
+    /// number can say.
+    ///
     /// ```
     /// # use fogbow::{host::Empty, math::{Ray, Vec3}, medium::Homogeneous, phase::Phase, sampling::{Generator, warp}};
     /// # use fogbow::{single_scatter::Contribution, spectrum::{Gradient, Spectrum}, transmittance::thickness::Steps, world::World};

@@ -42,6 +42,11 @@ pub struct World<'a, M: ?Sized, S: ?Sized> {
     /// The surfaces; [`Empty`](crate::host::Empty) for none.
     pub scene: &'a S,
     /// The lights; [`Hit::light`](crate::host::Hit::light) counts in this order.
+    ///
+    /// An area light (quad, sphere, mesh) is half of a lamp: the other half is its surface, which `scene` must find where the
+    /// light says it is, with that number in `Hit::light`. Paths meet it by chance as well as by connections, and the weights of both
+    /// add up to one; of a lamp that rays pass through, what chance would bring is missing, a quarter of its light or so. Nothing
+    /// can tell: a ray that meets something else may well meet it before the lamp.
     pub lights: &'a [Light<'a>],
 }
 
