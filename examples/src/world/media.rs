@@ -6,31 +6,38 @@ use fogbow::medium::{AnyMedium, Density, DensityGrid, Homogeneous, MediumError, 
 
 use fogbow::phase::Phase;
 
+use super::rotated::{Padded, shows_border};
 use crate::error::SceneError;
 use crate::scene_file::{Container, Matter, MediumDescription, Place, SceneFile};
 use crate::transform::{Transform, to_vec3};
-use crate::volume::{Values, Volume};
+use crate::volume::Values;
 
 /// Tables a medium borrows.
 #[derive(Debug, Default)]
 pub(super) struct MediumTable {
     /// Bounds of density per block of the grid.
     blocks: Vec<MinMax>,
+    /// The grid with its border repeated, where that shows.
+    padded: Option<Padded>,
     /// For each place of the medium, its holes.
     holes: Vec<Vec<Region>>,
 }
 
 impl MediumTable {
     pub(super) fn bytes(&self) -> usize {
-        size_of_val(&*self.blocks)
+        size_of_val(&*self.blocks) + self.padded.as_ref().map_or(0, |padded| padded.volume.bytes())
     }
 }
 
 pub(super) fn tables(scene: &SceneFile) -> Vec<MediumTable> {
     let table = |medium: &MediumDescription| match &medium.matter {
         Matter::Homogeneous { .. } => MediumTable::default(),
-        Matter::Grid { volume, .. } => {
-            MediumTable { blocks: vec![MinMax::default(); DensityGrid::block_count(volume.size)], holes: Vec::new() }
+        Matter::Grid { volume, to_world, .. } => {
+            let padded = shows_border(volume, to_world, &medium.places)
+                .then(|| Padded::new(volume, to_world, &medium.places))
+                .flatten();
+            let size = padded.as_ref().map_or(volume.size, |padded| padded.volume.size);
+            MediumTable { blocks: vec![MinMax::default(); DensityGrid::block_count(size)], padded, holes: Vec::new() }
         }
     };
     scene.media.iter().map(table).collect()
@@ -135,13 +142,17 @@ fn moved<'a, N>(place: &Placed<'_, AnyMedium<'_>>, holes: &'a [Region], medium: 
 type PlacedHoles<'a> = (Placed<'a, AnyMedium<'a>>, &'a [Region]);
 
 fn place<'a>(medium: &'a MediumDescription, table: &'a mut MediumTable) -> Result<Vec<PlacedHoles<'a>>, Refusal> {
-    let MediumTable { blocks, holes } = table;
+    let MediumTable { blocks, padded, holes } = table;
+    let padded = padded.as_ref();
     let any = match &medium.matter {
         Matter::Homogeneous { absorption, scattering, phase } => {
             AnyMedium::from(Homogeneous::new(*absorption, *scattering, *phase)?)
         }
         Matter::Grid { volume, to_world, absorption, scattering, phase } => {
-            check_border(volume, to_world)?;
+            if padded.is_none() && shows_border(volume, to_world, &medium.places) {
+                return Err(Refusal::Border);
+            }
+            let (volume, to_world) = padded.map_or((&**volume, to_world), |padded| (&padded.volume, &padded.to_world));
             let density = match &volume.values {
                 Values::F32(values) => Density::F32(values),
                 Values::U8(values) => Density::U8(values),
@@ -157,13 +168,17 @@ fn place<'a>(medium: &'a MediumDescription, table: &'a mut MediumTable) -> Resul
     }
     let mut placed = Vec::new();
     for (place, holes) in medium.places.iter().zip(&*holes) {
-        placed.push((Placed::new(any, region_of(medium, place)?).with_holes(holes), holes.as_slice()));
+        let region = match padded {
+            Some(padded) => padded.region(&place.container)?,
+            None => region_of(medium, place)?,
+        };
+        placed.push((Placed::new(any, region).with_holes(holes), holes.as_slice()));
     }
     Ok(placed)
 }
 
 /// Why a medium cannot be built.
-enum Refusal {
+pub(super) enum Refusal {
     Medium(MediumError),
     Border,
 }
@@ -178,22 +193,15 @@ impl core::fmt::Display for Refusal {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         match self {
             Self::Medium(error) => error.fmt(f),
-            Self::Border => f.write_str("a rotated grid must have empty cells along its border"),
+            Self::Border => f.write_str(
+                "the container of a rotated grid must lie in the axis-aligned box around it, or that box in the container, \
+                 or the cells along its border must be empty",
+            ),
         }
     }
 }
 
-/// Mitsuba evaluates a grid inside the axis-aligned box around its rotated cube, with the values of
-/// the border between the two; here nothing lies outside the cube. Both agree for empty borders.
-fn check_border(volume: &Volume, to_world: &Transform) -> Result<(), Refusal> {
-    let is_straight = to_world.rows.iter().all(|row| {
-        let largest = row.iter().take(3).fold(0.0_f64, |m, v| m.max(v.abs()));
-        row.iter().take(3).filter(|v| v.abs() > 1e-6 * largest).count() == 1
-    });
-    if is_straight || volume.has_empty_border() { Ok(()) } else { Err(Refusal::Border) }
-}
-
-fn region(container: &Container) -> Result<Region, MediumError> {
+pub(super) fn region(container: &Container) -> Result<Region, MediumError> {
     match container {
         Container::Cube(to_world) => {
             let centred = Transform::translation([-0.5; 3]).then(&Transform::scaling([2.0; 3]));

@@ -9,12 +9,14 @@
 //! | `triangles` | meshes in a tree |
 //! | `lights` | emitters and lent tables |
 //! | `media` | media and where they are |
+//! | `rotated` | rotated grids, whose border reaches as far as Mitsuba's |
 
 mod analytic;
 mod build;
 mod lights;
 mod many;
 mod media;
+mod rotated;
 #[cfg(test)]
 mod tests;
 mod triangles;
