@@ -18,8 +18,12 @@ use crate::storage::List;
 use crate::work::Rounds;
 use crate::world::World;
 
-/// Paths of one job. More: jobs take longer than some milliseconds in dense worlds. Changes no result.
+/// Paths of one job at most. More: jobs take longer than some milliseconds in dense worlds. Changes no result.
 const PATHS_PER_JOB: u32 = 64;
+
+/// Jobs that paths are dealt out to, if there are so many. Fewer: where a path leaves hundreds of lights, a pass has few paths, and other
+/// threads wait for the last job; more: hosts are busy with handing out jobs. Changes no result.
+const TRACE_JOBS: u32 = 128;
 
 /// Lights that one job connects to a witness. The same.
 const LIGHTS_PER_JOB: u32 = 512;
@@ -337,7 +341,7 @@ impl<'s, Q: GeneratorSource> VplPass<'s, Q> {
             memory,
             rng: independent(mix(settings.seed ^ 0x0d1b_7a5e_66c2_93f4), u64::from(number), 0),
             round: Round::Trace,
-            jobs: settings.paths.div_ceil(PATHS_PER_JOB),
+            jobs: settings.paths.div_ceil(paths_per_job(settings)),
             taken: 0,
             traced: 0,
             error: (!settings.is_valid()).then_some(VplPassError::Settings),
@@ -380,7 +384,7 @@ impl<'s, Q> VplPass<'s, Q> {
     /// Paths whose lights are in.
     fn paths(&self) -> u32 {
         if self.round == Round::Trace {
-            self.taken.saturating_mul(PATHS_PER_JOB).min(self.settings.paths)
+            self.taken.saturating_mul(paths_per_job(&self.settings)).min(self.settings.paths)
         } else {
             self.settings.paths
         }
@@ -501,8 +505,9 @@ where
         };
         if self.round == Round::Trace {
             let seed = mix(settings.seed ^ 0x51f2_90ad_c13b_7e66) ^ u64::from(self.number);
-            let from = job * PATHS_PER_JOB;
-            for path in from..from.saturating_add(PATHS_PER_JOB).min(settings.paths) {
+            let count = paths_per_job(settings);
+            let from = job * count;
+            for path in from..from.saturating_add(count).min(settings.paths) {
                 let mut rng = self.source.start(seed, u64::from(self.number), path);
                 shoot(world, &settings.bounds, &settings.walk, &mut rng, &mut |light| note(lights.push(light)));
             }
@@ -554,6 +559,11 @@ where
             Round::Done => "",
         }
     }
+}
+
+/// Paths of one job.
+fn paths_per_job(settings: &Settings) -> u32 {
+    (settings.paths / TRACE_JOBS).clamp(1, PATHS_PER_JOB)
 }
 
 /// Place of a point along a curve that fills the box: 16 bits of each coordinate, interleaved (Morton 1966).
