@@ -450,6 +450,41 @@ fn wide_beams_are_fewer_and_keep_their_light() {
 }
 
 #[test]
+fn the_noise_of_a_pass_is_what_its_settings_foretell() {
+    // Parallel beams through a square metre, somewhere, and an eye ray across.
+    const PATHS: u32 = 400;
+    let (power, depth, fog) = (3.0_f32, 1.0_f32, fog(0.0, 1e-4, 0.0));
+    let settings = Settings { paths: PATHS, depth, ..usual() };
+    let ray = Ray::between(Vec3::ZERO, Vec3::X * depth);
+    let mut relative = Vec::new();
+    for radius in [0.02_f32, 0.08] {
+        let mut rng = Generator::new(7);
+        let found: Vec<f64> = (0..4000)
+            .map(|_| {
+                let mut beams = Beams::new(Vec::new(), Vec::new());
+                for _ in 0..PATHS {
+                    let origin = Vec3::new(uniform(&mut rng), uniform(&mut rng) - 0.5, -1.0);
+                    let piece = Piece { radius, power: Spectrum::splat(power), ..beam(origin, Vec3::Z, 2.0, 0.0) };
+                    beams.push(piece).unwrap();
+                }
+                beams.build(PATHS).unwrap();
+                f64::from(beams.gather(&ray, &fog, u32::MAX, &mut rng).light.single[0])
+            })
+            .collect();
+        let n = found.len() as f64;
+        let mean = found.iter().sum::<f64>() / n;
+        let variance = found.iter().map(|light| (light - mean).powi(2)).sum::<f64>() / (n - 1.0) / mean.powi(2);
+        // The fluence of all beams together, over the square.
+        let foretold = f64::from(settings.noise(power) / (power * radius));
+        relative.push(variance / foretold);
+    }
+    // Variances of 4000 samples are known to √(2/4000) and a little more; a square's border takes 2 r of beams' light.
+    for (found, allowed) in relative.iter().zip([0.08, 0.12]) {
+        assert!((found - 1.0).abs() < allowed, "{relative:?} of what was foretold");
+    }
+}
+
+#[test]
 fn beams_give_the_same_bits_for_any_number_of_threads() {
     let settings = tiles::Settings { samples: 12, seed: 3, threads: 1, ..tiles::Settings::default() };
     let room = foggy_room();
