@@ -7,10 +7,10 @@ use crate::light::{Falloff, Light, Source};
 use crate::math::{Ray, float};
 use crate::phase::deflection;
 use crate::sampling::distance::Equiangular;
-use crate::sampling::{Generator, discrete, uniform, uniform2};
+use crate::sampling::{Generator, discrete, mis, uniform, uniform2};
 use crate::spectrum::Spectrum;
 use crate::transmittance::{marching_segments, transmittance};
-use crate::world::{World, short_of_end};
+use crate::world::{World, nearest_surface, short_of_end};
 
 /// Parts of an eye ray in which its medium is looked at: 768 bytes of stack. More: points follow thin veils of smoke better, and every
 /// ray takes longer.
@@ -36,6 +36,10 @@ const FEW: usize = 16;
 /// A part beside a flat light weighs at least this share of one straight before it. Larger: more points where it hardly shines; smaller: heavier
 /// weights where a wide light is seen although its middle is beside.
 const LEAST_COSINE: f32 = 0.2;
+
+/// Mean cosine (absolute) of phase functions that look for wide lights themselves. Larger: outliers where light comes straight on through the smoke
+/// before a lamp; smaller: a ray more for every connection.
+const PEAKED: f32 = 0.2;
 
 /// `tan` up to which an angle is as long as its tangent, in sums from which a part is drawn: within 2 %.
 const SMALL: f32 = 0.25;
@@ -89,7 +93,9 @@ pub(super) fn single<M: Medium + ?Sized, S: Scene + ?Sized>(
         let random = (uniform(rng), uniform2(rng));
         let weighted = world.lights.iter().enumerate().map(|entry| (sent(entry), entry.1));
         let Some((light, chosen)) = discrete::choose(weighted, u) else { continue };
-        if let Some(found) = connection(segment, world, &parts, light, (chosen.remainder, random), rng) {
+        if let Some(found) =
+            connection(segment, world, &parts, (chosen.index as u32, light), (chosen.remainder, random), rng)
+        {
             sum += found * (1.0 / chosen.probability);
         }
     }
@@ -242,7 +248,7 @@ fn connection<M: Medium + ?Sized, S: Scene + ?Sized>(
     segment: &Ray,
     world: &World<'_, M, S>,
     parts: &Parts,
-    light: &Light<'_>,
+    (index, light): (u32, &Light<'_>),
     (u_part, (u_within, on_light)): (f32, (f32, Vec2)),
     rng: &mut Generator,
 ) -> Option<Spectrum> {
@@ -278,22 +284,47 @@ fn connection<M: Medium + ?Sized, S: Scene + ?Sized>(
     let pdf = law.pdf(distance) * (own / total);
     let point = segment.at(distance);
     let properties = world.medium.properties(point);
-    let incident = match anchor {
-        Some(source) => source.incident(point)?,
-        None => light.sample(point, on_light)?.incident,
+    let to_eye = -segment.direction;
+    let (incident, light_pdf) = match anchor {
+        Some(source) => (source.incident(point), 0.0),
+        None => match light.sample(point, on_light) {
+            Some(sample) => (Some(sample.incident), sample.pdf),
+            None => (None, 0.0),
+        },
     };
-    let phase = properties.phase.value(deflection(incident.to_light, -segment.direction));
-    let scattered = properties.scattering * phase * incident.irradiance;
-    let way = Ray { origin: point, direction: incident.to_light, length: incident.distance };
-    if scattered.is_black() || world.scene.is_blocked(&short_of_end(&way)) {
-        return None;
+    // Of a wide light, what a peaked phase function makes bright may be a small part only, which the phase function finds.
+    let peak = properties.phase.mean_cosine().map(f32::abs).max_element();
+    let is_peaked = light_pdf > 0.0 && peak > PEAKED;
+    let mut arriving = Spectrum::ZERO;
+    if let Some(incident) = incident {
+        let deflection = deflection(incident.to_light, to_eye);
+        let weight = if is_peaked { mis::power(light_pdf, properties.phase.pdf(deflection)) } else { 1.0 };
+        let sent = properties.phase.value(deflection) * incident.irradiance * weight;
+        let way = Ray { origin: point, direction: incident.to_light, length: incident.distance };
+        if !sent.is_black() && !world.scene.is_blocked(&short_of_end(&way)) {
+            arriving += sent * transmittance(world.medium, &way, rng);
+        }
     }
-    let arriving = transmittance(world.medium, &way, rng);
-    if arriving.is_black() {
+    if is_peaked {
+        let sample = properties.phase.sample(to_eye, uniform2(rng));
+        let way = Ray::new(point, sample.to_light);
+        if let Some(hit) = nearest_surface(&way, world.scene)
+            && hit.light == Some(index)
+        {
+            let found = light.pdf(point, sample.to_light, hit.distance, hit.normal);
+            let sent = light.radiance(hit.normal, -sample.to_light) * mis::power(sample.pdf, found);
+            if !sent.is_black() {
+                let reach = transmittance(world.medium, &way.with_length(hit.distance), rng);
+                arriving += sample.weight * sent * reach;
+            }
+        }
+    }
+    let scattered = properties.scattering * arriving;
+    if scattered.is_black() {
         return None;
     }
     let seen = transmittance(world.medium, &segment.with_length(distance), rng);
-    Some(scattered * arriving * seen * (1.0 / pdf))
+    Some(scattered * seen * (1.0 / pdf))
 }
 
 #[cfg(test)]
