@@ -114,7 +114,7 @@ impl<'o> VplOutput<'o> {
     /// # let world = World { medium: &fog, scene: &Empty, lights: &lamps };
     /// # let outline = Outline::of(&world, Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE });
     /// # let light = VirtualLight::in_medium(Vec3::ZERO, Vec3::Z, Spectrum::ONE, 1, &Phase::ISOTROPIC);
-    /// let settings = Settings { paths: 64, ..Settings::for_outline(&outline) };
+    /// let settings = Settings { paths: 8192, ..Settings::for_outline(&outline) };
     /// let run = |lights: &mut [VirtualLight]| {
     ///     let mut pass = VplPass::new(&settings, 0, Independent, &[]);
     ///     work::finish(&mut pass, &world, &mut VplOutput::new(lights, &mut [0.0; 512][..]));
