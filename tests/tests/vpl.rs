@@ -469,11 +469,11 @@ fn a_pass_that_is_stopped_keeps_all_light() {
         let change = |settings| vpl::Settings { paths, candidates: 1, ..settings };
         lights_of_a_pass(change, |pass, world| work::finish(pass, world, &mut vpl::VplOutput::default())).unwrap()
     };
-    // While paths are followed: those so far. 64 of them are a job.
-    assert_eq!(part(3), all(3 * 64));
+    // While paths are followed: those so far. A job is a part in 128 of the 400, rounded down.
+    assert_eq!(part(30), all(30 * 3));
     // While lights are weighed: all of them, sorted before they were mixed.
     let key = |light: &VirtualLight| [light.position.to_array(), light.flux.0].map(|numbers| numbers.map(f32::to_bits));
-    let [mut some, mut every] = [part(7 + 2), all(400)];
+    let [mut some, mut every] = [part(400_u32.div_ceil(3) + 2), all(400)];
     some.sort_by_key(key);
     every.sort_by_key(key);
     assert_eq!(some, every);
