@@ -37,7 +37,7 @@ impl WithMedium for Job<'_> {
         let lights = self.0.lights();
         let steps = Steps::Length(3.0 * medium.resolution());
         let walk = multiple_scatter::Settings { one_light: lights.len() > 1, ..multiple_scatter::Settings::new(steps) };
-        let world = fogbow::world::World { medium, scene: self.0, lights: &lights };
+        let world = fogbow::world::World { medium, scene: self.0, lights: (&lights).into() };
         let paths = path::Settings::default();
         let estimator =
             Estimator { world, surfaces: None, scattered: None, walk, paths, light_samples: 16, finest: 0.02 };

@@ -23,7 +23,7 @@ use fogbow_tests::hosts::{Ball, Complaining};
 
 fn estimator<'a, M: Medium, S: Scene>(medium: &'a M, scene: &'a S, lights: &'a [Light<'a>]) -> Estimator<'a, M, S> {
     Estimator {
-        world: World { medium, scene, lights },
+        world: World { medium, scene, lights: lights.into() },
         surfaces: None,
         scattered: None,
         walk: multiple_scatter::Settings::new(Steps::Gauss(8)),

@@ -244,7 +244,7 @@ fn pieces_carry_the_transmittance_on_average() {
 fn endless_beams_end() {
     let thin = fog(0.0, 1e-3, 0.0);
     let lamp = [Light::Point(PointLight::from_flux(Vec3::ZERO, Spectrum::ONE).unwrap())];
-    let world = World { medium: &thin, scene: &Empty, lights: &lamp };
+    let world = World { medium: &thin, scene: &Empty, lights: (&lamp).into() };
     let bounds = Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE };
     let settings = path::Settings { max_scatterings: 1, ..path::Settings::default() };
     let mut count = 0;
@@ -325,7 +325,7 @@ fn blocks(film: &Film) -> Vec<f64> {
 }
 
 fn usual() -> Settings {
-    Settings::for_outline(&Outline::of(&World { medium: &Empty, scene: &Empty, lights: &[] }, BOUNDS))
+    Settings::for_outline(&Outline::of(&World { medium: &Empty, scene: &Empty, lights: (&[]).into() }, BOUNDS))
 }
 
 fn render(
@@ -353,13 +353,13 @@ fn by_beams<M: Medium + Sync>(medium: &M, walk: path::Settings, tiles: tiles::Se
     let lights = lamp();
     let settings = Settings { walk, paths: 512, samples: 4, radius: 0.03, longest: 0.4, ..usual() };
     let mut film = Film::new(SIDE, SIDE, &NAMES).unwrap();
-    render(&mut film, &tiles, &settings, &World { medium, scene: &Room, lights: &lights }).unwrap();
+    render(&mut film, &tiles, &settings, &World { medium, scene: &Room, lights: (&lights).into() }).unwrap();
     film
 }
 
 fn by_paths<M: Medium + Sync>(medium: &M, paths: path::Settings, tiles: tiles::Settings) -> Film {
     let lights = lamp();
-    let world = World { medium, scene: &Room, lights: &lights };
+    let world = World { medium, scene: &Room, lights: (&lights).into() };
     let mut film = Film::new(SIDE, SIDE, &NAMES).unwrap();
     tiles::render(&mut film, &tiles, &Control::default(), |sample, rng, layers| {
         let jitter = uniform2(rng);
@@ -425,7 +425,7 @@ fn pictures_by_beams_are_those_of_the_path_tracer() {
 #[test]
 fn wide_beams_are_fewer_and_keep_their_light() {
     let (room, lights) = (foggy_room(), lamp());
-    let world = World { medium: &room, scene: &Room, lights: &lights };
+    let world = World { medium: &room, scene: &Room, lights: (&lights).into() };
     let (narrow, wide) = (0.05_f32, 0.2_f32);
     let (mut all, mut kept) = (0, 0);
     // Of the same paths, so that only what thinning does is left.
@@ -466,7 +466,7 @@ fn beams_give_the_same_bits_for_any_number_of_threads() {
 fn what_beams_cannot_do_is_an_error() {
     let render = |medium: &Homogeneous, settings: Settings| {
         let mut film = Film::new(2, 2, &NAMES).unwrap();
-        let world = World { medium, scene: &Empty, lights: &[] };
+        let world = World { medium, scene: &Empty, lights: (&[]).into() };
         render(&mut film, &tiles::Settings::default(), &settings, &world)
     };
     let good = usual();
@@ -488,7 +488,7 @@ fn what_beams_cannot_do_is_an_error() {
 #[test]
 fn what_lent_memory_cannot_hold_is_an_error_and_no_part_of_the_light() {
     let (room, lights) = (foggy_room(), lamp());
-    let world = World { medium: &room, scene: &Room, lights: &lights };
+    let world = World { medium: &room, scene: &Room, lights: (&lights).into() };
     let settings = Settings { paths: 200, ..usual() };
     let grown = || {
         let mut pass = BeamPass::new(&settings, 3, |_, radius| radius);
@@ -514,7 +514,7 @@ fn what_lent_memory_cannot_hold_is_an_error_and_no_part_of_the_light() {
 #[test]
 fn a_pass_that_is_stopped_keeps_all_light() {
     let (room, lights) = (foggy_room(), lamp());
-    let world = World { medium: &room, scene: &Room, lights: &lights };
+    let world = World { medium: &room, scene: &Room, lights: (&lights).into() };
     // So wide that some beams of a few paths reach any eye ray.
     let settings = Settings { paths: 200, ..usual() };
     let mut pass = BeamPass::new(&settings, 0, |_, _| 0.5);

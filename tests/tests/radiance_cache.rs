@@ -96,7 +96,7 @@ fn fill_on<M: Medium + Sync>(
     control: &Control<'_>,
 ) -> (Filling<'static, Eye>, Ending) {
     let (room, lights) = (room(), [lamp()]);
-    let world = World { medium, scene: &room, lights: &lights };
+    let world = World { medium, scene: &room, lights: (&lights).into() };
     let mut filling = caches.fill(VIEW);
     let ran = run(&mut filling, &world, &Threads::new(threads).unwrap(), control, None, |_| {});
     (filling, ran.ending)
@@ -129,7 +129,7 @@ fn stored(caches: &Caches) -> Vec<u8> {
 /// An image with the caches, and how many of its look-ups were misses.
 fn picture(caches: &Caches, threads: usize) -> (Film, u64, u64) {
     let (fog, room, lights) = (fog(), room(), [lamp()]);
-    let world = World { medium: &fog, scene: &room, lights: &lights };
+    let world = World { medium: &fog, scene: &room, lights: (&lights).into() };
     let mut film = Film::new(16, 16, &["total"]).unwrap();
     let settings = tiles::Settings { samples: 4, threads, ..tiles::Settings::default() };
     let outcome = tiles::render(&mut film, &settings, &Control::default(), |sample, rng, layers| {
@@ -169,7 +169,7 @@ fn caches_filled_by_one_two_and_seven_threads_hold_the_same_bits() {
 #[test]
 fn a_fill_a_few_jobs_at_a_time_in_any_order_has_the_same_bits() {
     let (fog, room, lights) = (fog(), room(), [lamp()]);
-    let world = World { medium: &fog, scene: &room, lights: &lights };
+    let world = World { medium: &fog, scene: &room, lights: (&lights).into() };
     let mut filling = RadianceCaches::new(settings()).fill(VIEW);
     let mut slots: Vec<FilledRecords<'static>> = (0..5).map(|_| FilledRecords::default()).collect();
     let mut frame = 0_u32;
@@ -202,7 +202,7 @@ fn take(filling: &mut Filling<'static, Eye>, output: &FilledRecords<'static>) {
 #[test]
 fn a_box_of_points_has_records_everywhere_in_it() {
     let (fog, room, lights) = (fog(), room(), [lamp()]);
-    let world = World { medium: &fog, scene: &room, lights: &lights };
+    let world = World { medium: &fog, scene: &room, lights: (&lights).into() };
     let bounds = Bounds { min: Vec3::splat(-0.8), max: Vec3::splat(0.8) };
     let mut filling = RadianceCaches::new(settings()).fill(Asked::<Eye>::Box(bounds));
     finish(&mut filling, &world, &mut FilledRecords::default());
@@ -254,7 +254,7 @@ fn records_reach_no_farther_than_surfaces_let_them() {
 /// Share of places of fresh eye rays that no record of a cache of multiple scattering reaches.
 fn uncovered(caches: &Caches) -> f64 {
     let (fog, room, lights) = (fog(), room(), [lamp()]);
-    let world = World { medium: &fog, scene: &room, lights: &lights };
+    let world = World { medium: &fog, scene: &room, lights: (&lights).into() };
     let cache = caches.volume(Kind::Multiple).unwrap().cache;
     let reading = Reading::new(settings().multiple.unwrap().tolerance);
     let (mut asked, mut open) = (0, 0);
@@ -292,7 +292,7 @@ fn filling_for_another_view_adds_what_is_missing_there() {
     let before = counts(&caches);
     let other: Eye = |film| Ray { origin: Vec3::new(0.05, 0.0, -1.5), ..eye_ray(film) };
     let (room, fog, lights) = (room(), fog(), [lamp()]);
-    let world = World { medium: &fog, scene: &room, lights: &lights };
+    let world = World { medium: &fog, scene: &room, lights: (&lights).into() };
     let mut filling = caches.fill(Asked::View { ray: other, pixel: PIXEL });
     finish(&mut filling, &world, &mut FilledRecords::default());
     for (before, after) in before.into_iter().zip(counts(&filling.finish())) {
@@ -366,7 +366,7 @@ fn a_fill_cancelled_on_its_way_leaves_caches_that_serve_and_goes_on_to_the_same_
 
         // The fill itself goes on where it was.
         let (fog, room, lights) = (fog(), room(), [lamp()]);
-        let world = World { medium: &fog, scene: &room, lights: &lights };
+        let world = World { medium: &fog, scene: &room, lights: (&lights).into() };
         finish(&mut filling, &world, &mut FilledRecords::default());
         assert!(stored(&filling.finish()) == stored(&whole), "{questions}");
     }
@@ -387,7 +387,7 @@ fn an_estimate_of_nothing_fills_no_radius() {
     // In the dark every sum is zero: records are there, as far as they may reach.
     assert_eq!(fogbow::cache::valid_radius(&Sums::default(), 1.0), None);
     let (room, medium) = (room(), fog());
-    let world = World { medium: &medium, scene: &room, lights: &[] };
+    let world = World { medium: &medium, scene: &room, lights: (&[]).into() };
     let mut filling = RadianceCaches::new(settings()).fill(VIEW);
     finish(&mut filling, &world, &mut FilledRecords::default());
     let caches = filling.finish();
@@ -423,7 +423,7 @@ impl OfIndex {
 /// A fill in memory of just these lengths: the bytes of the caches, whether it was cut, and how many records there are.
 fn filled_in(room: &Lengths) -> (Vec<u8>, bool, [usize; 6]) {
     let (fog, walls, lights) = (fog(), self::room(), [lamp()]);
-    let world = World { medium: &fog, scene: &walls, lights: &lights };
+    let world = World { medium: &fog, scene: &walls, lights: (&lights).into() };
     let mut records = room.kinds.map(|kind| vec![Record::default(); kind.records]);
     let mut higher = room.kinds.map(|kind| vec![Coefficient::ZERO; kind.higher]);
     let mut facings = room.kinds.map(|kind| vec![Facing::default(); kind.facings]);

@@ -220,7 +220,7 @@ fn estimator<'a>(
     lights: &'a [Light<'a>],
 ) -> Estimator<'a, Homogeneous, Room> {
     Estimator {
-        world: World { medium, scene, lights },
+        world: World { medium, scene, lights: lights.into() },
         surfaces: None,
         scattered: None,
         walk: multiple_scatter::Settings::new(Steps::Gauss(1)),

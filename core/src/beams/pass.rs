@@ -60,7 +60,7 @@ impl<'o> BeamOutput<'o> {
     /// # use fogbow::{spectrum::Spectrum, work, world::{Outline, World}};
     /// # let fog = Homogeneous::new(Spectrum::ONE, Spectrum::ONE, Phase::ISOTROPIC)?;
     /// # let lamps = [Light::Point(PointLight::from_flux(Vec3::ZERO, Spectrum::ONE)?)];
-    /// # let world = World { medium: &fog, scene: &Empty, lights: &lamps };
+    /// # let world = World { medium: &fog, scene: &Empty, lights: (&lamps).into() };
     /// # let outline = Outline::of(&world, Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE });
     /// let settings = Settings { paths: 16, ..Settings::for_outline(&outline) };
     /// let run = |slots: &mut [Piece]| {
@@ -86,7 +86,7 @@ impl<'o> BeamOutput<'o> {
 /// use fogbow::{sampling::Generator, spectrum::Spectrum, work, world::{Outline, World}};
 /// let fog = Homogeneous::new(Spectrum::ONE, Spectrum::ONE, Phase::ISOTROPIC)?;
 /// let lamps = [Light::Point(PointLight::from_flux(Vec3::ZERO, Spectrum::ONE)?)];
-/// let world = World { medium: &fog, scene: &Empty, lights: &lamps };
+/// let world = World { medium: &fog, scene: &Empty, lights: (&lamps).into() };
 /// let outline = Outline::of(&world, Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE });
 /// // A pilot tells how many paths leave 20 000 pieces.
 /// let settings = Settings { pieces: 20_000, ..Settings::for_outline(&outline) };
@@ -137,7 +137,7 @@ impl<'s> BeamPass<'s, fn(Vec3, f32) -> f32> {
     /// # use fogbow::{spectrum::Spectrum, work, world::{Outline, World}};
     /// # let fog = Homogeneous::new(Spectrum::ONE, Spectrum::ONE, Phase::ISOTROPIC)?;
     /// # let lamps = [Light::Point(PointLight::from_flux(Vec3::ZERO, Spectrum::ONE)?)];
-    /// # let world = World { medium: &fog, scene: &Empty, lights: &lamps };
+    /// # let world = World { medium: &fog, scene: &Empty, lights: (&lamps).into() };
     /// # let outline = Outline::of(&world, Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE });
     /// let settings = Settings { pieces: 20_000, ..Settings::for_outline(&outline) };
     /// let (mut pieces, mut slots) = (vec![Piece::default(); 100_000], [Piece::default(); 4096]);
@@ -174,7 +174,7 @@ impl<'s, R: Fn(Vec3, f32) -> f32> BeamPass<'s, R> {
     /// # use fogbow::{spectrum::Spectrum, work, world::{Outline, World}};
     /// # let fog = Homogeneous::new(Spectrum::ONE, Spectrum::ONE, Phase::ISOTROPIC)?;
     /// # let lamps = [Light::Point(PointLight::from_flux(Vec3::ZERO, Spectrum::ONE)?)];
-    /// # let world = World { medium: &fog, scene: &Empty, lights: &lamps };
+    /// # let world = World { medium: &fog, scene: &Empty, lights: (&lamps).into() };
     /// # let outline = Outline::of(&world, Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE });
     /// let settings = Settings { paths: 16, ..Settings::for_outline(&outline) };
     /// let (mut pieces, mut nodes) = ([Piece::default(); 2048], [BeamNode::default(); 2049]);
@@ -297,7 +297,7 @@ impl Beams<'_> {
     /// # let (mut pieces, mut nodes) = ([], []);
     /// # let beams = Beams::new(&mut pieces[..], &mut nodes[..]);
     /// // Without beams there is no light of the medium; surfaces and lights are seen all the same.
-    /// let world = World { medium: &Empty, scene: &Empty, lights: &[Light::Constant(Spectrum::ONE)] };
+    /// let world = World { medium: &Empty, scene: &Empty, lights: (&[Light::Constant(Spectrum::ONE)]).into() };
     /// let eye = Ray::new(Vec3::ZERO, Vec3::Z);
     /// let seen = beams.radiance(&eye, &world, &path::Settings::default(), 1.0, &mut Generator::new(1));
     /// assert_eq!(seen.emitted, Spectrum::ONE);

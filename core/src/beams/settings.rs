@@ -75,7 +75,7 @@ impl Settings {
     /// # use fogbow::{beams::Settings, host::Empty, math::{Bounds, Vec3}, medium::Homogeneous, phase::Phase};
     /// # use fogbow::{spectrum::Spectrum, world::{Outline, World}};
     /// let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::ONE, Phase::ISOTROPIC)?;
-    /// let world = World { medium: &fog, scene: &Empty, lights: &[] };
+    /// let world = World { medium: &fog, scene: &Empty, lights: (&[]).into() };
     /// let bounds = Bounds { min: Vec3::ZERO, max: Vec3::new(3.0, 4.0, 0.0) };
     /// let settings = Settings::for_outline(&Outline::of(&world, bounds));
     /// assert!((settings.radius - 0.025).abs() < 1e-6 && (settings.longest - 0.5).abs() < 1e-6);
@@ -104,7 +104,7 @@ impl Settings {
     ///
     /// ```
     /// # use fogbow::{beams::Settings, host::Empty, math::Bounds, world::{Outline, World}};
-    /// # let world = World { medium: &Empty, scene: &Empty, lights: &[] };
+    /// # let world = World { medium: &Empty, scene: &Empty, lights: (&[]).into() };
     /// let settings = Settings::for_outline(&Outline::of(&world, Bounds::EVERYTHING));
     /// assert_eq!(settings.for_pixels(640 * 480).pieces, 4 * 640 * 480);
     /// ```
@@ -127,7 +127,7 @@ impl Settings {
     ///
     /// ```
     /// # use fogbow::{beams::Settings, host::Empty, math::Bounds, world::{Outline, World}};
-    /// # let world = World { medium: &Empty, scene: &Empty, lights: &[] };
+    /// # let world = World { medium: &Empty, scene: &Empty, lights: (&[]).into() };
     /// let settings = Settings::for_outline(&Outline::of(&world, Bounds::EVERYTHING));
     /// let settings = Settings { pieces: 20_000, ..settings }.for_pieces(10_000, 2048);
     /// assert_eq!(settings.paths, 4096);
@@ -143,7 +143,7 @@ impl Settings {
     ///
     /// ```
     /// # use fogbow::{beams::Settings, host::Empty, math::Bounds, world::{Outline, World}};
-    /// # let world = World { medium: &Empty, scene: &Empty, lights: &[] };
+    /// # let world = World { medium: &Empty, scene: &Empty, lights: (&[]).into() };
     /// let settings = Settings::for_outline(&Outline::of(&world, Bounds::EVERYTHING));
     /// assert_eq!([settings.share(0), settings.share(1), settings.share(8)], [8.0, 0.0, 8.0]);
     /// ```

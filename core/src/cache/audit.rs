@@ -146,7 +146,7 @@ pub struct Compared {
 /// # let fog = Homogeneous::new(Spectrum::ONE, Spectrum::ONE, Phase::ISOTROPIC)?;
 /// # let ball = Placed::new(fog, Region::sphere(Vec3::ZERO, 1.0)?);
 /// # let sky = [Light::Constant(Spectrum::ONE)];
-/// # let world = World { medium: &ball, scene: &Empty, lights: &sky };
+/// # let world = World { medium: &ball, scene: &Empty, lights: (&sky).into() };
 /// # let bounds = Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE };
 /// let settings = Settings { rays: 64, ..Settings::for_outline(&Outline::of(&world, bounds), 0.02).with_walks(64) };
 /// let camera = |at: [f32; 2]| Ray::new(3.0 * Vec3::Z, Vec3::new(at[0] - 0.5, at[1] - 0.5, -2.0).normalize());
@@ -303,7 +303,7 @@ mod tests {
         let ball = Placed::new(fog, Region::sphere(Vec3::ZERO, 1.0).unwrap());
         let lamp = PointLight::new(Vec3::new(0.2, 0.1, -0.3), Spectrum::ONE).unwrap();
         let lights = [Light::Point(lamp), Light::Constant(Spectrum::splat(0.3))];
-        let world = World { medium: &ball, scene: &crate::host::Empty, lights: &lights };
+        let world = World { medium: &ball, scene: &crate::host::Empty, lights: (&lights).into() };
         let bounds = Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE };
         let camera = |at: [f32; 2]| Ray::new(3.0 * Vec3::Z, Vec3::new(at[0] - 0.5, at[1] - 0.5, -2.0).normalize());
         let settings = Settings::for_outline(&Outline::of(&world, bounds), 0.02).with_walks(1024);

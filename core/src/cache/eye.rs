@@ -6,11 +6,10 @@ use super::estimate::Estimator;
 use super::lookup::{Basis, Reading};
 use super::store::{SurfaceCache, VolumeCache};
 use crate::host::{Hit, Medium, Properties, Rng, Scene};
-use crate::light::{Light, LightSample};
+use crate::light::{Except, FromPoint, FromRay, LightSample, Survey};
 use crate::march::scattering_points;
 use crate::math::{Frame, Ray};
 use crate::phase::deflection;
-use crate::sampling::discrete::choose;
 use crate::sampling::{Generator, uniform, uniform2, warp};
 use crate::spectrum::Spectrum;
 use crate::surface::{Surface, lambert};
@@ -162,7 +161,7 @@ fn look<M: Medium + ?Sized, S: Scene + ?Sized>(
         }
         let Some(hit) = hit else {
             if lights_visible && !lights_done {
-                let light = world.lights.iter().map(|light| light.background(ray.direction)).sum::<Spectrum>();
+                let light = world.lights.distant().map(|(_, light)| light.background(ray.direction)).sum::<Spectrum>();
                 sight.emitted(throughput * light);
             }
             return;
@@ -215,7 +214,7 @@ pub struct Place {
 /// # use fogbow::{sampling::Generator, spectrum::Spectrum};
 /// # use fogbow::world::World;
 /// let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::ONE, Phase::ISOTROPIC)?;
-/// let world = World { medium: &fog, scene: &Empty, lights: &[] };
+/// let world = World { medium: &fog, scene: &Empty, lights: (&[]).into() };
 /// let settings = RaySettings { density: 8.0, connections: 1, lights_visible: true, indirect: true };
 /// let (ray, mut found) = (Ray::between(Vec3::ZERO, core::f32::consts::LN_2 * Vec3::X), Vec::new());
 /// places(&ray, &world, &settings, &mut Generator::new(1), |place| found.push(place));
@@ -303,7 +302,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized, F: FnMut(Place)> Sight for Wanted<'_
 /// # use fogbow::world::World;
 /// # #[cfg(feature = "alloc")] {
 /// let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::ONE, Phase::ISOTROPIC)?;
-/// let world = World { medium: &fog, scene: &Empty, lights: &[] };
+/// let world = World { medium: &fog, scene: &Empty, lights: (&[]).into() };
 /// # let walk = multiple_scatter::Settings::new(Steps::Length(0.1));
 /// # let (paths, light_samples) = (path::Settings::default(), 1);
 /// # let estimator = Estimator { world, surfaces: None, scattered: None, walk, paths, light_samples, finest: 1e-3 };
@@ -339,7 +338,7 @@ pub fn radiance<M: Medium + ?Sized, S: Scene + ?Sized>(
 /// // A sky of 1, seen through a ball of fog two metres wide.
 /// let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::ONE, Phase::ISOTROPIC)?;
 /// let (ball, lights) = (Placed::new(fog, Region::sphere(Vec3::ZERO, 1.0)?), [Light::Constant(Spectrum::ONE)]);
-/// let world = World { medium: &ball, scene: &Empty, lights: &lights };
+/// let world = World { medium: &ball, scene: &Empty, lights: (&lights).into() };
 /// # let walk = multiple_scatter::Settings::new(Steps::Length(0.1));
 /// # let (paths, light_samples) = (path::Settings::default(), 1);
 /// # let estimator = Estimator { world, surfaces: None, scattered: None, walk, paths, light_samples, finest: 1e-3 };
@@ -413,23 +412,16 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Gather<'_, M, S> {
             let x = self.light[i] + STEPS[i] * k as f32;
             (x - libm::floorf(x)).min(1.0 - f32::EPSILON)
         });
-        let weight = |light: &Light<'_>| {
-            let is_near = light.steep_field().is_some_and(|field| field.contains(point));
-            if is_near || (light.is_sky() && self.settings.indirect) { 0.0 } else { light.importance(point) }
-        };
+        let weight = FromPoint { point, except: Except::Steep, sky: !self.settings.indirect };
         let value = |to_light: Vec3| properties.phase.value(deflection(to_light, to_eye));
-        self.estimator.connected(point, |_| point, weight, value, (choice, Vec2::new(u, v)), &mut self.rng)
+        self.estimator.connected(&weight, |_| point, value, (choice, Vec2::new(u, v)), &mut self.rng)
     }
 
     /// Single scattering along a segment of one light within its near field.
-    fn near(&mut self, segment: &Ray, choice: f32, u: f32) -> Option<Spectrum> {
+    fn near(&mut self, segment: &Ray, lights: &Survey<'_, '_, FromRay>, choice: f32, u: f32) -> Option<Spectrum> {
         let world = &self.estimator.world;
-        let reached = world.lights.iter().filter_map(|light| {
-            light.steep_field()?;
-            let light = NearLight::of(light, segment, 0.0, segment.length)?;
-            Some((light.sent(segment), light))
-        });
-        let (light, chosen) = choose(reached, choice)?;
+        let chosen = lights.pick(choice)?;
+        let light = NearLight::of(&world.lights[chosen.index], segment, 0.0, segment.length)?;
         let joint = light.join(segment, u, uniform2(&mut self.rng))?;
         let properties = world.medium.properties(joint.point);
         if properties.scattering.is_black() {
@@ -478,10 +470,13 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Sight for Gather<'_, M, S> {
             return;
         }
         let count = self.settings.connections.max(1);
+        let sent = FromRay { ray: *segment, near: 0.0, far: segment.length, steep: true, until: None };
+        let lights = self.estimator.world.lights;
+        let lights = lights.survey(&sent);
         for k in 0..count {
             let choice = self.along[0] + STEPS[0] * k as f32;
             let u = (k as f32 + self.along[1]) / count as f32;
-            if let Some(light) = self.near(segment, choice - libm::floorf(choice), u) {
+            if let Some(light) = self.near(segment, &lights, choice - libm::floorf(choice), u) {
                 self.seen.medium_single += throughput * light / count as f32;
             }
         }

@@ -92,7 +92,7 @@ enum Round {
 /// # use fogbow::{host::Empty, math::{Bounds, Ray, Vec3}, medium::Homogeneous, phase::Phase, spectrum::Spectrum};
 /// # use fogbow::{work::step, world::{Outline, World}};
 /// # let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::ONE, Phase::ISOTROPIC)?;
-/// # let world = World { medium: &fog, scene: &Empty, lights: &[] };
+/// # let world = World { medium: &fog, scene: &Empty, lights: (&[]).into() };
 /// # let bounds = Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE };
 /// # let settings = Settings { rays: 20, ..Settings::for_outline(&Outline::of(&world, bounds), 0.02).with_walks(16) };
 /// # let asked = Asked::<fn([f32; 2]) -> Ray>::Box(bounds);
@@ -152,7 +152,7 @@ impl<'s> RadianceCaches<'s> {
     /// # use fogbow::{host::Empty, math::{Bounds, Ray, Vec3}, medium::Homogeneous, phase::Phase, spectrum::Spectrum};
     /// # use fogbow::{work, world::{Outline, World}};
     /// # let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::ONE, Phase::ISOTROPIC)?;
-    /// # let world = World { medium: &fog, scene: &Empty, lights: &[] };
+    /// # let world = World { medium: &fog, scene: &Empty, lights: (&[]).into() };
     /// # let bounds = Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE };
     /// # let settings = Settings { rays: 20, ..Settings::for_outline(&Outline::of(&world, bounds), 0.02).with_walks(16) };
     /// # let asked = || Asked::<fn([f32; 2]) -> Ray>::Box(bounds);

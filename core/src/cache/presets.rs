@@ -92,7 +92,7 @@ impl Settings {
     /// # use fogbow::{medium::Homogeneous, phase::Lobe, spectrum::Spectrum, world::{Outline, World}};
     /// let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::ONE, Lobe::HenyeyGreenstein { g: 0.6 })?;
     /// let lamps = [Light::Point(PointLight::new(Vec3::Z, Spectrum::ONE)?)];
-    /// let world = World { medium: &fog, scene: &Empty, lights: &lamps };
+    /// let world = World { medium: &fog, scene: &Empty, lights: (&lamps).into() };
     /// let bounds = Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE };
     /// let settings = Settings::for_outline(&Outline::of(&world, bounds), 0.02);
     /// // One lamp is connected to; the sharper fog scatters, the finer are records of light scattered often.
@@ -150,7 +150,7 @@ impl Settings {
     ///
     /// ```
     /// # use fogbow::{cache::Settings, host::Empty, math::{Bounds, Vec3}, world::{Outline, World}};
-    /// # let world = World { medium: &Empty, scene: &Empty, lights: &[] };
+    /// # let world = World { medium: &Empty, scene: &Empty, lights: (&[]).into() };
     /// # let outline = Outline::of(&world, Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE });
     /// let settings = Settings::for_outline(&outline, 0.02);
     /// assert!(settings.single.is_none() && settings.with_single_cached(&outline).single.is_some());

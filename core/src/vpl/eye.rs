@@ -71,7 +71,7 @@ pub struct VplRadiance {
 /// # use fogbow::{spectrum::Spectrum, vpl::{Bound, EyeSettings, Gatherer, VirtualLight, radiance}};
 /// # use fogbow::world::World;
 /// let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::splat(0.1), Phase::ISOTROPIC)?;
-/// let world = World { medium: &fog, scene: &Empty, lights: &[] };
+/// let world = World { medium: &fog, scene: &Empty, lights: (&[]).into() };
 /// let gatherer = Gatherer { world, bound: Bound::NONE, compensation: None, has_mirrors: false };
 /// let settings = EyeSettings::new(Settings::default());
 /// let ray = Ray::between(Vec3::ZERO, 2.0 * Vec3::Z);
@@ -105,7 +105,7 @@ pub fn radiance<M: Medium + ?Sized, S: Scene + ?Sized>(
 /// # use fogbow::{spectrum::Spectrum, vpl::receivers};
 /// # use fogbow::world::World;
 /// let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::splat(0.5), Phase::ISOTROPIC)?;
-/// let world = World { medium: &fog, scene: &Empty, lights: &[] };
+/// let world = World { medium: &fog, scene: &Empty, lights: (&[]).into() };
 /// let (ray, mut rng, mut opacity) = (Ray::between(Vec3::ZERO, 2.0 * Vec3::Z), Generator::new(1), 0.0);
 /// for _ in 0..1000 {
 ///     receivers(&ray, &world, &Settings::default(), &mut rng, |receiver, weight| {

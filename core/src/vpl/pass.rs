@@ -64,7 +64,7 @@ impl core::error::Error for VplPassError {}
 /// # use fogbow::{host::Empty, math::*, medium::Homogeneous, phase::Phase, sampling::Generator};
 /// # use fogbow::{spectrum::Spectrum, vpl::{self, Settings}, world::{Outline, World}};
 /// let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::ONE, Phase::ISOTROPIC)?;
-/// let world = World { medium: &fog, scene: &Empty, lights: &[] };
+/// let world = World { medium: &fog, scene: &Empty, lights: (&[]).into() };
 /// let settings = Settings::for_outline(&Outline::of(&world, Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE }));
 /// let mut found = Vec::new();
 /// let eye = |[x, y]: [f32; 2], _: &mut Generator| Ray::between(Vec3::NEG_Z, Vec3::new(x, y, 0.0));
@@ -107,7 +107,7 @@ impl<'o> VplOutput<'o> {
     /// # use fogbow::{spectrum::Spectrum, work, world::{Outline, World}};
     /// # let fog = Homogeneous::new(Spectrum::ONE, Spectrum::ONE, Phase::ISOTROPIC)?;
     /// # let lamps = [Light::Point(PointLight::from_flux(Vec3::ZERO, Spectrum::ONE)?)];
-    /// # let world = World { medium: &fog, scene: &Empty, lights: &lamps };
+    /// # let world = World { medium: &fog, scene: &Empty, lights: (&lamps).into() };
     /// # let outline = Outline::of(&world, Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE });
     /// # let light = VirtualLight::in_medium(Vec3::ZERO, Vec3::Z, Spectrum::ONE, 1, &Phase::ISOTROPIC);
     /// let settings = Settings { paths: 64, ..Settings::for_outline(&outline) };
@@ -152,7 +152,7 @@ impl<'s> VplMemory<'s> {
     /// # use fogbow::{spectrum::Spectrum, work, world::{Outline, World}};
     /// # let fog = Homogeneous::new(Spectrum::ONE, Spectrum::ONE, Phase::ISOTROPIC)?;
     /// # let lamps = [Light::Point(PointLight::from_flux(Vec3::ZERO, Spectrum::ONE)?)];
-    /// # let world = World { medium: &fog, scene: &Empty, lights: &lamps };
+    /// # let world = World { medium: &fog, scene: &Empty, lights: (&lamps).into() };
     /// # let outline = Outline::of(&world, Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE });
     /// # let light = VirtualLight::in_medium(Vec3::ZERO, Vec3::Z, Spectrum::ONE, 1, &Phase::ISOTROPIC);
     /// // Half of all light is absorbed in every collision: 64 paths leave about 64 lights, of which 20 are kept by what a witness sees.
@@ -210,7 +210,7 @@ enum Round {
 /// use fogbow::{spectrum::Spectrum, work, world::{Outline, World}};
 /// let fog = Homogeneous::new(Spectrum::ONE, Spectrum::ONE, Phase::ISOTROPIC)?;
 /// let lamps = [Light::Point(PointLight::from_flux(Vec3::ZERO, Spectrum::ONE)?)];
-/// let world = World { medium: &fog, scene: &Empty, lights: &lamps };
+/// let world = World { medium: &fog, scene: &Empty, lights: (&lamps).into() };
 /// let outline = Outline::of(&world, Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE });
 /// // A pilot tells how many paths leave as many candidates.
 /// let settings = Settings { lights: 100, candidates: 4, ..Settings::for_outline(&outline) };
@@ -270,7 +270,7 @@ impl<'s, Q: GeneratorSource> VplPass<'s, Q> {
     /// # use fogbow::{spectrum::Spectrum, work, world::{Outline, World}};
     /// # let fog = Homogeneous::new(Spectrum::ONE, Spectrum::ONE, Phase::ISOTROPIC)?;
     /// # let lamps = [Light::Point(PointLight::from_flux(Vec3::ZERO, Spectrum::ONE)?)];
-    /// # let world = World { medium: &fog, scene: &Empty, lights: &lamps };
+    /// # let world = World { medium: &fog, scene: &Empty, lights: (&lamps).into() };
     /// # let outline = Outline::of(&world, Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE });
     /// # let light = VirtualLight::in_medium(Vec3::ZERO, Vec3::Z, Spectrum::ONE, 1, &Phase::ISOTROPIC);
     /// let settings = Settings { lights: 100, candidates: 1, ..Settings::for_outline(&outline) };
@@ -305,7 +305,7 @@ impl<'s, Q: GeneratorSource> VplPass<'s, Q> {
     /// # use fogbow::{spectrum::Spectrum, work, world::{Outline, World}};
     /// # let fog = Homogeneous::new(Spectrum::ONE, Spectrum::ONE, Phase::ISOTROPIC)?;
     /// # let lamps = [Light::Point(PointLight::from_flux(Vec3::ZERO, Spectrum::ONE)?)];
-    /// # let world = World { medium: &fog, scene: &Empty, lights: &lamps };
+    /// # let world = World { medium: &fog, scene: &Empty, lights: (&lamps).into() };
     /// # let outline = Outline::of(&world, Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE });
     /// # let light = VirtualLight::in_medium(Vec3::ZERO, Vec3::Z, Spectrum::ONE, 1, &Phase::ISOTROPIC);
     /// let settings = Settings { paths: 256, ..Settings::for_outline(&outline) };

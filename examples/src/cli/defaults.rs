@@ -9,7 +9,7 @@ use fogbow::world::{Outline, World};
 
 /// A world without anything in it whose diagonal is 1: lengths of its presets are shares of the diagonal.
 pub(super) fn unit_outline() -> Outline {
-    let world = World { medium: &Empty, scene: &Empty, lights: &[] };
+    let world = World { medium: &Empty, scene: &Empty, lights: (&[]).into() };
     Outline::of(&world, Bounds { min: Vec3::ZERO, max: Vec3::X })
 }
 

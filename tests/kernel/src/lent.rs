@@ -56,7 +56,7 @@ pub fn with_world<T>(f: impl FnOnce(&Foggy<'_>) -> T) -> Option<T> {
         Light::Sphere(SphereLight::new(SHINING.0, SHINING.1, white).ok()?),
         Light::Point(PointLight::new(Vec3::new(1.0, 1.0, -1.0), white).ok()?),
     ];
-    Some(f(&World { medium: &medium, scene: &OverPaleFloor, lights: &lights }))
+    Some(f(&World { medium: &medium, scene: &OverPaleFloor, lights: (&lights).into() }))
 }
 
 /// The eye ray of a point of the film.

@@ -1,0 +1,283 @@
+//! A tree of boxes around lights.
+
+use bytemuck::{Pod, Zeroable};
+use glam::Vec3;
+
+use super::Light;
+use crate::math::float::{self, PI};
+use crate::math::{Bounds, Frame};
+use crate::storage::{Full, List};
+
+/// No node.
+pub(super) const NONE: u32 = u32::MAX;
+
+/// Levels at most: lights are halved by number, so 2³² of them have 32.
+pub(super) const DEPTH: usize = 33;
+
+/// Lights that are asked for together; each kind has a tree of its own.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum Kind {
+    /// Without extent: the near field is all of space.
+    Lamp,
+    /// With a near field in which the light of samples has no bound, or hardly one.
+    Body,
+    /// Sampled by the solid angle they are seen under.
+    Panel,
+    /// At infinity, from some directions.
+    Sun,
+    /// [`Light::is_sky`].
+    Sky,
+}
+
+/// How many kinds there are.
+pub(super) const KINDS: usize = 5;
+
+impl Kind {
+    pub(super) const ALL: [Self; KINDS] = [Self::Lamp, Self::Body, Self::Panel, Self::Sun, Self::Sky];
+
+    pub(super) fn of(light: &Light<'_>) -> Self {
+        match light {
+            Light::Point(_) | Light::Phong(_) | Light::Spot(_) => Self::Lamp,
+            Light::Sphere(_) | Light::Mesh(_) => Self::Body,
+            Light::Quad(_) => Self::Panel,
+            Light::Sun(_) | Light::Constant(_) | Light::Environment(_) => {
+                if light.is_sky() {
+                    Self::Sky
+                } else {
+                    Self::Sun
+                }
+            }
+        }
+    }
+}
+
+/// A box around lights of one kind, with bounds on where they shine: see [`LightTree`].
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct LightNode {
+    /// Smallest corner (m).
+    pub(super) min: Vec3,
+    /// Sum of the greatest radiant intensities (W/sr), or at infinity of irradiances (W·m⁻²), mean of the channels.
+    pub(super) strength: f32,
+    /// Largest corner (m).
+    pub(super) max: Vec3,
+    /// Radiant power (W, mean of the channels); at infinity over the cross section of the world (W·m⁻²).
+    pub(super) power: f32,
+    /// Around it (unit) light leaves, …
+    pub(super) axis: Vec3,
+    /// … within this angle (rad).
+    pub(super) spread: f32,
+    /// Greatest radius (m) of a near field; infinite for lamps.
+    pub(super) reach: f32,
+    /// The node above, or [`NONE`].
+    pub(super) parent: u32,
+    /// The nodes below; [`NONE`] and the light's index for a leaf.
+    pub(super) children: [u32; 2],
+}
+
+impl LightNode {
+    pub(super) fn leaf(&self) -> Option<usize> {
+        (self.children[0] == NONE).then_some(self.children[1] as usize)
+    }
+
+    pub(super) fn centre(&self) -> Vec3 {
+        (self.min + self.max) * 0.5
+    }
+
+    /// Distance (m) of its middle.
+    pub(crate) fn away(&self, point: Vec3) -> f32 {
+        self.centre().distance(point)
+    }
+
+    /// Squared radius (m²) of the ball around the box.
+    pub(super) fn radius2(&self) -> f32 {
+        0.25 * self.min.distance_squared(self.max)
+    }
+
+    /// Squared distance (m²) from `point` to the box.
+    pub(super) fn distance2(&self, point: Vec3) -> f32 {
+        (self.min - point).max(point - self.max).max(Vec3::ZERO).length_squared()
+    }
+
+    /// Whether light may leave towards a point at `offset` (m) from the centre.
+    pub(super) fn shines_to(&self, offset: Vec3, distance2: f32, radius2: f32) -> bool {
+        if self.spread >= PI || distance2 <= radius2 {
+            return true;
+        }
+        let inverse = 1.0 / float::sqrt(distance2);
+        let seen = float::asin(float::sqrt(radius2) * inverse);
+        float::acos(self.axis.dot(offset) * inverse) <= self.spread + seen
+    }
+
+    fn of(index: usize, light: &Light<'_>) -> Self {
+        // Rounding must not hide what is lit.
+        const SLACK: f32 = 2e-3;
+        // A cross section of 1 m².
+        let unit = Bounds { min: Vec3::ZERO, max: Vec3::X * float::sqrt(4.0 / PI) };
+        let bounds = light.bounds();
+        let (axis, spread) = match light {
+            Light::Phong(light) => (light.axis, 0.5 * PI + SLACK),
+            Light::Spot(light) => (light.axis, light.cutoff + SLACK),
+            Light::Quad(light) => (light.normal(), 0.5 * PI + SLACK),
+            _ => (Vec3::Z, PI),
+        };
+        let field = light.near_field();
+        let strength = if field.is_some() { light.intensity() } else { light.importance(Vec3::ZERO) };
+        Self {
+            min: bounds.min,
+            strength: strength.min(1e30),
+            max: bounds.max,
+            power: light.power(&unit).mean().min(1e30),
+            axis,
+            spread: spread.min(PI),
+            reach: field.map_or(0.0, |field| field.radius().unwrap_or(f32::INFINITY)),
+            parent: NONE,
+            children: [NONE, index as u32],
+        }
+    }
+
+    /// The node above two.
+    fn above(nodes: &[Self], children: [u32; 2]) -> Self {
+        let [a, b] = children.map(|child| &nodes[child as usize]);
+        let (axis, spread) = cone([(a.axis, a.spread), (b.axis, b.spread)]);
+        Self {
+            min: a.min.min(b.min),
+            strength: (a.strength + b.strength).min(f32::MAX),
+            max: a.max.max(b.max),
+            power: (a.power + b.power).min(f32::MAX),
+            axis,
+            spread,
+            reach: a.reach.max(b.reach),
+            parent: NONE,
+            children,
+        }
+    }
+}
+
+/// The narrowest cone (axis, half angle) around two.
+fn cone([a, b]: [(Vec3, f32); 2]) -> (Vec3, f32) {
+    let (wide, narrow) = if a.1 >= b.1 { (a, b) } else { (b, a) };
+    let between = float::acos(wide.0.dot(narrow.0));
+    if between + narrow.1 <= wide.1 {
+        return wide;
+    }
+    let half = 0.5 * (wide.1 + narrow.1 + between) + 1e-4;
+    let across = narrow.0 - wide.0 * wide.0.dot(narrow.0);
+    if half >= PI {
+        return (wide.0, PI);
+    }
+    let (sin, cos) = float::sin_cos(half - wide.1);
+    // Opposite axes: any plane holds both.
+    let across = across.try_normalize().unwrap_or_else(|| Frame::around(wide.0).to_world(Vec3::X));
+    ((wide.0 * cos + across * sin).normalize(), half)
+}
+
+/// Lights in a tree of boxes, so that one of many is chosen by what it sends to a place in a time that grows like the logarithm of their
+/// number (Conty Estevez and Kulla 2018).
+///
+/// Built once for all lights of a world, in lent memory of two nodes per light or in a `Vec`; given to [`Lights`](super::Lights) together
+/// with them. Few lights, some sixteen, need no tree.
+///
+/// ```
+/// # use fogbow::{light::{Light, LightNode, Lights, LightTree, PointLight}, math::Vec3, spectrum::Spectrum};
+/// // A row of lamps, every metre one.
+/// let lamp = |i: usize| Light::Point(PointLight::new(Vec3::X * i as f32, Spectrum::ONE).unwrap());
+/// let lamps: [Light; 100] = core::array::from_fn(lamp);
+/// let mut memory = [LightNode::EMPTY; 200];
+/// let tree = LightTree::new(&lamps, &mut memory[..])?;
+/// let lights = Lights::with_tree(&lamps, &tree);
+/// // Beside the seventh it is that which is chosen.
+/// let (index, probability) = lights.choose(Vec3::new(7.0, 0.1, 0.0), 0.5).unwrap();
+/// assert!(index == 7 && probability > 0.8);
+/// assert!((lights.probability(Vec3::new(7.0, 0.1, 0.0), index) / probability - 1.0).abs() < 1e-5);
+/// # Ok::<(), fogbow::storage::Full>(())
+/// ```
+#[doc(alias("light BVH", "many lights", "light hierarchy"))]
+#[derive(Debug)]
+pub struct LightTree<'s> {
+    /// A leaf for every light, in their order; then inner nodes.
+    nodes: List<'s, LightNode>,
+    roots: [u32; KINDS],
+}
+
+impl LightNode {
+    /// A node of no light, to fill lent memory with.
+    pub const EMPTY: Self = Self {
+        min: Vec3::ZERO,
+        strength: 0.0,
+        max: Vec3::ZERO,
+        power: 0.0,
+        axis: Vec3::Z,
+        spread: PI,
+        reach: 0.0,
+        parent: NONE,
+        children: [NONE; 2],
+    };
+}
+
+impl<'s> LightTree<'s> {
+    /// Over `lights`, in `memory` of two nodes for every light.
+    ///
+    /// # Errors
+    /// [`Full`] where lent memory is too small.
+    pub fn new(lights: &[Light<'_>], memory: impl Into<List<'s, LightNode>>) -> Result<Self, Full> {
+        let mut nodes = memory.into();
+        nodes.clear();
+        let count = lights.len();
+        if u32::try_from(count).map_or(true, |count| count > NONE / 2) {
+            return Err(Full);
+        }
+        for _ in 0..2 {
+            for (i, light) in lights.iter().enumerate() {
+                nodes.push(LightNode::of(i, light))?;
+            }
+        }
+        let all = nodes.as_mut_slice();
+        // The second half is what is sorted. The node above the items `low..high` takes the place of the middle one, when that is done with.
+        let kind = |node: &LightNode| Kind::of(&lights[node.children[1] as usize]);
+        all[count..].sort_unstable_by_key(|node| (kind(node), node.children[1]));
+        let mut roots = [NONE; KINDS];
+        let mut low = count;
+        for (root, wanted) in roots.iter_mut().zip(Kind::ALL) {
+            let high = low + all[low..].iter().take_while(|node| kind(node) == wanted).count();
+            if high > low {
+                *root = divide(all, low, high);
+            }
+            low = high;
+        }
+        Ok(Self { nodes, roots })
+    }
+
+    pub(super) fn nodes(&self) -> (&[LightNode], [u32; KINDS]) {
+        (self.nodes.as_slice(), self.roots)
+    }
+}
+
+/// Divides the items `low..high` of the second half, and returns the node above them.
+fn divide(nodes: &mut [LightNode], low: usize, high: usize) -> u32 {
+    if high - low == 1 {
+        return nodes[low].children[1];
+    }
+    let items = &mut nodes[low..high];
+    let around = Bounds::of(items.iter().map(LightNode::centre));
+    let size = around.size();
+    let axis = if size.x >= size.max_element() {
+        0
+    } else if size.y >= size.z {
+        1
+    } else {
+        2
+    };
+    let half = items.len() / 2;
+    // Of equals the order is that of lights: the same tree on every machine.
+    let key = |node: &LightNode| (node.centre()[axis], node.children[1]);
+    items.select_nth_unstable_by(half, |a, b| key(a).0.total_cmp(&key(b).0).then(key(a).1.cmp(&key(b).1)));
+    let middle = low + half;
+    let children = [divide(nodes, low, middle), divide(nodes, middle, high)];
+    let above = middle as u32;
+    for child in children {
+        nodes[child as usize].parent = above;
+    }
+    nodes[middle] = LightNode::above(nodes, children);
+    above
+}
