@@ -18,7 +18,7 @@ pub(super) const REPRESENTATIVES: usize = 64;
 
 /// A node is opened where what is not known of it is more than this part of all that is sent. Larger: smaller cuts, whose choices are
 /// noisier; smaller: nodes are opened that do not matter.
-const DOUBT: f32 = 0.02;
+const DOUBT: f32 = 0.1;
 
 /// Nodes with what they send, about.
 pub(crate) struct Cut {
@@ -27,32 +27,38 @@ pub(crate) struct Cut {
 }
 
 impl Cut {
-    /// From the roots down, the largest nodes first, until nothing is in doubt or there are `limit` nodes.
+    /// From the roots down, what is least known first, until nothing is in doubt or there are `limit` nodes.
     pub(super) fn of(lights: &Lights<'_>, question: &impl Question, limit: usize) -> Self {
-        let limit = limit.min(MOST);
-        let mut queue = heapless::Deque::<(u32, Guess), MOST>::new();
         let mut cut = Self { entries: heapless::Vec::new(), total: 0.0 };
-        let add = |queue: &mut heapless::Deque<_, MOST>, total: &mut f32, index| {
-            let guess = guess(lights, question, index);
-            if guess.weight > 0.0 {
-                *total += guess.weight;
-                // There is room for `limit` nodes.
-                let _ = queue.push_back((index, guess));
-            }
-        };
+        let mut doubts = heapless::Vec::<f32, MOST>::new();
         for (_, root) in lights.roots().filter(|(kind, _)| question.asks(*kind)) {
-            add(&mut queue, &mut cut.total, root);
-        }
-        while let Some((index, guess)) = queue.pop_front() {
-            let node = lights.node(index);
-            let full = cut.entries.len() + queue.len() + 2 > limit;
-            if full || node.leaf().is_some() || guess.doubt <= DOUBT * cut.total {
-                let _ = cut.entries.push((index, guess.weight));
-                continue;
+            let guess = guess(lights, question, root);
+            if guess.weight > 0.0 {
+                cut.total += guess.weight;
+                // There is room for `limit` nodes.
+                let _ = (cut.entries.push((root, guess.weight)), doubts.push(guess.doubt));
             }
-            cut.total -= guess.weight;
-            for child in node.children {
-                add(&mut queue, &mut cut.total, child);
+        }
+        while cut.entries.len() < limit.min(MOST) {
+            let (mut worst, mut most) = (0, 0.0);
+            for (i, doubt) in doubts.iter().enumerate() {
+                if *doubt > most {
+                    (worst, most) = (i, *doubt);
+                }
+            }
+            // What was taken away may leave less than nothing of the total.
+            if most <= DOUBT * cut.total.max(0.0) {
+                break;
+            }
+            let (index, weight) = cut.entries.swap_remove(worst);
+            doubts.swap_remove(worst);
+            cut.total -= weight;
+            for child in lights.node(index).children {
+                let guess = guess(lights, question, child);
+                if guess.weight > 0.0 {
+                    cut.total += guess.weight;
+                    let _ = (cut.entries.push((child, guess.weight)), doubts.push(guess.doubt));
+                }
             }
         }
         // Anew, so that rounding does not add up.

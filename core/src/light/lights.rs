@@ -332,3 +332,55 @@ impl<Q: Question> Survey<'_, '_, Q> {
         }
     }
 }
+#[cfg(test)]
+mod tuning {
+    extern crate std;
+    use super::*;
+    use crate::light::{FromRay, PointLight};
+    use crate::math::Ray;
+    use crate::sampling::{Generator, uniform, uniform2, warp};
+    use alloc::vec::Vec;
+
+    #[test]
+    fn print_factors() {
+        for n in [24, 100, 1000, 10000] {
+            let rng = &mut Generator::new(3);
+            let mut at = |s: f32| Vec3::new(uniform(rng), uniform(rng), uniform(rng)) * s;
+            let lamps: Vec<Light<'_>> = (0..n)
+                .map(|_| Light::Point(PointLight::new(at(2.0), Spectrum::splat(at(1.0).x + 0.5)).unwrap()))
+                .collect();
+            let tree = LightTree::new(&lamps, Vec::new()).unwrap();
+            let lights = Lights::with_tree(&lamps, &tree);
+            let (mut of_point, mut of_ray, mut sums, mut worst) = (0.0, 0.0, [0.0; 2], [0.0_f64; 2]);
+            let rng = &mut Generator::new(4);
+            let count = 20;
+            for _ in 0..count {
+                let p = Vec3::new(uniform(rng), uniform(rng), uniform(rng)) * 2.0;
+                let q = FromPoint::all(p);
+                let ray = Ray::new(p, warp::uniform_sphere(uniform2(rng)));
+                let r = FromRay { ray, near: 0.0, far: 1.0, steep: false, until: None };
+                let point = factor(&lights, &q, &mut sums[0]);
+                let along = factor(&lights, &r, &mut sums[1]);
+                of_point += point / f64::from(count);
+                of_ray += along / f64::from(count);
+                worst = [worst[0].max(point), worst[1].max(along)];
+            }
+            std::println!("{n}: point {of_point:.3} (worst {:.2}) ray {of_ray:.3} (worst {:.2}); sums {:?}", worst[0], worst[1], sums.map(|s| s / f64::from(count)));
+        }
+    }
+
+    fn factor(lights: &Lights<'_>, q: &impl Question, sum: &mut f64) -> f64 {
+        let (mut squares, mut total) = (0.0, 0.0);
+        let cut = Cut::of(lights, q, q.limit());
+        for i in 0..lights.len() {
+            let p = f64::from(cut.share(lights, q, i));
+            let f = f64::from(q.light(&lights[i]));
+            *sum += p;
+            if f > 0.0 {
+                squares += f * f / p;
+            }
+            total += f;
+        }
+        squares / (total * total)
+    }
+}
