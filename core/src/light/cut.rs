@@ -11,7 +11,7 @@ pub(super) const MOST: usize = 64;
 
 /// Nodes of the cut by which one light is chosen. More: probabilities follow what lights send more closely, at the cost of looking at twice as
 /// many nodes; fewer: nodes around a place stay closed, and lights in them that are near it are chosen too seldom.
-pub(super) const CHOICE: usize = 32;
+pub(super) const CHOICE: usize = 24;
 
 /// Nodes of the cut of which every one sends a light: for sums over all lights. More: less noise of a record, for as many more shadow rays.
 pub(super) const REPRESENTATIVES: usize = 64;
@@ -53,7 +53,7 @@ impl Cut {
             let (index, weight) = cut.entries.swap_remove(worst);
             doubts.swap_remove(worst);
             cut.total -= weight;
-            for child in lights.node(index).children {
+            for child in lights.node(index).children() {
                 let guess = guess(lights, question, child);
                 if guess.weight > 0.0 {
                     cut.total += guess.weight;
@@ -99,16 +99,17 @@ impl Cut {
             if let Some(light) = node.leaf() {
                 return Some((light, share));
             }
-            let [left, right] = node.children.map(|child| guess(lights, question, child).weight);
+            let children = node.children();
+            let [left, right] = children.map(|child| guess(lights, question, child).weight);
             let of_left = left / (left + right);
             // Written so that NaN, of no light at all, fails.
             if !(left + right > 0.0) {
                 return None;
             }
             let (child, part, rest) = if *u < of_left {
-                (node.children[0], of_left, *u / of_left)
+                (children[0], of_left, *u / of_left)
             } else {
-                (node.children[1], 1.0 - of_left, (*u - of_left) / (1.0 - of_left))
+                (children[1], 1.0 - of_left, (*u - of_left) / (1.0 - of_left))
             };
             if part <= 0.0 {
                 return None;
@@ -120,10 +121,10 @@ impl Cut {
 
     /// The probability with which [`Cut::pick`] takes a light.
     pub(super) fn share(&self, lights: &Lights<'_>, question: &impl Question, light: usize) -> f32 {
-        let (mut index, mut share) = (light as u32, 1.0);
         if light >= lights.slice().len() {
             return 0.0;
         }
+        let (mut index, mut share) = (lights.node(light as u32).leaf, 1.0);
         while index != NONE {
             if let Some((_, weight)) = self.entries.iter().find(|(entry, _)| *entry == index) {
                 return share * (weight / self.total);
@@ -132,7 +133,7 @@ impl Cut {
             if above == NONE {
                 break;
             }
-            let children = lights.node(above).children;
+            let children = lights.node(above).children();
             let [left, right] = children.map(|child| guess(lights, question, child).weight);
             if !(left + right > 0.0) {
                 return 0.0;

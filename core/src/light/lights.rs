@@ -70,7 +70,7 @@ impl<'a> Lights<'a> {
     /// ```
     /// # use fogbow::{light::{Light, LightNode, LightTree, Lights, PointLight}, math::Vec3, spectrum::Spectrum};
     /// let lamps = [Light::Point(PointLight::new(Vec3::Z, Spectrum::ONE)?); 2];
-    /// let mut memory = [LightNode::EMPTY; 4];
+    /// let mut memory = [LightNode::EMPTY; 6];
     /// let tree = LightTree::new(&lamps, &mut memory[..]).unwrap();
     /// assert!(Lights::with_tree(&lamps, &tree).has_tree());
     /// assert!(!Lights::with_tree(&lamps[..1], &tree).has_tree());
@@ -205,7 +205,7 @@ impl<'a> Lights<'a> {
         loop {
             let children = match self.node(node).leaf() {
                 Some(index) => return Some(Choice { index, probability, remainder }),
-                None => self.node(node).children,
+                None => self.node(node).children(),
             };
             let (child, choice) = discrete::choose(children.map(|child| (self.node(child).power, child)), remainder)?;
             (node, remainder, probability) = (child, choice.remainder, probability * choice.probability);
@@ -231,7 +231,7 @@ impl<'a> Lights<'a> {
                     nearest = nearest.min(away(&self.all[light]).unwrap_or(f32::INFINITY));
                     continue;
                 }
-                let mut children = node.children.map(|child| (child, self.node(child).distance2(point)));
+                let mut children = node.children().map(|child| (child, self.node(child).distance2(point)));
                 if children[0].1 < children[1].1 {
                     children.swap(0, 1);
                 }
@@ -255,7 +255,7 @@ impl<'a> Lights<'a> {
     fn leaves(&self, root: u32) -> impl Iterator<Item = usize> + '_ {
         let down = |mut node: u32| {
             while self.node(node).leaf().is_none() {
-                node = self.node(node).children[0];
+                node = self.node(node).below;
             }
             node
         };
@@ -264,13 +264,13 @@ impl<'a> Lights<'a> {
                 return None;
             }
             let above = self.node(node).parent;
-            let [left, right] = self.node(above).children;
+            let [left, right] = self.node(above).children();
             if node == left {
                 return Some(down(right));
             }
             node = above;
         };
-        core::iter::successors(Some(down(root)), move |leaf| after(*leaf)).map(|leaf| leaf as usize)
+        core::iter::successors(Some(down(root)), move |leaf| after(*leaf)).filter_map(|leaf| self.node(leaf).leaf())
     }
 
     /// Radiance of all lights together that are a sky: [`sky`].
@@ -365,7 +365,12 @@ mod tuning {
                 of_ray += along / f64::from(count);
                 worst = [worst[0].max(point), worst[1].max(along)];
             }
-            std::println!("{n}: point {of_point:.3} (worst {:.2}) ray {of_ray:.3} (worst {:.2}); sums {:?}", worst[0], worst[1], sums.map(|s| s / f64::from(count)));
+            std::println!(
+                "{n}: point {of_point:.3} (worst {:.2}) ray {of_ray:.3} (worst {:.2}); sums {:?}",
+                worst[0],
+                worst[1],
+                sums.map(|s| s / f64::from(count))
+            );
         }
     }
 

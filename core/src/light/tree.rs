@@ -71,13 +71,23 @@ pub struct LightNode {
     pub(super) reach: f32,
     /// The node above, or [`NONE`].
     pub(super) parent: u32,
-    /// The nodes below; [`NONE`] and the light's index for a leaf.
-    pub(super) children: [u32; 2],
+    /// The first of two nodes below, side by side; [`LEAF`] and the light's index for a leaf.
+    pub(super) below: u32,
+    /// The leaf of the light whose index is that of this node; of no meaning beyond the number of lights.
+    pub(super) leaf: u32,
 }
+
+/// Marks leaves.
+const LEAF: u32 = 1 << 31;
 
 impl LightNode {
     pub(super) fn leaf(&self) -> Option<usize> {
-        (self.children[0] == NONE).then_some(self.children[1] as usize)
+        (self.below & LEAF != 0).then_some((self.below & !LEAF) as usize)
+    }
+
+    /// The two nodes below an inner one.
+    pub(super) fn children(&self) -> [u32; 2] {
+        [self.below, self.below + 1]
     }
 
     pub(super) fn centre(&self) -> Vec3 {
@@ -132,13 +142,13 @@ impl LightNode {
             spread: spread.min(PI),
             reach: field.map_or(0.0, |field| field.radius().unwrap_or(f32::INFINITY)),
             parent: NONE,
-            children: [NONE, index as u32],
+            below: LEAF | index as u32,
+            leaf: NONE,
         }
     }
 
     /// The node above two.
-    fn above(nodes: &[Self], children: [u32; 2]) -> Self {
-        let [a, b] = children.map(|child| &nodes[child as usize]);
+    fn above(a: &Self, b: &Self) -> Self {
         let (axis, spread) = cone([(a.axis, a.spread), (b.axis, b.spread)]);
         Self {
             min: a.min.min(b.min),
@@ -148,8 +158,7 @@ impl LightNode {
             axis,
             spread,
             reach: a.reach.max(b.reach),
-            parent: NONE,
-            children,
+            ..Self::EMPTY
         }
     }
 }
@@ -175,7 +184,7 @@ fn cone([a, b]: [(Vec3, f32); 2]) -> (Vec3, f32) {
 /// Lights in a tree of boxes, so that one of many is chosen by what it sends to a place in a time that grows like the logarithm of their
 /// number (Conty Estevez and Kulla 2018).
 ///
-/// Built once for all lights of a world, in lent memory of two nodes per light or in a `Vec`; given to [`Lights`](super::Lights) together
+/// Built once for all lights of a world, in lent memory of three nodes per light, one of them for the work, or in a `Vec`; given to [`Lights`](super::Lights) together
 /// with them. Few lights, some sixteen, need no tree.
 ///
 /// ```
@@ -183,7 +192,7 @@ fn cone([a, b]: [(Vec3, f32); 2]) -> (Vec3, f32) {
 /// // A row of lamps, every metre one.
 /// let lamp = |i: usize| Light::Point(PointLight::new(Vec3::X * i as f32, Spectrum::ONE).unwrap());
 /// let lamps: [Light; 100] = core::array::from_fn(lamp);
-/// let mut memory = [LightNode::EMPTY; 200];
+/// let mut memory = [LightNode::EMPTY; 300];
 /// let tree = LightTree::new(&lamps, &mut memory[..])?;
 /// let lights = Lights::with_tree(&lamps, &tree);
 /// // Beside the seventh it is that which is chosen.
@@ -195,7 +204,6 @@ fn cone([a, b]: [(Vec3, f32); 2]) -> (Vec3, f32) {
 #[doc(alias("light BVH", "many lights", "light hierarchy"))]
 #[derive(Debug)]
 pub struct LightTree<'s> {
-    /// A leaf for every light, in their order; then inner nodes.
     nodes: List<'s, LightNode>,
     roots: [u32; KINDS],
 }
@@ -211,12 +219,13 @@ impl LightNode {
         spread: PI,
         reach: 0.0,
         parent: NONE,
-        children: [NONE; 2],
+        below: NONE,
+        leaf: NONE,
     };
 }
 
 impl<'s> LightTree<'s> {
-    /// Over `lights`, in `memory` of two nodes for every light.
+    /// Over `lights`, in `memory` of three nodes for every light.
     ///
     /// # Errors
     /// [`Full`] where lent memory is too small.
@@ -224,27 +233,30 @@ impl<'s> LightTree<'s> {
         let mut nodes = memory.into();
         nodes.clear();
         let count = lights.len();
-        if u32::try_from(count).map_or(true, |count| count > NONE / 2) {
+        if u32::try_from(count).map_or(true, |count| count >= LEAF / 2) {
             return Err(Full);
         }
-        for _ in 0..2 {
-            for (i, light) in lights.iter().enumerate() {
-                nodes.push(LightNode::of(i, light))?;
-            }
+        for _ in 0..2 * count {
+            nodes.push(LightNode::EMPTY)?;
         }
-        let all = nodes.as_mut_slice();
-        // The second half is what is sorted. The node above the items `low..high` takes the place of the middle one, when that is done with.
-        let kind = |node: &LightNode| Kind::of(&lights[node.children[1] as usize]);
-        all[count..].sort_unstable_by_key(|node| (kind(node), node.children[1]));
-        let mut roots = [NONE; KINDS];
-        let mut low = count;
+        for (i, light) in lights.iter().enumerate() {
+            nodes.push(LightNode::of(i, light))?;
+        }
+        let (nodes_of_tree, items) = nodes.as_mut_slice().split_at_mut(2 * count);
+        let kind = |node: &LightNode| node.leaf().map(|i| Kind::of(&lights[i]));
+        items.sort_unstable_by_key(|node| (kind(node), node.below));
+        let mut builder = Builder { nodes: nodes_of_tree, used: 0 };
+        let (mut roots, mut rest) = ([NONE; KINDS], items);
         for (root, wanted) in roots.iter_mut().zip(Kind::ALL) {
-            let high = low + all[low..].iter().take_while(|node| kind(node) == wanted).count();
-            if high > low {
-                *root = divide(all, low, high);
+            let (own, others) = rest.split_at_mut(rest.iter().take_while(|node| kind(node) == Some(wanted)).count());
+            if !own.is_empty() {
+                *root = builder.used as u32;
+                builder.used += 1;
+                builder.divide(own, *root, NONE);
             }
-            low = high;
+            rest = others;
         }
+        nodes.truncate(2 * count);
         Ok(Self { nodes, roots })
     }
 
@@ -253,31 +265,41 @@ impl<'s> LightTree<'s> {
     }
 }
 
-/// Divides the items `low..high` of the second half, and returns the node above them.
-fn divide(nodes: &mut [LightNode], low: usize, high: usize) -> u32 {
-    if high - low == 1 {
-        return nodes[low].children[1];
+/// Writes nodes, children side by side and soon after what is above them.
+struct Builder<'n> {
+    nodes: &'n mut [LightNode],
+    used: usize,
+}
+
+impl Builder<'_> {
+    /// The node `at` over leaves.
+    fn divide(&mut self, items: &mut [LightNode], at: u32, parent: u32) {
+        if let [leaf] = items {
+            let light = leaf.leaf().unwrap_or_default();
+            // What another node says of leaves stays.
+            self.nodes[at as usize] = LightNode { parent, leaf: self.nodes[at as usize].leaf, ..*leaf };
+            self.nodes[light].leaf = at;
+            return;
+        }
+        let size = Bounds::of(items.iter().map(LightNode::centre)).size();
+        let axis = if size.x >= size.max_element() {
+            0
+        } else if size.y >= size.z {
+            1
+        } else {
+            2
+        };
+        let half = items.len() / 2;
+        // Of equals the order is that of lights: the same tree on every machine.
+        let key = |node: &LightNode| (node.centre()[axis], node.below);
+        items.select_nth_unstable_by(half, |a, b| key(a).0.total_cmp(&key(b).0).then(key(a).1.cmp(&key(b).1)));
+        let (left, right) = items.split_at_mut(half);
+        let below = self.used;
+        self.used += 2;
+        self.divide(left, below as u32, at);
+        self.divide(right, below as u32 + 1, at);
+        let above = LightNode::above(&self.nodes[below], &self.nodes[below + 1]);
+        let leaf = self.nodes[at as usize].leaf;
+        self.nodes[at as usize] = LightNode { parent, below: below as u32, leaf, ..above };
     }
-    let items = &mut nodes[low..high];
-    let around = Bounds::of(items.iter().map(LightNode::centre));
-    let size = around.size();
-    let axis = if size.x >= size.max_element() {
-        0
-    } else if size.y >= size.z {
-        1
-    } else {
-        2
-    };
-    let half = items.len() / 2;
-    // Of equals the order is that of lights: the same tree on every machine.
-    let key = |node: &LightNode| (node.centre()[axis], node.children[1]);
-    items.select_nth_unstable_by(half, |a, b| key(a).0.total_cmp(&key(b).0).then(key(a).1.cmp(&key(b).1)));
-    let middle = low + half;
-    let children = [divide(nodes, low, middle), divide(nodes, middle, high)];
-    let above = middle as u32;
-    for child in children {
-        nodes[child as usize].parent = above;
-    }
-    nodes[middle] = LightNode::above(nodes, children);
-    above
 }
