@@ -11,7 +11,10 @@ pub(super) const MOST: usize = 64;
 
 /// Nodes of the cut by which one light is chosen. More: probabilities follow what lights send more closely, at the cost of looking at twice as
 /// many nodes; fewer: nodes around a place stay closed, and lights in them that are near it are chosen too seldom.
-pub(super) const CHOICE: usize = 24;
+pub(super) const CHOICE: usize = 16;
+
+/// The same for segments of walks with gradients, of which a record has hundreds: their noise is that of the walks.
+pub(super) const WALKS: usize = 8;
 
 /// Nodes of the cut of which every one sends a light: for sums over all lights. More: less noise of a record, for as many more shadow rays.
 pub(super) const REPRESENTATIVES: usize = 64;
@@ -150,7 +153,7 @@ impl Cut {
 fn guess(lights: &Lights<'_>, question: &impl Question, index: u32) -> Guess {
     let node = lights.node(index);
     match node.leaf() {
-        Some(light) => Guess { weight: question.light(&lights.slice()[light]), doubt: 0.0 },
+        Some(light) => Guess { weight: question.leaf(node, &lights.slice()[light]), doubt: 0.0 },
         None => question.node(node),
     }
 }

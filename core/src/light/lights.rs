@@ -332,60 +332,229 @@ impl<Q: Question> Survey<'_, '_, Q> {
         }
     }
 }
-#[cfg(test)]
-mod tuning {
-    extern crate std;
-    use super::*;
-    use crate::light::{FromRay, PointLight};
-    use crate::math::Ray;
-    use crate::sampling::{Generator, uniform, uniform2, warp};
+#[cfg(all(test, feature = "alloc"))]
+mod tests {
     use alloc::vec::Vec;
+    use core::cell::Cell;
 
-    #[test]
-    fn print_factors() {
-        for n in [24, 100, 1000, 10000] {
-            let rng = &mut Generator::new(3);
-            let mut at = |s: f32| Vec3::new(uniform(rng), uniform(rng), uniform(rng)) * s;
-            let lamps: Vec<Light<'_>> = (0..n)
-                .map(|_| Light::Point(PointLight::new(at(2.0), Spectrum::splat(at(1.0).x + 0.5)).unwrap()))
-                .collect();
-            let tree = LightTree::new(&lamps, Vec::new()).unwrap();
-            let lights = Lights::with_tree(&lamps, &tree);
-            let (mut of_point, mut of_ray, mut sums, mut worst) = (0.0, 0.0, [0.0; 2], [0.0_f64; 2]);
-            let rng = &mut Generator::new(4);
-            let count = 20;
-            for _ in 0..count {
-                let p = Vec3::new(uniform(rng), uniform(rng), uniform(rng)) * 2.0;
-                let q = FromPoint::all(p);
-                let ray = Ray::new(p, warp::uniform_sphere(uniform2(rng)));
-                let r = FromRay { ray, near: 0.0, far: 1.0, steep: false, until: None };
-                let point = factor(&lights, &q, &mut sums[0]);
-                let along = factor(&lights, &r, &mut sums[1]);
-                of_point += point / f64::from(count);
-                of_ray += along / f64::from(count);
-                worst = [worst[0].max(point), worst[1].max(along)];
+    use super::*;
+    use crate::light::question::{Except, FromRay, Guess};
+    use crate::light::{PointLight, QuadLight, SphereLight, SpotLight, Sun};
+    use crate::math::Ray;
+    use crate::sampling::{Generator, uniform2, warp};
+
+    fn at(rng: &mut Generator) -> Vec3 {
+        Vec3::new(uniform(rng), uniform(rng), uniform(rng)) * 2.0
+    }
+
+    fn lamps(count: usize) -> Vec<Light<'static>> {
+        let rng = &mut Generator::new(3);
+        let lamp = |_| Light::Point(PointLight::new(at(rng), Spectrum::splat(0.5 + uniform(rng))).unwrap());
+        (0..count).map(lamp).collect()
+    }
+
+    /// Lights of every kind, all that may be left out in some place.
+    fn mixed(count: usize) -> Vec<Light<'static>> {
+        let rng = &mut Generator::new(5);
+        let mut light = |i: usize| {
+            let (place, towards) = (at(rng), warp::uniform_sphere(uniform2(rng)));
+            let (size, bright) = (0.02 + 0.05 * uniform(rng), Spectrum::splat(0.5 + uniform(rng)));
+            match i % 6 {
+                0 => Light::Point(PointLight::new(place, bright).unwrap()),
+                1 => Light::Spot(SpotLight::new(place, towards, 0.2, 0.7, bright).unwrap()),
+                2 => {
+                    let across = towards.any_orthonormal_vector() * size;
+                    Light::Quad(QuadLight::new(place, across, across.cross(towards), bright * 100.0).unwrap())
+                }
+                3 | 4 => Light::Sphere(SphereLight::new(place, 0.2 * size, bright * 1000.0).unwrap()),
+                _ => Light::Sun(Sun::new(towards, bright * 0.1).unwrap()),
             }
-            std::println!(
-                "{n}: point {of_point:.3} (worst {:.2}) ray {of_ray:.3} (worst {:.2}); sums {:?}",
-                worst[0],
-                worst[1],
-                sums.map(|s| s / f64::from(count))
-            );
+        };
+        (0..count).map(&mut light).chain([Light::Constant(Spectrum::splat(0.01))]).collect()
+    }
+
+    fn questions(rng: &mut Generator) -> ([FromPoint; 3], [FromRay; 2]) {
+        let point = at(rng);
+        let of = |except, sky| FromPoint { point, except, sky };
+        let ray = Ray::new(point, warp::uniform_sphere(uniform2(rng)));
+        let part = FromRay { ray, near: 0.1, far: 1.0, steep: false, until: None };
+        let all = [of(Except::Nothing, true), of(Except::Near, true), of(Except::Steep, false)];
+        (all, [part, FromRay { far: f32::INFINITY, steep: true, until: Some((1e4, 1.0)), ..part }])
+    }
+
+    /// Chooses many times: every light as often as is said of it, with the probability that is said; and those that take part are reached.
+    fn check_choices(lights: &Lights<'_>, question: &impl Question, is_whole: bool) {
+        let survey = lights.survey(question);
+        let count = 4000;
+        let mut found = alloc::vec![0_u32; lights.len()];
+        for i in 0..count {
+            let u = (i as f32 + 0.5) / count as f32;
+            let Some(choice) = survey.pick(u) else { continue };
+            found[choice.index] += 1;
+            let said = lights.share(question, choice.index);
+            assert!((choice.probability / said - 1.0).abs() < 1e-3, "{} {said}", choice.probability);
+            assert!((0.0..1.0).contains(&choice.remainder));
+        }
+        let shares: Vec<f32> = (0..lights.len()).map(|i| lights.share(question, i)).collect();
+        let sum: f64 = shares.iter().map(|share| f64::from(*share)).sum();
+        assert!(sum < 1.0 + 1e-4 && (!is_whole || sum > 1.0 - 1e-4), "{sum}");
+        // Lattice points: each light owns a few intervals.
+        for (i, (found, share)) in found.iter().zip(&shares).enumerate() {
+            assert!((*found as f32 - share * count as f32).abs() < 4.0, "{i}: {found}, {share}");
+            assert!(*share > 0.0 || question.light(&lights[i]) == 0.0, "{i} is never chosen");
         }
     }
 
-    fn factor(lights: &Lights<'_>, q: &impl Question, sum: &mut f64) -> f64 {
-        let (mut squares, mut total) = (0.0, 0.0);
-        let cut = Cut::of(lights, q, q.limit());
-        for i in 0..lights.len() {
-            let p = f64::from(cut.share(lights, q, i));
-            let f = f64::from(q.light(&lights[i]));
-            *sum += p;
-            if f > 0.0 {
-                squares += f * f / p;
+    #[test]
+    fn lights_are_chosen_as_often_as_is_said_and_probabilities_make_one() {
+        for (of_all, is_whole) in [(lamps(300), true), (mixed(300), false), (mixed(5), false), (lamps(1), true)] {
+            let tree = LightTree::new(&of_all, Vec::new()).unwrap();
+            let lights = Lights::with_tree(&of_all, &tree);
+            let rng = &mut Generator::new(4);
+            for _ in 0..6 {
+                let (points, rays) = questions(rng);
+                check_choices(&lights, &points[0], is_whole);
+                points[1..].iter().for_each(|question| check_choices(&lights, question, false));
+                rays.iter().for_each(|question| check_choices(&lights, question, is_whole));
             }
-            total += f;
+        }
+    }
+
+    /// What an estimate by one choice has as its mean square, over its squared mean: 1 where probabilities follow the lights.
+    fn spread(lights: &Lights<'_>, question: &impl Question) -> f64 {
+        let (mut squares, mut total) = (0.0, 0.0);
+        for (i, light) in lights.iter().enumerate() {
+            let sent = f64::from(question.light(light));
+            total += sent;
+            if sent > 0.0 {
+                squares += sent * sent / f64::from(lights.share(question, i));
+            }
         }
         squares / (total * total)
+    }
+
+    #[test]
+    fn choices_by_the_tree_are_nearly_as_good_as_by_all_lights() {
+        for count in [24, 300, 3000] {
+            let all = lamps(count);
+            let tree = LightTree::new(&all, Vec::new()).unwrap();
+            let lights = Lights::with_tree(&all, &tree);
+            let rng = &mut Generator::new(4);
+            let (mut of_points, mut of_rays, places) = (0.0, 0.0, 16);
+            for _ in 0..places {
+                let (points, rays) = questions(rng);
+                of_points += spread(&lights, &points[0]) / f64::from(places);
+                of_rays += spread(&lights, &rays[0]) / f64::from(places);
+            }
+            assert!(of_points < 1.3 && of_rays < 1.7, "{count}: {of_points}, {of_rays}");
+        }
+    }
+
+    /// Counts the nodes and lights that are looked at.
+    struct Counting<'a, Q>(&'a Q, &'a Cell<u32>);
+
+    impl<Q: Question> Question for Counting<'_, Q> {
+        fn asks(&self, kind: Kind) -> bool {
+            self.0.asks(kind)
+        }
+        fn light(&self, light: &Light<'_>) -> f32 {
+            self.1.set(self.1.get() + 1);
+            self.0.light(light)
+        }
+        fn node(&self, node: &LightNode) -> Guess {
+            self.1.set(self.1.get() + 1);
+            self.0.node(node)
+        }
+        fn limit(&self) -> usize {
+            self.0.limit()
+        }
+    }
+
+    #[test]
+    fn a_choice_and_its_probability_look_at_few_nodes() {
+        let mut most = Vec::new();
+        for count in [100, 1000, 10_000] {
+            let all = lamps(count);
+            let tree = LightTree::new(&all, Vec::new()).unwrap();
+            let lights = Lights::with_tree(&all, &tree);
+            let rng = &mut Generator::new(7);
+            let mut looked = 0;
+            for _ in 0..50 {
+                let (points, rays) = questions(rng);
+                for index in [0, count / 2] {
+                    let seen = Cell::new(0);
+                    let _ = lights.pick(&Counting(&points[0], &seen), uniform(rng));
+                    looked = looked.max(seen.replace(0));
+                    let _ = lights.pick(&Counting(&rays[0], &seen), uniform(rng));
+                    looked = looked.max(seen.replace(0));
+                    let _ = lights.share(&Counting(&points[0], &seen), index);
+                    looked = looked.max(seen.replace(0));
+                }
+            }
+            most.push(looked);
+        }
+        // A cut, and two nodes of every level: of ten times as many lights there are four levels more.
+        assert!(most[0] > 0 && most[2] <= most[1] + 10 && most[1] <= most[0] + 10 && most[2] < 80, "{most:?}");
+    }
+
+    #[test]
+    fn sums_over_representatives_agree_with_sums_over_all_lights() {
+        let all = mixed(600);
+        let tree = LightTree::new(&all, Vec::new()).unwrap();
+        let (lights, rng) = (Lights::with_tree(&all, &tree), &mut Generator::new(9));
+        for _ in 0..4 {
+            let question = FromPoint::all(at(rng));
+            let exact: f64 = all.iter().map(|light| f64::from(question.light(light))).sum();
+            let (mut sum, mut squares, runs, mut visits) = (0.0, 0.0, 2000, 0);
+            for _ in 0..runs {
+                let mut one = 0.0;
+                lights.representatives(&question, rng, |light, share, _| {
+                    one += f64::from(question.light(light) / share);
+                    visits += 1;
+                });
+                sum += one;
+                squares += one * one;
+            }
+            let n = f64::from(runs);
+            let (mean, error) = (sum / n, libm::sqrt((squares / n - (sum / n) * (sum / n)).max(0.0) / n));
+            assert!((mean - exact).abs() < 4.0 * error + 1e-4 * exact, "{mean} {exact} {error}");
+            assert!(visits <= 64 * runs);
+        }
+    }
+
+    #[test]
+    fn the_tree_finds_what_a_look_at_all_lights_finds() {
+        let all = mixed(200);
+        let tree = LightTree::new(&all, Vec::new()).unwrap();
+        let (few, many, rng) = (Lights::from(&all), Lights::with_tree(&all, &tree), &mut Generator::new(2));
+        assert!(many.has_tree() && !few.has_tree());
+        for _ in 0..100 {
+            let point = at(rng);
+            assert_eq!(many.nearest2(point), few.nearest2(point));
+            assert_eq!(many.sky(Vec3::Z), few.sky(Vec3::Z));
+        }
+        let sorted = |lights: &Lights<'_>| {
+            let mut found: Vec<usize> = lights.distant().map(|(i, _)| i).collect();
+            found.sort_unstable();
+            found
+        };
+        assert_eq!(sorted(&many), sorted(&few));
+        assert!(many.but_sky().all(|lights| lights.sky(Vec3::Z) == Spectrum::ZERO));
+        // By power, whatever is chosen has the probability it has among all.
+        let bounds = Bounds { min: Vec3::ZERO, max: Vec3::splat(2.0) };
+        let total: f32 = all.iter().map(|light| light.power(&bounds).mean()).sum();
+        for i in 0..100 {
+            let choice = many.emitting(&bounds, (i as f32 + 0.5) / 100.0).unwrap();
+            let expected = all[choice.index].power(&bounds).mean() / total;
+            assert!((choice.probability / expected - 1.0).abs() < 1e-4, "{choice:?} {expected}");
+        }
+    }
+
+    #[test]
+    fn memory_that_is_too_small_is_told() {
+        let all = lamps(4);
+        let mut memory = [LightNode::EMPTY; 11];
+        assert!(LightTree::new(&all, &mut memory[..]).is_err());
+        assert!(!LightTree::new(&[], Vec::new()).is_ok_and(|tree| Lights::with_tree(&[], &tree).has_tree()));
     }
 }

@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use super::cut::CHOICE;
+use super::cut::{CHOICE, WALKS};
 use super::tree::{Kind, LightNode};
 use super::{Light, NearField};
 use crate::math::{Ray, float};
@@ -18,10 +18,11 @@ pub(crate) struct Guess {
 
 impl Guess {
     /// `ratio2` is the squared radius of the node over its squared distance.
+    #[inline]
     fn new(weight: f32, ratio2: f32) -> Self {
-        // 1/(1 − ρ)² − 1/(1 + ρ)², of the nearest and the farthest light there may be.
+        // Of 1/(1 − ρ)² − 1/(1 + ρ)², for the nearest and the farthest light there may be, as much as does not cancel.
         let clear = (1.0 - ratio2).max(0.1);
-        Self { weight, doubt: weight * 4.0 * float::sqrt(ratio2.min(100.0)) / (clear * clear) }
+        Self { weight, doubt: weight * ratio2 * (4.0 / (clear * clear)) }
     }
 }
 
@@ -40,6 +41,10 @@ pub(crate) trait Question {
     fn light(&self, light: &Light<'_>) -> f32;
     /// The same for a node of the tree, about.
     fn node(&self, node: &LightNode) -> Guess;
+    /// The same for a leaf: what is told by it alone, where that is all there is to know.
+    fn leaf(&self, _: &LightNode, light: &Light<'_>) -> f32 {
+        self.light(light)
+    }
     /// Nodes of a cut at most.
     fn limit(&self) -> usize {
         CHOICE
@@ -99,19 +104,29 @@ impl Question for FromPoint {
     }
 
     #[inline]
+    fn leaf(&self, node: &LightNode, light: &Light<'_>) -> f32 {
+        if !node.is_even() || node.reach == 0.0 {
+            return self.light(light);
+        }
+        let distance2 = self.point.distance_squared(node.centre);
+        let left_out = self.except != Except::Nothing && !(distance2 >= node.reach * node.reach);
+        if left_out { 0.0 } else { (node.strength / distance2.max(1e-12)).min(1e30) }
+    }
+
+    #[inline]
     fn node(&self, node: &LightNode) -> Guess {
         // At infinity all are the same from everywhere.
         if node.reach == 0.0 {
             return Guess { weight: node.strength, doubt: 0.0 };
         }
-        let offset = self.point - node.centre();
-        let (distance2, radius2) = (offset.length_squared(), node.radius2());
-        if !node.shines_to(offset, distance2, radius2) {
+        let offset = self.point - node.centre;
+        let (distance2, radius2) = (offset.length_squared(), node.radius2);
+        if !node.shines_to(offset, distance2) {
             return Guess::default();
         }
         // Lamps on one another have no radius.
-        let weight = (node.strength / distance2.max(INSIDE * radius2).max(1e-12)).min(1e30);
-        Guess::new(weight, radius2 / distance2)
+        let inverse2 = 1.0 / distance2.max(INSIDE * radius2).max(1e-12);
+        Guess::new((node.strength * inverse2).min(1e30), radius2 * inverse2)
     }
 }
 
@@ -157,14 +172,31 @@ impl Question for FromRay {
         self.part(light).map_or(0.0, |part| light.sent_along(&self.ray, part))
     }
 
+    fn limit(&self) -> usize {
+        if self.until.is_some() { WALKS } else { CHOICE }
+    }
+
+    #[inline]
+    fn leaf(&self, node: &LightNode, light: &Light<'_>) -> f32 {
+        if !node.is_even() || self.far.is_infinite() {
+            return self.light(light);
+        }
+        let closest = self.ray.direction.dot(node.centre - self.ray.origin);
+        let height2 = self.ray.at(closest).distance_squared(node.centre);
+        let half2 = node.reach * node.reach - height2;
+        if !(half2 > 0.0) {
+            return 0.0;
+        }
+        let half = float::sqrt(half2);
+        let (near, far) = (self.near.max(closest - half), self.far.min(closest + half));
+        if far > near { self.sent(node.strength, height2.max(1e-12), closest, (near, far)) } else { 0.0 }
+    }
+
     #[inline]
     fn node(&self, node: &LightNode) -> Guess {
-        let centre = node.centre();
-        let radius2 = node.radius2();
+        let (centre, radius2) = (node.centre, node.radius2);
         let closest = self.ray.direction.dot(centre - self.ray.origin);
-        let nearest = self.ray.at(closest.max(self.near).min(self.far));
-        let offset = nearest - centre;
-        let distance2 = offset.length_squared();
+        let distance2 = self.ray.at(closest.max(self.near).min(self.far)).distance_squared(centre);
         let mut strength = node.strength;
         if node.reach.is_finite() {
             if float::sqrt(distance2) > float::sqrt(radius2) + node.reach {
@@ -177,20 +209,28 @@ impl Question for FromRay {
             return Guess::default();
         }
         let height2 = self.ray.at(closest).distance_squared(centre).max(INSIDE * radius2).max(1e-12);
+        Guess::new(
+            self.sent(strength, height2, closest, (self.near, self.far)),
+            radius2 / distance2.max(INSIDE * radius2).max(1e-12),
+        )
+    }
+}
+
+impl FromRay {
+    /// `∫ I/r² dt` over a part, from a height (m, squared) above the ray's point at `closest` (m): about, and never 0.
+    #[inline]
+    fn sent(&self, strength: f32, height2: f32, closest: f32, (near, far): (f32, f32)) -> f32 {
         let height = float::sqrt(height2);
-        let (before, after) = (self.near - closest, self.far - closest);
+        let (before, after) = (near - closest, far - closest);
         let angle = if after.is_finite() {
             quick_angle(height * (after - before), height2 + before * after)
         } else {
             quick_angle(height, before)
         };
-        // Written so that NaN counts as little, and nothing as 0.
-        let weight = (strength * (angle / height).max(1e-30)).clamp(f32::MIN_POSITIVE, 1e30);
-        Guess::new(weight, radius2 / distance2)
+        // Written so that NaN counts as little.
+        (strength * (angle / height).max(1e-30)).max(f32::MIN_POSITIVE).min(1e30)
     }
-}
 
-impl FromRay {
     /// Whether light of a node may come to any point of the part. Where it is dark behind lights is convex, so both ends tell.
     fn may_be_lit(&self, node: &LightNode, centre: Vec3, radius2: f32) -> bool {
         if node.spread > 0.5 * float::PI + 0.1 || !self.far.is_finite() {

@@ -55,17 +55,17 @@ impl Kind {
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct LightNode {
-    /// Smallest corner (m).
-    pub(super) min: Vec3,
+    /// Middle of the box (m).
+    pub(super) centre: Vec3,
+    /// Squared radius (m²) of the ball around it.
+    pub(super) radius2: f32,
     /// Sum of the greatest radiant intensities (W/sr), or at infinity of irradiances (W·m⁻²), mean of the channels.
     pub(super) strength: f32,
-    /// Largest corner (m).
-    pub(super) max: Vec3,
     /// Radiant power (W, mean of the channels); at infinity over the cross section of the world (W·m⁻²).
     pub(super) power: f32,
     /// Around it (unit) light leaves, …
     pub(super) axis: Vec3,
-    /// … within this angle (rad).
+    /// … within this angle (rad); [`UNEVEN`] where all but the leaf itself has to be asked.
     pub(super) spread: f32,
     /// Greatest radius (m) of a near field; infinite for lamps.
     pub(super) reach: f32,
@@ -76,6 +76,9 @@ pub struct LightNode {
     /// The leaf of the light whose index is that of this node; of no meaning beyond the number of lights.
     pub(super) leaf: u32,
 }
+
+/// Of a leaf: the middle and strength do not tell all that a choice needs to know.
+const UNEVEN: f32 = 4.0;
 
 /// Marks leaves.
 const LEAF: u32 = 1 << 31;
@@ -90,32 +93,29 @@ impl LightNode {
         [self.below, self.below + 1]
     }
 
-    pub(super) fn centre(&self) -> Vec3 {
-        (self.min + self.max) * 0.5
-    }
-
     /// Distance (m) of its middle.
     pub(crate) fn away(&self, point: Vec3) -> f32 {
-        self.centre().distance(point)
+        self.centre.distance(point)
     }
 
-    /// Squared radius (m²) of the ball around the box.
-    pub(super) fn radius2(&self) -> f32 {
-        0.25 * self.min.distance_squared(self.max)
+    /// Whether a leaf shines evenly in all directions from its middle.
+    pub(super) fn is_even(&self) -> bool {
+        self.spread == PI
     }
 
-    /// Squared distance (m²) from `point` to the box.
+    /// Squared distance (m²) from `point` to the ball around the box.
     pub(super) fn distance2(&self, point: Vec3) -> f32 {
-        (self.min - point).max(point - self.max).max(Vec3::ZERO).length_squared()
+        let gap = (self.away(point) - float::sqrt(self.radius2)).max(0.0);
+        gap * gap
     }
 
     /// Whether light may leave towards a point at `offset` (m) from the centre.
-    pub(super) fn shines_to(&self, offset: Vec3, distance2: f32, radius2: f32) -> bool {
-        if self.spread >= PI || distance2 <= radius2 {
+    pub(super) fn shines_to(&self, offset: Vec3, distance2: f32) -> bool {
+        if self.spread >= PI || distance2 <= self.radius2 {
             return true;
         }
         let inverse = 1.0 / float::sqrt(distance2);
-        let seen = float::asin(float::sqrt(radius2) * inverse);
+        let seen = float::asin(float::sqrt(self.radius2) * inverse);
         float::acos(self.axis.dot(offset) * inverse) <= self.spread + seen
     }
 
@@ -129,17 +129,18 @@ impl LightNode {
             Light::Phong(light) => (light.axis, 0.5 * PI + SLACK),
             Light::Spot(light) => (light.axis, light.cutoff + SLACK),
             Light::Quad(light) => (light.normal(), 0.5 * PI + SLACK),
+            Light::Mesh(_) => (Vec3::Z, UNEVEN),
             _ => (Vec3::Z, PI),
         };
         let field = light.near_field();
         let strength = if field.is_some() { light.intensity() } else { light.importance(Vec3::ZERO) };
         Self {
-            min: bounds.min,
+            centre: bounds.centre(),
+            radius2: 0.25 * bounds.size().length_squared(),
             strength: strength.min(1e30),
-            max: bounds.max,
             power: light.power(&unit).mean().min(1e30),
             axis,
-            spread: spread.min(PI),
+            spread: if spread == UNEVEN { spread } else { spread.min(PI) },
             reach: field.map_or(0.0, |field| field.radius().unwrap_or(f32::INFINITY)),
             parent: NONE,
             below: LEAF | index as u32,
@@ -147,13 +148,13 @@ impl LightNode {
         }
     }
 
-    /// The node above two.
-    fn above(a: &Self, b: &Self) -> Self {
+    /// The node above two, whose lights lie within `bounds`.
+    fn above(a: &Self, b: &Self, bounds: &Bounds) -> Self {
         let (axis, spread) = cone([(a.axis, a.spread), (b.axis, b.spread)]);
         Self {
-            min: a.min.min(b.min),
+            centre: bounds.centre(),
+            radius2: 0.25 * bounds.size().length_squared(),
             strength: (a.strength + b.strength).min(f32::MAX),
-            max: a.max.max(b.max),
             power: (a.power + b.power).min(f32::MAX),
             axis,
             spread,
@@ -211,9 +212,9 @@ pub struct LightTree<'s> {
 impl LightNode {
     /// A node of no light, to fill lent memory with.
     pub const EMPTY: Self = Self {
-        min: Vec3::ZERO,
+        centre: Vec3::ZERO,
+        radius2: 0.0,
         strength: 0.0,
-        max: Vec3::ZERO,
         power: 0.0,
         axis: Vec3::Z,
         spread: PI,
@@ -245,7 +246,7 @@ impl<'s> LightTree<'s> {
         let (nodes_of_tree, items) = nodes.as_mut_slice().split_at_mut(2 * count);
         let kind = |node: &LightNode| node.leaf().map(|i| Kind::of(&lights[i]));
         items.sort_unstable_by_key(|node| (kind(node), node.below));
-        let mut builder = Builder { nodes: nodes_of_tree, used: 0 };
+        let mut builder = Builder { lights, nodes: nodes_of_tree, used: 0 };
         let (mut roots, mut rest) = ([NONE; KINDS], items);
         for (root, wanted) in roots.iter_mut().zip(Kind::ALL) {
             let (own, others) = rest.split_at_mut(rest.iter().take_while(|node| kind(node) == Some(wanted)).count());
@@ -266,22 +267,23 @@ impl<'s> LightTree<'s> {
 }
 
 /// Writes nodes, children side by side and soon after what is above them.
-struct Builder<'n> {
+struct Builder<'n, 'l> {
+    lights: &'n [Light<'l>],
     nodes: &'n mut [LightNode],
     used: usize,
 }
 
-impl Builder<'_> {
-    /// The node `at` over leaves.
-    fn divide(&mut self, items: &mut [LightNode], at: u32, parent: u32) {
+impl Builder<'_, '_> {
+    /// The node `at` over leaves; returns a box around their lights.
+    fn divide(&mut self, items: &mut [LightNode], at: u32, parent: u32) -> Bounds {
         if let [leaf] = items {
             let light = leaf.leaf().unwrap_or_default();
             // What another node says of leaves stays.
             self.nodes[at as usize] = LightNode { parent, leaf: self.nodes[at as usize].leaf, ..*leaf };
             self.nodes[light].leaf = at;
-            return;
+            return self.lights[light].bounds();
         }
-        let size = Bounds::of(items.iter().map(LightNode::centre)).size();
+        let size = Bounds::of(items.iter().map(|node| node.centre)).size();
         let axis = if size.x >= size.max_element() {
             0
         } else if size.y >= size.z {
@@ -291,15 +293,16 @@ impl Builder<'_> {
         };
         let half = items.len() / 2;
         // Of equals the order is that of lights: the same tree on every machine.
-        let key = |node: &LightNode| (node.centre()[axis], node.below);
+        let key = |node: &LightNode| (node.centre[axis], node.below);
         items.select_nth_unstable_by(half, |a, b| key(a).0.total_cmp(&key(b).0).then(key(a).1.cmp(&key(b).1)));
         let (left, right) = items.split_at_mut(half);
         let below = self.used;
         self.used += 2;
-        self.divide(left, below as u32, at);
-        self.divide(right, below as u32 + 1, at);
-        let above = LightNode::above(&self.nodes[below], &self.nodes[below + 1]);
+        let bounds = self.divide(left, below as u32, at);
+        let bounds = bounds.union(self.divide(right, below as u32 + 1, at));
+        let above = LightNode::above(&self.nodes[below], &self.nodes[below + 1], &bounds);
         let leaf = self.nodes[at as usize].leaf;
         self.nodes[at as usize] = LightNode { parent, below: below as u32, leaf, ..above };
+        bounds
     }
 }

@@ -22,7 +22,7 @@ const WIDEST: f32 = 0.5;
 
 /// Nodes of the cut through many lights, of which single lamps are aimed at. More: weaker lamps are, too, and what passes them has a bound;
 /// fewer: a vertex takes less time.
-const CUT: usize = 16;
+const CUT: usize = 8;
 
 /// `I/r`, what rays about a lamp collect together.
 struct Glare {
