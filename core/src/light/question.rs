@@ -228,7 +228,7 @@ impl FromRay {
             quick_angle(height, before)
         };
         // Written so that NaN counts as little.
-        (strength * (angle / height).max(1e-30)).max(f32::MIN_POSITIVE).min(1e30)
+        (strength * (angle / height).max(1e-30)).clamp(f32::MIN_POSITIVE, 1e30)
     }
 
     /// Whether light of a node may come to any point of the part. Where it is dark behind lights is convex, so both ends tell.
