@@ -15,7 +15,7 @@
 //! let fog = Homogeneous::new(Spectrum::splat(0.1), Spectrum::splat(0.9), Lobe::HenyeyGreenstein { g: 0.7 })?;
 //! let ball = Placed::new(fog, Region::sphere(Vec3::ZERO, 1.0)?);
 //! let lamps = [Light::Point(PointLight::from_flux(Vec3::ZERO, Spectrum::splat(60.0))?)];
-//! let world = World { medium: &ball, scene: &Empty, lights: &lamps };
+//! let world = World { medium: &ball, scene: &Empty, lights: (&lamps).into() };
 //! let ray = |at: [f32; 2]| Ray::new(Vec3::Z * 3.0, Vec3::new(0.8 * at[0] - 0.4, 0.8 * at[1] - 0.4, -1.0).normalize());
 //!
 //! let outline = Outline::of(&world, Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE });

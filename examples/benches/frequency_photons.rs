@@ -25,7 +25,7 @@ impl WithMedium for Job<'_> {
 
     fn with<M: Medium + Sync>(self, medium: &M) {
         let lights = self.0.lights();
-        let world = fogbow::world::World { medium, scene: self.0, lights: &lights };
+        let world = fogbow::world::World { medium, scene: self.0, lights: (&lights).into() };
         let (bounds, settings) = (self.0.bounds(), path::Settings::default());
         let walks = |visit: &mut dyn FnMut(&Event<'_>)| {
             let clock = Stopwatch::start();

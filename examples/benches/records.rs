@@ -37,10 +37,10 @@ impl WithMedium for Job<'_> {
         let lights = self.0.lights();
         let steps = Steps::Length(3.0 * medium.resolution());
         let walk = multiple_scatter::Settings { one_light: lights.len() > 1, ..multiple_scatter::Settings::new(steps) };
-        let world = fogbow::world::World { medium, scene: self.0, lights: &lights };
+        let world = fogbow::world::World { medium, scene: self.0, lights: (&lights).into() };
         let paths = path::Settings::default();
         let estimator =
-            Estimator { world, surfaces: None, scattered: None, walk, paths, light_samples: 16, finest: 0.02 };
+            Estimator { world, surfaces: None, photons: None, walk, paths, light_samples: 16, finest: 0.02 };
         let eye = RaySettings { density: 1.0, connections: 4, lights_visible: true, indirect: true };
         let camera = self.0.camera();
         let mut found: Vec<Place> = Vec::new();
@@ -55,13 +55,10 @@ impl WithMedium for Job<'_> {
         }
         let caches = filled(&estimator, &camera, REACH * self.0.bounds().size().max_element());
         let read = caches.reader();
-        let known = read.surface.zip(read.multiple).map(|(s, m)| [(s.cache, s.reading), (m.cache, m.reading)]);
         let surfaces = read.irradiance.map(|r| (r.cache, r.reading));
-        for (name, estimator) in [
-            ("nothing cached", estimator),
-            ("surfaces cached", Estimator { surfaces, ..estimator }),
-            ("everything cached", Estimator { surfaces, scattered: known, ..estimator }),
-        ] {
+        for (name, estimator) in
+            [("nothing cached", estimator), ("surfaces cached", Estimator { surfaces, ..estimator })]
+        {
             println!("{name}");
             println!("  {:10} {:>7} {:>12} {:>10} {:>14}", "kind", "places", "us/sample", "noise", "noise^2 * us");
             measure(&estimator, &found);

@@ -4,7 +4,7 @@ use fogbow::{host::Empty, host::Medium, math::Vec3, medium::Homogeneous, phase::
 use fogbow::{sampling::Generator, spectrum::Spectrum, world::World};
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let fog = Homogeneous::new(Spectrum::splat(0.2), Spectrum::splat(0.8), Phase::ISOTROPIC)?;
-    let world = World { medium: &fog, scene: &Empty, lights: &[] };
+    let world = World { medium: &fog, scene: &Empty, lights: (&[]).into() };
     let receiver = Receiver::in_medium(Vec3::ZERO, Vec3::Z, &fog.properties(Vec3::ZERO)).ok_or("black fog")?;
     let (bound, mut rng, count) = (Bound::within(1.2)?, Generator::new(1), 100_000);
     let mut next = || next_vertex(&world, &receiver, bound, &Compensation::FULL, &mut rng);

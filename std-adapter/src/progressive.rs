@@ -76,7 +76,7 @@ impl Runner<'_> {
 /// use fogbow_std::{film::Film, progress::Control, progressive, tiles};
 /// let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::ONE, Phase::ISOTROPIC)?;
 /// let lamps = [Light::Point(PointLight::from_flux(Vec3::ZERO, Spectrum::ONE)?)];
-/// let world = World { medium: &fog, scene: &Empty, lights: &lamps };
+/// let world = World { medium: &fog, scene: &Empty, lights: (&lamps).into() };
 /// let bounds = Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE };
 /// let settings = beams::Settings { samples: 2, paths: 256, ..beams::Settings::for_outline(&Outline::of(&world, bounds)) };
 /// let mut film = Film::new(4, 1, &["total"])?;

@@ -309,7 +309,7 @@ fn caches() -> RadianceCaches<'static> {
     let surface = Surface::Lambert { reflectance: Spectrum::splat(0.6) };
     let room = Ball { centre: Vec3::ZERO, radius: 2.0, surface };
     let lamps = [Light::Point(PointLight::new(Vec3::Y, Spectrum::ONE).unwrap())];
-    let world = World { medium: &fog, scene: &room, lights: &lamps };
+    let world = World { medium: &fog, scene: &room, lights: (&lamps).into() };
     let ray = |at: [f32; 2]| Ray::new(Vec3::ZERO, Vec3::new(at[0], at[1], 1.0).normalize());
     let mut filling = RadianceCaches::new(settings()).fill(Asked::View { ray, pixel: 0.06 });
     finish(&mut filling, &world, &mut FilledRecords::default());

@@ -1,11 +1,12 @@
 //! What the radiance cache is filled with, where the light is known.
 
 use fogbow::cache::{
-    Cache, Caches, Estimator, Extrapolation, RaySettings, Reader, Reading, Record, VolumeCache, clearance, radiance,
+    Cache, Caches, Estimator, Extrapolation, PhotonEffort, PhotonGrid, RaySettings, Reader, Reading, Record,
+    VolumeCache, clearance, radiance,
 };
 use fogbow::host::{Empty, Medium, Scene};
 use fogbow::light::{EnvironmentMap, Light, PointLight, Sun};
-use fogbow::math::{Mat3, Ray, Vec2, Vec3, float::PI};
+use fogbow::math::{Bounds, Mat3, Ray, Vec2, Vec3, float::PI};
 use fogbow::medium::Homogeneous;
 use fogbow::multiple_scatter;
 use fogbow::path;
@@ -23,9 +24,9 @@ use fogbow_tests::hosts::{Ball, Complaining};
 
 fn estimator<'a, M: Medium, S: Scene>(medium: &'a M, scene: &'a S, lights: &'a [Light<'a>]) -> Estimator<'a, M, S> {
     Estimator {
-        world: World { medium, scene, lights },
+        world: World { medium, scene, lights: lights.into() },
         surfaces: None,
-        scattered: None,
+        photons: None,
         walk: multiple_scatter::Settings::new(Steps::Gauss(8)),
         paths: path::Settings::default(),
         light_samples: 4,
@@ -278,42 +279,16 @@ fn multiple_scattering_in_an_endless_medium_is_that_of_the_transport_equation() 
     let point = Vec3::new(1.5, 0.0, 0.0);
     estimate(3000, |rng| make.multiple(point, &Phase::ISOTROPIC, 16, &mut [], rng).value)
         .assert_is(truth, 2e-3, "by walks");
-    // Walks that end at records that tell the truth tell it, too.
-    let known = radial_cache(&make);
-    let surface: VolumeCache<'_> = uniform_cache(Spectrum::ZERO);
-    let scattered = Some([(&surface, Reading::new(0.5)), (&known, Reading::new(0.5))]);
-    let make = Estimator { scattered, ..make };
+    // Walks that end in cells lit by photons tell it, too; a cell's light is a mean over its volume.
+    let bounds = Bounds { min: Vec3::splat(-7.0), max: Vec3::splat(7.0) };
+    let effort = PhotonEffort { bounds, cells: 48, paths: 1 << 16, flights: u64::MAX, enough: u32::MAX };
+    let photons = PhotonGrid::lit(&make.world, &effort, &make.paths, 3);
+    let make = Estimator { photons: Some(&photons), ..make };
     estimate(1000, |rng| make.multiple(point, &Phase::ISOTROPIC, 16, &mut [], rng).value).assert_is(
         truth,
-        0.03,
-        "by walks that end at records",
+        0.02,
+        "by walks that end in cells",
     );
-}
-
-/// Records of multiple scattering on shells around the lamp.
-fn radial_cache<M: Medium, S: Scene>(make: &Estimator<'_, M, S>) -> VolumeCache<'static> {
-    let mut cache: VolumeCache<'static> = Cache::growing(0);
-    for shell in 0..26_u64 {
-        let r = 0.3 * 1.12_f32.powi(shell as i32);
-        let mut all = Sums::default();
-        for k in 0..8 {
-            all.merge(&make.multiple(
-                Vec3::X * r,
-                &Phase::ISOTROPIC,
-                2048,
-                &mut [],
-                &mut Generator::new(8 * shell + k),
-            ));
-        }
-        let (value, slope) = (all.value / 8.0, Spectrum::splat(all.gradient.x[0] / 8.0));
-        for k in 0..320 {
-            let outward = warp::uniform_sphere(Vec2::new((k as f32 + 0.5) / 320.0, (k as f32 * 0.618_034).fract()));
-            let gradient = Gradient::outer(slope, outward);
-            cache.insert(Record { position: outward * r, radius: 0.2 * r, value, gradient }, &[]).unwrap();
-        }
-    }
-    cache.finish().unwrap();
-    cache
 }
 
 fn uniform_cache(value: Spectrum) -> VolumeCache<'static> {

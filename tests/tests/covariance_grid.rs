@@ -79,7 +79,7 @@ fn filled(threads: usize, seed: u64) -> CovarianceGrid<'static> {
         lamp(Vec3::new(-0.7, 0.1, 0.2)),
         Light::Phong(PhongLight::new(Vec3::NEG_ONE, Vec3::ONE, 30.0, Spectrum::new(1.0, 0.5, 0.2)).unwrap()),
     ];
-    let world = World { medium: &fog, scene: &Slit { x: 0.0, half: 0.3 }, lights: &lights };
+    let world = World { medium: &fog, scene: &Slit { x: 0.0, half: 0.3 }, lights: (&lights).into() };
     fill(&world, Settings { photons: 3001, edge: 13, seed, ..Settings::new(cube(1.0)) }, threads)
 }
 
@@ -481,7 +481,7 @@ fn steps_of_an_empty_grid_are_the_longest() {
 fn shaft(edge: u32, half: f32) -> Vec<(f32, f32)> {
     let (scene, fog) = (Slit { x: 0.0, half }, fog(0.01, 0.0));
     let lights = [Light::Sun(Sun::new(Vec3::NEG_X, Spectrum::ONE).unwrap())];
-    let world = World { medium: &fog, scene: &scene, lights: &lights };
+    let world = World { medium: &fog, scene: &scene, lights: (&lights).into() };
     let grid = fill(&world, Settings { photons: 60_000, edge, ..Settings::new(cube(1.0)) }, 0);
     let grid = grid.view();
     let cell = grid.lattice().cell().y;
@@ -579,7 +579,7 @@ fn assert_near((mean, error): (f64, f64), due: f64, what: &str) {
 fn the_fluence_of_a_lamp_in_absorbing_fog_is_the_closed_form() {
     let (absorption, fog) = (0.7, fog(0.7, 0.0));
     let lights = [lamp(Vec3::ZERO)];
-    let world = World { medium: &fog, scene: &Empty, lights: &lights };
+    let world = World { medium: &fog, scene: &Empty, lights: (&lights).into() };
     let lattice = Lattice::cubic(cube(2.0), 15).unwrap();
     for at in [Vec3::new(0.5, 0.0, 0.0), Vec3::new(-0.6, 0.9, 0.3), Vec3::new(0.0, 0.0, -1.6)] {
         let index = lattice.index(at).unwrap();
@@ -601,7 +601,7 @@ fn the_fluence_of_a_lamp_in_absorbing_fog_is_the_closed_form() {
 fn walks_end_where_max_scatterings_says() {
     let (scattering, fog) = (2.0, fog(0.0, 2.0));
     let lights = [lamp(Vec3::ZERO)];
-    let world = World { medium: &fog, scene: &Empty, lights: &lights };
+    let world = World { medium: &fog, scene: &Empty, lights: (&lights).into() };
     // Ten mean free paths each way: nearly nothing leaves.
     let lattice = Lattice::cubic(cube(5.0), 6).unwrap();
     let cell = lattice.cell();

@@ -26,7 +26,7 @@ fn source(name: &str) -> String {
 #[test]
 fn an_engine_with_a_queue_of_its_own_has_the_bits_of_the_adapter() {
     let level = world::level().unwrap();
-    let world = World { medium: &level.fog, scene: &level.room, lights: &level.lamps };
+    let world = World { medium: &level.fog, scene: &level.room, lights: (&level.lamps).into() };
     let pixels = world::SIZE[0] * world::SIZE[1];
     let settings = Settings::for_outline(&Outline::of(&world, world::BOUNDS), 0.02).for_pixels(pixels);
     let settings = host::quick(settings);

@@ -49,7 +49,7 @@ fn single_and_multiple_scattering_add_up_to_one_in_a_white_furnace() {
         let medium = Complaining::new(ball_of(field, 1.0, g, 1.0));
         for lengths in [Lengths::Tracking, Lengths::Marched] {
             let settings = Settings { lengths, max_vertices: 1000, ..Settings::new(STEPS) };
-            let walk = Walk { world: World { medium: &medium, scene: &Empty, lights: &lights }, settings };
+            let walk = Walk { world: World { medium: &medium, scene: &Empty, lights: (&lights).into() }, settings };
             let towards = Towards { to_eye: Vec3::Z, phase: &medium.inner.medium.phase };
             assert_mean(&format!("white furnace, {lengths:?}"), 400, 1.0, |rng| {
                 let once = single_scatter::sample(x, &towards, &walk.world, &samples(16), rng);
@@ -68,7 +68,7 @@ fn multiple_scattering_in_an_infinite_medium_agrees_with_the_fourier_solution() 
     let lights = [Light::Point(lamp)];
     for lengths in [Lengths::Tracking, Lengths::Marched, Lengths::Exponential { floor: 0.05 }] {
         let settings = Settings { lengths, max_vertices: 1000, ..Settings::new(STEPS) };
-        let walk = Walk { world: World { medium: &medium, scene: &Empty, lights: &lights }, settings };
+        let walk = Walk { world: World { medium: &medium, scene: &Empty, lights: (&lights).into() }, settings };
         let x = Vec3::new(0.0, 1.5, 0.0);
         let towards = Towards { to_eye: Vec3::X, phase: &Phase::ISOTROPIC };
         assert_mean(&format!("{lengths:?}"), 500, INFINITE_MEDIUM_MULTIPLE, |rng| {
@@ -87,7 +87,7 @@ fn one_light_at_a_time_has_the_same_mean_as_all_of_them() {
     let towards = Towards { to_eye: Vec3::X, phase: &medium.medium.phase };
     let estimate = |one_light: bool| {
         let settings = Settings { one_light, ..Settings::new(STEPS) };
-        let walk = Walk { world: World { medium: &medium, scene: &Empty, lights: &lights }, settings };
+        let walk = Walk { world: World { medium: &medium, scene: &Empty, lights: (&lights).into() }, settings };
         let one = |i| multiple_scatter::sample(x, &towards, &walk, NO_SURFACE, 64, &mut Generator::new(i)).value;
         mean_and_error(&(0..300).map(|i| f64::from(one(i)[0])).collect::<Vec<_>>())
     };
@@ -104,7 +104,7 @@ fn no_sample_of_light_along_a_ray_towards_a_lamp_is_an_outlier() {
     let ray = Ray::new(Vec3::ZERO, Vec3::X);
     let along = |lights: &[Light<'_>], seed: u64| {
         let settings = Settings { one_light: true, max_vertices: 1, ..Settings::new(STEPS) };
-        let walk = Walk { world: World { medium: &medium, scene: &Empty, lights }, settings };
+        let walk = Walk { world: World { medium: &medium, scene: &Empty, lights: lights.into() }, settings };
         let start = Start { ray, end: None, pdf: 1.0, collision: None };
         let incoming = walk.along(&start, NO_SURFACE, |_, _, _| None, &mut Generator::new(seed));
         f64::from(incoming.irradiance[0])
@@ -126,8 +126,10 @@ fn mean_gradient_of_multiple_scattering_agrees_with_differences_of_means() {
     let mut medium = ball_of(field, 0.9, 0.5, 2.5);
     medium.medium.tint = Spectrum::new(1.0, 0.5, 0.25);
     let lights = [Light::Sun(Sun::new(Vec3::Y, Spectrum::ONE).unwrap())];
-    let walk =
-        Walk { world: World { medium: &medium, scene: &Empty, lights: &lights }, settings: Settings::new(STEPS) };
+    let walk = Walk {
+        world: World { medium: &medium, scene: &Empty, lights: (&lights).into() },
+        settings: Settings::new(STEPS),
+    };
     let towards = Towards { to_eye: Vec3::X, phase: &medium.medium.phase };
     let (x, h) = (Vec3::new(0.4, 0.3, 0.0), 0.1);
     let run =
@@ -157,10 +159,13 @@ fn expansions_agree_with_single_directions() {
     let (x, to_eye) = (Vec3::new(0.1, 0.2, 0.3), Vec3::new(0.48, -0.6, 0.64));
     let phase = medium.medium.phase;
     let f = moments(&phase, 16);
-    let walk = Walk { world: World { medium: &medium, scene: &wall, lights: &lights }, settings: Settings::new(STEPS) };
+    let walk = Walk {
+        world: World { medium: &medium, scene: &wall, lights: (&lights).into() },
+        settings: Settings::new(STEPS),
+    };
     let glow = |ray: &Ray, hit: &fogbow::host::Hit| Spectrum::splat(1.0 + ray.at(hit.distance).y.max(0.0));
     let towards = Towards { to_eye, phase: &phase };
-    let open = World { medium: &medium, scene: &Empty, lights: &lights };
+    let open = World { medium: &medium, scene: &Empty, lights: (&lights).into() };
     let rng = || Generator::new(5);
     let plain: [Sums; 3] = [
         single_scatter::sample(x, &towards, &open, &samples(8), &mut rng()),
@@ -192,7 +197,7 @@ fn a_glowing_sphere_seen_from_its_centre_through_soot() {
     let wall = Complaining::new(Ball { centre: Vec3::ZERO, radius: 2.0, surface: Surface::BLACK });
     let mut rng = Generator::new(1);
     let glow = |_: &Ray, _: &fogbow::host::Hit| Spectrum::ONE;
-    let world = World { medium: &soot, scene: &wall, lights: &[] };
+    let world = World { medium: &soot, scene: &wall, lights: (&[]).into() };
     let towards = Towards { to_eye: Vec3::X, phase: &Phase::ISOTROPIC };
     let seen = single_scatter::sample_surfaces(Vec3::ZERO, &towards, &world, glow, &samples(64), &mut rng);
     assert!((seen.value[0] - (-1.0_f32).exp()).abs() < 1e-6, "{:?}", seen.value);
@@ -208,7 +213,7 @@ fn shadowed_lights_count_in_the_unshadowed_sums_only() {
     let lights = [lamp(3.0), lamp(-3.0)];
     let mut rng = Generator::new(1);
     let towards = Towards { to_eye: Vec3::Z, phase: &Phase::ISOTROPIC };
-    let world = World { medium: &Empty, scene: &blocker, lights: &lights };
+    let world = World { medium: &Empty, scene: &blocker, lights: (&lights).into() };
     let sums = single_scatter::sample(Vec3::ZERO, &towards, &world, &samples(1), &mut rng);
     assert!((sums.unshadowed[0] / sums.value[0] - 2.0).abs() < 1e-6);
     assert!((sums.unshadowed_gradient_norms[0] / sums.gradient_norms[0] - 2.0).abs() < 1e-6);

@@ -108,7 +108,7 @@ fn fog_that_only_scatters_vanishes_under_a_uniform_sky() {
             for is_constant in [true, false] {
                 let fog = Ball { radius: 1.0, absorption: Spectrum::ZERO, scattering, phase, is_constant };
                 let sky = [Light::Constant(Spectrum::new(1.0, 2.0, 3.0))];
-                let world = World { medium: &fog, scene: &Empty, lights: &sky };
+                let world = World { medium: &fog, scene: &Empty, lights: (&sky).into() };
                 let seen = estimate(40_000, |rng| {
                     path::radiance(&towards_ball(rng), &world, &Settings::default(), rng).total()
                 });
@@ -138,7 +138,7 @@ fn white_surfaces_vanish_under_a_uniform_sky_with_and_without_fog() {
             };
             let scene = Sphere { radius: 1.0, surface, light: None };
             let sky = [Light::Constant(Spectrum::ONE)];
-            let world = World { medium: &fog, scene: &scene, lights: &sky };
+            let world = World { medium: &fog, scene: &scene, lights: (&sky).into() };
             let seen =
                 estimate(40_000, |rng| path::radiance(&towards_ball(rng), &world, &Settings::default(), rng).total());
             seen.assert_is([1.0; 3], ROUNDING, &format!("{surface:?}, density {density}"));
@@ -152,7 +152,7 @@ fn an_isothermal_medium_looks_like_emission_over_absorption_whatever_it_scatters
         let fog = Homogeneous::new(Spectrum::splat(0.8), scattering, Lobe::HenyeyGreenstein { g: 0.5 })
             .and_then(|fog| fog.with_emission(Spectrum::new(0.8, 1.6, 2.4)))
             .unwrap();
-        let world = World { medium: &fog, scene: &Empty, lights: &[] };
+        let world = World { medium: &fog, scene: &Empty, lights: (&[]).into() };
         let ray = Ray::new(Vec3::ZERO, Vec3::X);
         let seen = estimate(60_000, |rng| path::radiance(&ray, &world, &Settings::default(), rng).total());
         seen.assert_is([1.0, 2.0, 3.0], ROUNDING, &format!("{scattering:?}"));
@@ -165,7 +165,7 @@ fn an_isothermal_medium_looks_like_emission_over_absorption_whatever_it_scatters
 fn fluence_around_a_point_light_in_an_infinite_medium() {
     let fog = Homogeneous::new(Spectrum::splat(0.2), Spectrum::splat(0.8), Lobe::Isotropic).unwrap();
     let lamp = [Light::Point(PointLight::from_flux(Vec3::ZERO, Spectrum::ONE).unwrap())];
-    let world = World { medium: &fog, scene: &Empty, lights: &lamp };
+    let world = World { medium: &fog, scene: &Empty, lights: (&lamp).into() };
     let seen = estimate(5_000_000, |rng| {
         let ray = Ray::new(Vec3::new(0.0, 1.5, 0.0), warp::uniform_sphere(uniform2(rng)));
         path::radiance(&ray, &world, &Settings::default(), rng).total() * 0.8
@@ -256,7 +256,7 @@ fn single_scattering_of_every_kind_of_light_matches_quadrature() {
                 parts
             });
         let lights = [*light];
-        let world = World { medium: &fog, scene: &Empty, lights: &lights };
+        let world = World { medium: &fog, scene: &Empty, lights: (&lights).into() };
         let settings = Settings { max_scatterings: 1, ..Settings::default() };
         let seen = estimate(400_000, |rng| path::radiance(&ray, &world, &settings, rng).total());
         // The quadrature's own error: 24² strata on the light.
@@ -275,7 +275,7 @@ fn a_light_seen_through_absorbing_fog_follows_beer_and_lambert() {
     };
     let lights = [Light::Sphere(SphereLight::new(Vec3::ZERO, 0.5, Spectrum::ONE).unwrap())];
     let scene = Sphere { radius: 0.5, surface: Surface::BLACK, light: Some(0) };
-    let world = World { medium: &fog, scene: &scene, lights: &lights };
+    let world = World { medium: &fog, scene: &scene, lights: (&lights).into() };
     let ray = Ray::new(Vec3::new(0.0, 0.0, 3.0), Vec3::NEG_Z);
     let seen = estimate(200_000, |rng| path::radiance(&ray, &world, &Settings::default(), rng).total());
     seen.assert_is([0.1f64, 0.5, 2.0].map(|s| (-0.5 * s).exp()), ROUNDING, "half a metre of fog");
@@ -299,7 +299,7 @@ fn a_surface_close_to_a_small_lamp_and_far_from_the_eye_gets_all_its_light() {
         }
     }
     let lights = [Light::Sphere(SphereLight::new(Vec3::ZERO, 0.04, Spectrum::splat(400.0)).unwrap())];
-    let world = World { medium: &Empty, scene: &Shell, lights: &lights };
+    let world = World { medium: &Empty, scene: &Shell, lights: (&lights).into() };
     let target = Vec3::new(0.1, 0.05, -0.4);
     let eye = Vec3::new(0.3, 0.2, 4.0);
     let ray = Ray::new(eye, (target - eye).normalize());
@@ -316,7 +316,7 @@ fn the_components_of_radiance_hold_what_their_names_say() {
     let fog = Homogeneous::new(Spectrum::splat(0.1), Spectrum::splat(0.4), Lobe::Isotropic).unwrap();
     let lamp = [Light::Point(PointLight::new(Vec3::new(0.0, 3.0, 0.0), Spectrum::splat(9.0)).unwrap())];
     let scene = Sphere { radius: 1.0, surface: Surface::Lambert { reflectance: Spectrum::splat(0.5) }, light: None };
-    let world = World { medium: &fog, scene: &scene, lights: &lamp };
+    let world = World { medium: &fog, scene: &scene, lights: (&lamp).into() };
     let ray = Ray::new(Vec3::new(0.0, 2.0, 2.0), Vec3::new(0.0, -1.0, -1.0).normalize());
     let once = Settings { max_scatterings: 1, ..Settings::default() };
     let mut sum = Radiance::default();

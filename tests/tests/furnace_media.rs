@@ -50,7 +50,7 @@ fn through_the_middle(rng: &mut Generator) -> Ray {
 #[track_caller]
 fn assert_white_furnace(medium: &dyn Medium, what: &str) {
     let sky = [Light::Constant(Spectrum::new(1.0, 2.0, 3.0))];
-    let world = World { medium, scene: &Empty, lights: &sky };
+    let world = World { medium, scene: &Empty, lights: (&sky).into() };
     let seen =
         estimate(15_000, |rng| path::radiance(&through_the_middle(rng), &world, &Settings::default(), rng).total());
     seen.assert_is([1.0, 2.0, 3.0], 2e-5, what);
@@ -180,7 +180,7 @@ fn glowing_media_look_like_emission_over_absorption() {
         let grid = DensityGrid::new(SIZE, Density::F32(&values), &fire, placement(), &mut blocks).unwrap();
         // Kirchhoff: under a sky of the same radiance a glowing body of any thickness vanishes.
         let sky = [Light::Constant(Spectrum::new(1.0, 2.0, 3.0))];
-        let world = World { medium: &grid, scene: &Empty, lights: &sky };
+        let world = World { medium: &grid, scene: &Empty, lights: (&sky).into() };
         let seen =
             estimate(20_000, |rng| path::radiance(&through_the_middle(rng), &world, &Settings::default(), rng).total());
         seen.assert_is([1.0, 2.0, 3.0], 2e-5, &format!("{scattering:?}"));
@@ -208,7 +208,7 @@ fn what_glows_without_extinction_is_seen() {
     let red_seen = 0.5 * (1.0 - (-2.0f64).exp());
     let media: [(&dyn Medium, f64); 3] = [(&flame, 1.0), (&clear, 1.0), (&red, red_seen)];
     for (i, (medium, first)) in media.into_iter().enumerate() {
-        let world = World { medium, scene: &Empty, lights: &[] };
+        let world = World { medium, scene: &Empty, lights: (&[]).into() };
         let ray = Ray::new(Vec3::new(0.1, 0.2, 3.0), Vec3::NEG_Z);
         let seen = estimate(60_000, |rng| path::radiance(&ray, &world, &Settings::default(), rng).total());
         seen.assert_is([first, 2.0, 3.0], 1e-4, &format!("medium {i}"));
@@ -236,7 +236,7 @@ fn endless_media_end() {
             }
             let mut rng = Generator::new(1);
             assert!(transmittance(&noise, &ray, &mut rng).is_valid());
-            let world = World { medium: &noise, scene: &Empty, lights: &sky };
+            let world = World { medium: &noise, scene: &Empty, lights: (&sky).into() };
             let settings = Settings { max_scatterings: 2, ..Settings::default() };
             assert!(path::radiance(&ray, &world, &settings, &mut rng).total().is_valid());
         }
@@ -384,7 +384,7 @@ fn brute_force<M: Medium + ?Sized>(
                 continue;
             }
         } else {
-            for light in world.lights {
+            for light in world.lights.iter() {
                 sum += throughput * light.background(ray.direction);
             }
             return sum;
@@ -455,7 +455,7 @@ fn connections_and_hits_add_up_to_what_hits_alone_find() {
                 // A second light makes choices count; it has no surface and is black.
                 let dark = Light::Constant(Spectrum::ZERO);
                 let lights = [*light, dark];
-                let world = World { medium: *medium, scene: &scene, lights: &lights[..1 + (i + j) % 2] };
+                let world = World { medium: *medium, scene: &scene, lights: lights[..1 + (i + j) % 2].into() };
                 let eye = |rng: &mut Generator| {
                     let (from, u) = (Vec3::new(0.2, 0.4, 3.0), uniform2(rng));
                     let to = Vec3::new(u.x * 2.0 - 1.2, u.y * 1.2 - 1.0, 0.0);
@@ -482,7 +482,7 @@ fn small_sphere_lights_become_points() {
     let see = |light: Light<'_>, shape: Option<Shape<'_>>| {
         let scene = Room { ball: Surface::Lambert { reflectance: Spectrum::splat(0.5) }, light: shape };
         let lights = [light];
-        let world = World { medium: &fog, scene: &scene, lights: &lights };
+        let world = World { medium: &fog, scene: &scene, lights: (&lights).into() };
         let ray = Ray::between(Vec3::new(0.2, 0.4, 3.0), Vec3::new(0.1, -0.6, 0.3));
         let ray = Ray::new(ray.origin, ray.direction);
         estimate(150_000, |rng| path::radiance(&ray, &world, &settings, rng).total())
@@ -545,7 +545,7 @@ fn rays_through_extremes_stay_numbers() {
         for origin in [0.0, 1e-30, 1.0, 1e7, 1e15] {
             for length in [0.0, 1e-30, 1.0, 1e30, f32::INFINITY] {
                 for lights in [&lights[..0], &lights[..1], &lights[..]] {
-                    let world = World { medium, scene: &scene, lights };
+                    let world = World { medium, scene: &scene, lights: lights.into() };
                     let direction = warp::uniform_sphere(Vec2::new(uniform(&mut rng), uniform(&mut rng)));
                     let ray = Ray::new(Vec3::splat(origin), direction.normalize()).with_length(length);
                     let seen = path::radiance(&ray, &world, &settings, &mut rng).total();

@@ -54,7 +54,7 @@ fn marching_sees_what_the_path_tracer_sees() {
     let cloud = Analytic { phase, ..Analytic::grey(Field::Gaussian { a: 0.1, k: 0.9, c: Vec3::ZERO, s: 0.5 }, 0.8) };
     let bump = Placed::new(cloud, Region::sphere(Vec3::ZERO, 1.5).unwrap());
     let lights = lamps();
-    let world = World { medium: &bump, scene: &Empty, lights: &lights };
+    let world = World { medium: &bump, scene: &Empty, lights: (&lights).into() };
     let ray = Ray::between(Vec3::new(0.3, 0.1, -3.0), Vec3::new(-0.1, 0.2, 3.0));
     for most in [1, 2, u32::MAX] {
         let settings = Settings { max_scatterings: most, ..Settings::default() };

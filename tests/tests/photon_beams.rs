@@ -244,7 +244,7 @@ fn pieces_carry_the_transmittance_on_average() {
 fn endless_beams_end() {
     let thin = fog(0.0, 1e-3, 0.0);
     let lamp = [Light::Point(PointLight::from_flux(Vec3::ZERO, Spectrum::ONE).unwrap())];
-    let world = World { medium: &thin, scene: &Empty, lights: &lamp };
+    let world = World { medium: &thin, scene: &Empty, lights: (&lamp).into() };
     let bounds = Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE };
     let settings = path::Settings { max_scatterings: 1, ..path::Settings::default() };
     let mut count = 0;
@@ -325,7 +325,7 @@ fn blocks(film: &Film) -> Vec<f64> {
 }
 
 fn usual() -> Settings {
-    Settings::for_outline(&Outline::of(&World { medium: &Empty, scene: &Empty, lights: &[] }, BOUNDS))
+    Settings::for_outline(&Outline::of(&World { medium: &Empty, scene: &Empty, lights: (&[]).into() }, BOUNDS))
 }
 
 fn render(
@@ -353,13 +353,13 @@ fn by_beams<M: Medium + Sync>(medium: &M, walk: path::Settings, tiles: tiles::Se
     let lights = lamp();
     let settings = Settings { walk, paths: 512, samples: 4, radius: 0.03, longest: 0.4, ..usual() };
     let mut film = Film::new(SIDE, SIDE, &NAMES).unwrap();
-    render(&mut film, &tiles, &settings, &World { medium, scene: &Room, lights: &lights }).unwrap();
+    render(&mut film, &tiles, &settings, &World { medium, scene: &Room, lights: (&lights).into() }).unwrap();
     film
 }
 
 fn by_paths<M: Medium + Sync>(medium: &M, paths: path::Settings, tiles: tiles::Settings) -> Film {
     let lights = lamp();
-    let world = World { medium, scene: &Room, lights: &lights };
+    let world = World { medium, scene: &Room, lights: (&lights).into() };
     let mut film = Film::new(SIDE, SIDE, &NAMES).unwrap();
     tiles::render(&mut film, &tiles, &Control::default(), |sample, rng, layers| {
         let jitter = uniform2(rng);
@@ -425,7 +425,7 @@ fn pictures_by_beams_are_those_of_the_path_tracer() {
 #[test]
 fn wide_beams_are_fewer_and_keep_their_light() {
     let (room, lights) = (foggy_room(), lamp());
-    let world = World { medium: &room, scene: &Room, lights: &lights };
+    let world = World { medium: &room, scene: &Room, lights: (&lights).into() };
     let (narrow, wide) = (0.05_f32, 0.2_f32);
     let (mut all, mut kept) = (0, 0);
     // Of the same paths, so that only what thinning does is left.
@@ -450,6 +450,41 @@ fn wide_beams_are_fewer_and_keep_their_light() {
 }
 
 #[test]
+fn the_noise_of_a_pass_is_what_its_settings_foretell() {
+    // Parallel beams through a square metre, somewhere, and an eye ray across.
+    const PATHS: u32 = 400;
+    let (power, depth, fog) = (3.0_f32, 1.0_f32, fog(0.0, 1e-4, 0.0));
+    let settings = Settings { paths: PATHS, depth, ..usual() };
+    let ray = Ray::between(Vec3::ZERO, Vec3::X * depth);
+    let mut relative = Vec::new();
+    for radius in [0.02_f32, 0.08] {
+        let mut rng = Generator::new(7);
+        let found: Vec<f64> = (0..4000)
+            .map(|_| {
+                let mut beams = Beams::new(Vec::new(), Vec::new());
+                for _ in 0..PATHS {
+                    let origin = Vec3::new(uniform(&mut rng), uniform(&mut rng) - 0.5, -1.0);
+                    let piece = Piece { radius, power: Spectrum::splat(power), ..beam(origin, Vec3::Z, 2.0, 0.0) };
+                    beams.push(piece).unwrap();
+                }
+                beams.build(PATHS).unwrap();
+                f64::from(beams.gather(&ray, &fog, u32::MAX, &mut rng).light.single[0])
+            })
+            .collect();
+        let n = found.len() as f64;
+        let mean = found.iter().sum::<f64>() / n;
+        let variance = found.iter().map(|light| (light - mean).powi(2)).sum::<f64>() / (n - 1.0) / mean.powi(2);
+        // The fluence of all beams together, over the square.
+        let foretold = f64::from(settings.noise(power) / (power * radius));
+        relative.push(variance / foretold);
+    }
+    // Variances of 4000 samples are known to √(2/4000) and a little more; a square's border takes 2 r of beams' light.
+    for (found, allowed) in relative.iter().zip([0.08, 0.12]) {
+        assert!((found - 1.0).abs() < allowed, "{relative:?} of what was foretold");
+    }
+}
+
+#[test]
 fn beams_give_the_same_bits_for_any_number_of_threads() {
     let settings = tiles::Settings { samples: 12, seed: 3, threads: 1, ..tiles::Settings::default() };
     let room = foggy_room();
@@ -466,7 +501,7 @@ fn beams_give_the_same_bits_for_any_number_of_threads() {
 fn what_beams_cannot_do_is_an_error() {
     let render = |medium: &Homogeneous, settings: Settings| {
         let mut film = Film::new(2, 2, &NAMES).unwrap();
-        let world = World { medium, scene: &Empty, lights: &[] };
+        let world = World { medium, scene: &Empty, lights: (&[]).into() };
         render(&mut film, &tiles::Settings::default(), &settings, &world)
     };
     let good = usual();
@@ -488,7 +523,7 @@ fn what_beams_cannot_do_is_an_error() {
 #[test]
 fn what_lent_memory_cannot_hold_is_an_error_and_no_part_of_the_light() {
     let (room, lights) = (foggy_room(), lamp());
-    let world = World { medium: &room, scene: &Room, lights: &lights };
+    let world = World { medium: &room, scene: &Room, lights: (&lights).into() };
     let settings = Settings { paths: 200, ..usual() };
     let grown = || {
         let mut pass = BeamPass::new(&settings, 3, |_, radius| radius);
@@ -514,7 +549,7 @@ fn what_lent_memory_cannot_hold_is_an_error_and_no_part_of_the_light() {
 #[test]
 fn a_pass_that_is_stopped_keeps_all_light() {
     let (room, lights) = (foggy_room(), lamp());
-    let world = World { medium: &room, scene: &Room, lights: &lights };
+    let world = World { medium: &room, scene: &Room, lights: (&lights).into() };
     // So wide that some beams of a few paths reach any eye ray.
     let settings = Settings { paths: 200, ..usual() };
     let mut pass = BeamPass::new(&settings, 0, |_, _| 0.5);

@@ -142,7 +142,7 @@ fn fluence_around_a_lamp_in_absorbing_fog_follows_the_closed_form() {
     let absorption = Spectrum::new(0.5, 1.0, 2.0);
     let fog = Homogeneous::new(absorption, Spectrum::ZERO, Phase::ISOTROPIC).unwrap();
     let lamp = [Light::Point(PointLight::from_flux(Vec3::ZERO, COLOUR).unwrap())];
-    let world = World { medium: &fog, scene: &Empty, lights: &lamp };
+    let world = World { medium: &fog, scene: &Empty, lights: (&lamp).into() };
     for (near, far) in [(0.0_f32, 0.3_f32), (0.5, 1.0), (2.0, 4.0)] {
         // ∫ Φ dV of a shell = P (e^−σr₀ − e^−σr₁)/σ, all flights being straight.
         let truth = [0, 1, 2].map(|c| {
@@ -172,7 +172,7 @@ fn photons_are_absorbed_where_diffusion_exactly_says() {
         )
         .unwrap();
         let lamp = [Light::Point(PointLight::from_flux(Vec3::ZERO, Spectrum::ONE).unwrap())];
-        let world = World { medium: &fog, scene: &Empty, lights: &lamp };
+        let world = World { medium: &fog, scene: &Empty, lights: (&lamp).into() };
         for roulette_after in [0, 5] {
             let settings = Settings { roulette_after, ..Settings::default() };
             let share = 1.0 - albedo;
@@ -203,7 +203,7 @@ fn fog_that_only_scatters_is_filled_evenly_by_a_uniform_sky() {
     let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::splat(1.5), Lobe::HenyeyGreenstein { g: 0.4 }).unwrap();
     let fog = Placed::new(fog, ball);
     let sky = [Light::Constant(COLOUR)];
-    let world = World { medium: &fog, scene: &Empty, lights: &sky };
+    let world = World { medium: &fog, scene: &Empty, lights: (&sky).into() };
     let found = walks(60_000, &world, &Settings::default(), |event| match *event {
         Event::Collided { power, properties, .. } => power.ratio(properties.extinction()),
         _ => Spectrum::ZERO,
@@ -236,7 +236,7 @@ fn surfaces_pass_on_power_and_not_radiance() {
     let settings = Settings { roulette_after: 100, ..Settings::default() };
     for surface in surfaces {
         let floor = Floor(surface);
-        let world = World { medium: &Empty, scene: &floor, lights: &lamp };
+        let world = World { medium: &Empty, scene: &floor, lights: (&lamp).into() };
         for seed in 0..200 {
             let mut powers = Vec::new();
             photon::trace(&world, &BOUNDS, &settings, &mut Generator::new(seed), &mut |event| match *event {
@@ -255,7 +255,7 @@ fn flights_reach_through_null_interfaces_and_say_where_they_met() {
     let fog = Homogeneous::new(Spectrum::splat(3.0), Spectrum::ZERO, Phase::ISOTROPIC).unwrap();
     for (surface, is_endless) in [(Surface::Null, true), (Surface::BLACK, false)] {
         let floor = Floor(surface);
-        let world = World { medium: &fog, scene: &floor, lights: &lamp };
+        let world = World { medium: &fog, scene: &floor, lights: (&lamp).into() };
         let mut flights = 0;
         for seed in 0..500 {
             photon::trace(
@@ -284,7 +284,7 @@ fn flights_reach_through_null_interfaces_and_say_where_they_met() {
 fn no_walk_is_longer_than_the_settings_allow() {
     let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::ONE, Phase::ISOTROPIC).unwrap();
     let lamp = [Light::Point(PointLight::from_flux(Vec3::ZERO, Spectrum::ONE).unwrap())];
-    let world = World { medium: &fog, scene: &Empty, lights: &lamp };
+    let world = World { medium: &fog, scene: &Empty, lights: (&lamp).into() };
     for max_scatterings in [0, 1, 2, 5] {
         let settings = Settings { max_scatterings, ..Settings::default() };
         let mut flights = 0;

@@ -3,8 +3,9 @@
 use core::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 use fogbow::cache::{
-    Asked, Effort, Estimate, FilledRecords, Filling, FillingMemory, Guide, Kind, Limits, Place, RadianceCaches,
-    RaySettings, Reading, Record, Room as Lengths, Settings, Slots, Wanted, clearance, places, room_for,
+    Asked, Effort, Estimate, FilledRecords, Filling, FillingMemory, Guide, Kind, Limits, PhotonCell, PhotonDeposit,
+    PhotonEffort, Place, RadianceCaches, RaySettings, Reading, Record, Room as Lengths, Settings, Slots, Wanted,
+    clearance, places, room_for,
 };
 use fogbow::host::{Gradients, MajorantSegment, Medium, Properties};
 use fogbow::light::{Light, PointLight};
@@ -59,7 +60,9 @@ fn settings() -> Settings {
     let effort = |tolerance: f32, degree: usize| {
         Some(Effort { tolerance, samples: 32, degree, limits, clearance, free_paths: f32::INFINITY })
     };
+    let bounds = Bounds { min: Vec3::splat(-2.0), max: Vec3::splat(2.0) };
     Settings {
+        photons: Some(PhotonEffort { bounds, cells: 8, paths: 2048, flights: u64::MAX, enough: u32::MAX }),
         single: effort(0.5, 3),
         surface: effort(1.5, 2),
         multiple: effort(1.0, 2),
@@ -96,20 +99,20 @@ fn fill_on<M: Medium + Sync>(
     control: &Control<'_>,
 ) -> (Filling<'static, Eye>, Ending) {
     let (room, lights) = (room(), [lamp()]);
-    let world = World { medium, scene: &room, lights: &lights };
+    let world = World { medium, scene: &room, lights: (&lights).into() };
     let mut filling = caches.fill(VIEW);
     let ran = run(&mut filling, &world, &Threads::new(threads).unwrap(), control, None, |_| {});
     (filling, ran.ending)
 }
 
-fn fill_in<M: Medium + Sync>(caches: Caches, medium: &M) -> (Caches, [u64; 6]) {
+fn fill_in<M: Medium + Sync>(caches: Caches, medium: &M) -> (Caches, [u64; 5]) {
     let (filling, ending) = fill_on(caches, medium, 2, &Control::default());
     assert_eq!(ending, Ending::Done);
     let computed = computed(&filling);
     (filling.finish(), computed)
 }
 
-fn computed(filling: &Filling<'static, Eye>) -> [u64; 6] {
+fn computed(filling: &Filling<'static, Eye>) -> [u64; 5] {
     Kind::ALL.map(|kind| filling.computed(kind))
 }
 
@@ -129,7 +132,7 @@ fn stored(caches: &Caches) -> Vec<u8> {
 /// An image with the caches, and how many of its look-ups were misses.
 fn picture(caches: &Caches, threads: usize) -> (Film, u64, u64) {
     let (fog, room, lights) = (fog(), room(), [lamp()]);
-    let world = World { medium: &fog, scene: &room, lights: &lights };
+    let world = World { medium: &fog, scene: &room, lights: (&lights).into() };
     let mut film = Film::new(16, 16, &["total"]).unwrap();
     let settings = tiles::Settings { samples: 4, threads, ..tiles::Settings::default() };
     let outcome = tiles::render(&mut film, &settings, &Control::default(), |sample, rng, layers| {
@@ -169,7 +172,7 @@ fn caches_filled_by_one_two_and_seven_threads_hold_the_same_bits() {
 #[test]
 fn a_fill_a_few_jobs_at_a_time_in_any_order_has_the_same_bits() {
     let (fog, room, lights) = (fog(), room(), [lamp()]);
-    let world = World { medium: &fog, scene: &room, lights: &lights };
+    let world = World { medium: &fog, scene: &room, lights: (&lights).into() };
     let mut filling = RadianceCaches::new(settings()).fill(VIEW);
     let mut slots: Vec<FilledRecords<'static>> = (0..5).map(|_| FilledRecords::default()).collect();
     let mut frame = 0_u32;
@@ -202,7 +205,7 @@ fn take(filling: &mut Filling<'static, Eye>, output: &FilledRecords<'static>) {
 #[test]
 fn a_box_of_points_has_records_everywhere_in_it() {
     let (fog, room, lights) = (fog(), room(), [lamp()]);
-    let world = World { medium: &fog, scene: &room, lights: &lights };
+    let world = World { medium: &fog, scene: &room, lights: (&lights).into() };
     let bounds = Bounds { min: Vec3::splat(-0.8), max: Vec3::splat(0.8) };
     let mut filling = RadianceCaches::new(settings()).fill(Asked::<Eye>::Box(bounds));
     finish(&mut filling, &world, &mut FilledRecords::default());
@@ -239,22 +242,21 @@ fn records_reach_no_farther_than_surfaces_let_them() {
         // No radius is narrowed to less than what is asked for at all, or than a pixel.
         let least = |record: &Record| (PIXEL * record.position.distance(eye_ray([0.5; 2]).origin)).max(0.02);
         let is_beyond = |record: &&Record| record.radius > bound(record).max(least(record)) * 1.000_01;
-        [Kind::Surface, Kind::Multiple, Kind::CoarseMultiple]
-            .map(|kind| caches.records(kind).iter().filter(is_beyond).count())
+        [Kind::Surface, Kind::Multiple].map(|kind| caches.records(kind).iter().filter(is_beyond).count())
     };
     let near = |effort: Option<Effort>| effort.map(|e| Effort { clearance: 0.5, ..e });
     let few = settings();
     let bounded = filled(Settings { surface: near(few.surface), multiple: near(few.multiple), ..few });
-    assert_eq!(beyond(&bounded, 0.5), [0; 3]);
-    // Unbounded ones do reach farther, but for those at which walks end.
-    let [surface, multiple, coarse] = beyond(&filled(few), 1.0);
-    assert!(surface > 0 && multiple > 0 && coarse == 0, "{surface}, {multiple}, {coarse}");
+    assert_eq!(beyond(&bounded, 0.5), [0; 2]);
+    // Unbounded ones do reach farther.
+    let [surface, multiple] = beyond(&filled(few), 1.0);
+    assert!(surface > 0 && multiple > 0, "{surface}, {multiple}");
 }
 
 /// Share of places of fresh eye rays that no record of a cache of multiple scattering reaches.
 fn uncovered(caches: &Caches) -> f64 {
     let (fog, room, lights) = (fog(), room(), [lamp()]);
-    let world = World { medium: &fog, scene: &room, lights: &lights };
+    let world = World { medium: &fog, scene: &room, lights: (&lights).into() };
     let cache = caches.volume(Kind::Multiple).unwrap().cache;
     let reading = Reading::new(settings().multiple.unwrap().tolerance);
     let (mut asked, mut open) = (0, 0);
@@ -283,7 +285,7 @@ fn filling_what_is_full_computes_nothing() {
     let caches = filled(settings());
     let before = stored(&caches);
     let (again, computed) = fill_in(caches, &fog());
-    assert_eq!((computed, stored(&again) == before), ([0; 6], true));
+    assert_eq!((computed, stored(&again) == before), ([0; 5], true));
 }
 
 #[test]
@@ -292,7 +294,7 @@ fn filling_for_another_view_adds_what_is_missing_there() {
     let before = counts(&caches);
     let other: Eye = |film| Ray { origin: Vec3::new(0.05, 0.0, -1.5), ..eye_ray(film) };
     let (room, fog, lights) = (room(), fog(), [lamp()]);
-    let world = World { medium: &fog, scene: &room, lights: &lights };
+    let world = World { medium: &fog, scene: &room, lights: (&lights).into() };
     let mut filling = caches.fill(Asked::View { ray: other, pixel: PIXEL });
     finish(&mut filling, &world, &mut FilledRecords::default());
     for (before, after) in before.into_iter().zip(counts(&filling.finish())) {
@@ -305,7 +307,7 @@ fn a_fill_cancelled_beforehand_leaves_empty_caches_that_serve() {
     let flag = AtomicBool::new(true);
     let control = Control { cancel: Some(&flag), progress: None };
     let (filling, ending) = fill_on(RadianceCaches::new(settings()), &fog(), 2, &control);
-    assert_eq!((ending, computed(&filling)), (Ending::Cancelled, [0; 6]));
+    assert_eq!((ending, computed(&filling)), (Ending::Cancelled, [0; 5]));
     let caches = filling.finish();
     assert_eq!(counts(&caches), [0; 4]);
     // Every question is answered by a sample of its own.
@@ -366,7 +368,7 @@ fn a_fill_cancelled_on_its_way_leaves_caches_that_serve_and_goes_on_to_the_same_
 
         // The fill itself goes on where it was.
         let (fog, room, lights) = (fog(), room(), [lamp()]);
-        let world = World { medium: &fog, scene: &room, lights: &lights };
+        let world = World { medium: &fog, scene: &room, lights: (&lights).into() };
         finish(&mut filling, &world, &mut FilledRecords::default());
         assert!(stored(&filling.finish()) == stored(&whole), "{questions}");
     }
@@ -376,10 +378,10 @@ fn a_fill_cancelled_on_its_way_leaves_caches_that_serve_and_goes_on_to_the_same_
 fn nothing_asked_for_is_nothing_filled() {
     let none = Settings { single: None, surface: None, multiple: None, irradiance: None, ..settings() };
     let (caches, computed) = fill_in(RadianceCaches::new(none), &fog());
-    assert_eq!((computed, counts(&caches), Kind::ALL.map(|kind| caches.bytes(kind))), ([0; 6], [0; 4], [0; 6]));
+    assert_eq!((computed, counts(&caches), Kind::ALL.map(|kind| caches.bytes(kind))), ([0; 5], [0; 4], [0; 5]));
     assert_eq!(picture(&caches, 2).2, 0);
     let (caches, computed) = fill_in(RadianceCaches::new(Settings { rays: 0, ..settings() }), &fog());
-    assert_eq!((computed, counts(&caches)), ([0; 6], [0; 4]));
+    assert_eq!((computed, counts(&caches)), ([0; 5], [0; 4]));
 }
 
 #[test]
@@ -387,7 +389,7 @@ fn an_estimate_of_nothing_fills_no_radius() {
     // In the dark every sum is zero: records are there, as far as they may reach.
     assert_eq!(fogbow::cache::valid_radius(&Sums::default(), 1.0), None);
     let (room, medium) = (room(), fog());
-    let world = World { medium: &medium, scene: &room, lights: &[] };
+    let world = World { medium: &medium, scene: &room, lights: (&[]).into() };
     let mut filling = RadianceCaches::new(settings()).fill(VIEW);
     finish(&mut filling, &world, &mut FilledRecords::default());
     let caches = filling.finish();
@@ -398,9 +400,9 @@ fn an_estimate_of_nothing_fills_no_radius() {
 }
 
 /// A fill in memory of just these lengths: the bytes of the caches, whether it was cut, and how many records there are.
-fn filled_in(room: &Lengths) -> (Vec<u8>, bool, [usize; 6]) {
+fn filled_in(room: &Lengths) -> (Vec<u8>, bool, [usize; 5]) {
     let (fog, walls, lights) = (fog(), self::room(), [lamp()]);
-    let world = World { medium: &fog, scene: &walls, lights: &lights };
+    let world = World { medium: &fog, scene: &walls, lights: (&lights).into() };
     let (mut memory, mut views) = (vec![Chunk::default(); room.chunks], [0; 1]);
     let caches = RadianceCaches::lent(settings(), &mut views[..], &mut memory);
 
@@ -410,6 +412,8 @@ fn filled_in(room: &Lengths) -> (Vec<u8>, bool, [usize; 6]) {
     let mut estimates = vec![Estimate::default(); room.estimates];
     let mut of_estimates = vec![Coefficient::ZERO; room.higher];
     let mut guides = room.guides.map(|count| vec![Guide::default(); count]);
+    let (mut photons, mut deposits) =
+        (vec![PhotonCell::default(); room.photons], vec![PhotonDeposit::default(); room.of_job_deposits]);
     let memory = FillingMemory::lent(Slots {
         wanted: &mut wanted,
         open: [&mut open, &mut still_open],
@@ -417,12 +421,17 @@ fn filled_in(room: &Lengths) -> (Vec<u8>, bool, [usize; 6]) {
         estimates: &mut estimates,
         higher: &mut of_estimates,
         guides: guides.each_mut().map(|guides| &mut guides[..]),
+        photons: &mut photons,
     });
     let mut of_job = vec![Wanted::default(); room.of_job_wanted];
     let mut open_of_job = vec![0; room.of_job_open];
     let mut higher_of_job = vec![Coefficient::ZERO; room.of_job_higher];
     let mut filling = caches.fill_in(memory, VIEW);
-    finish(&mut filling, &world, &mut FilledRecords::lent(&mut of_job, &mut open_of_job, &mut higher_of_job));
+    finish(
+        &mut filling,
+        &world,
+        &mut FilledRecords::lent(&mut of_job, &mut open_of_job, &mut higher_of_job, &mut deposits),
+    );
     let is_cut = filling.is_cut();
     let caches = filling.finish();
     // Whatever there is can be read.
@@ -454,9 +463,11 @@ fn a_fill_in_lent_memory_has_the_bits_of_one_that_grows_or_says_that_it_was_cut(
         Lengths { open: 50, ..ample },
         Lengths { estimates: 5, ..ample },
         Lengths { higher: 40, ..ample },
-        Lengths { guides: [3; 6], ..ample },
+        Lengths { guides: [3; 5], ..ample },
         Lengths { of_job_wanted: 10, ..ample },
         Lengths { of_job_open: 10, ..ample },
+        Lengths { of_job_deposits: 10, ..ample },
+        Lengths { photons: 7, ..ample },
     ] {
         let (_, is_cut, counts) = filled_in(&room);
         assert!(is_cut && counts.iter().any(|&count| count > 0), "{room:?}: {counts:?}");
@@ -465,5 +476,5 @@ fn a_fill_in_lent_memory_has_the_bits_of_one_that_grows_or_says_that_it_was_cut(
     let (_, is_cut, counts) = filled_in(&Lengths { of_job_higher: 2, ..ample });
     assert!(is_cut && counts[Kind::Multiple as usize] == 0 && counts[Kind::CoarseIrradiance as usize] > 0);
     let (_, is_cut, counts) = filled_in(&Lengths::default());
-    assert!(is_cut && counts == [0; 6]);
+    assert!(is_cut && counts == [0; 5]);
 }

@@ -81,7 +81,7 @@ fn in_world<T>(scale: f32, with: impl FnOnce(&World<'_, Placed<'_, DensityGrid<'
         Light::Spot(spot.unwrap()),
     ];
     let bounds = Bounds { min: Vec3::splat(-2.0 * scale), max: Vec3::splat(2.0 * scale) };
-    with(&World { medium: &medium, scene: &Room { scale }, lights: &lights }, bounds)
+    with(&World { medium: &medium, scene: &Room { scale }, lights: (&lights).into() }, bounds)
 }
 
 fn eye_ray(scale: f32, [x, y]: [f32; 2]) -> Ray {

@@ -220,9 +220,9 @@ fn estimator<'a>(
     lights: &'a [Light<'a>],
 ) -> Estimator<'a, Homogeneous, Room> {
     Estimator {
-        world: World { medium, scene, lights },
+        world: World { medium, scene, lights: lights.into() },
         surfaces: None,
-        scattered: None,
+        photons: None,
         walk: multiple_scatter::Settings::new(Steps::Gauss(1)),
         // Walls are lit by lamps alone.
         paths: path::Settings { max_scatterings: 1, ..path::Settings::default() },

@@ -41,9 +41,9 @@ const MOVED: f32 = 100.0 * 64.0 * 3.0 * f32::EPSILON;
 
 fn estimator<'a, M: Medium, S: Scene>(medium: &'a M, scene: &'a S, lights: &'a [Light<'a>]) -> Estimator<'a, M, S> {
     Estimator {
-        world: World { medium, scene, lights },
+        world: World { medium, scene, lights: lights.into() },
         surfaces: None,
-        scattered: None,
+        photons: None,
         walk: multiple_scatter::Settings::new(Steps::Gauss(8)),
         paths: Settings::default(),
         light_samples: 1,
@@ -115,7 +115,7 @@ fn null_interfaces_change_no_photon() {
     for seed in 0..200 {
         let [plain, sheets] = [0, MANY].map(|count| {
             let scene = Sheets(count);
-            let world = World { medium: &fog, scene: &scene, lights: &lamp };
+            let world = World { medium: &fog, scene: &scene, lights: (&lamp).into() };
             let (mut met, mut kept) = (Vec::new(), 0);
             photon::trace(&world, &bounds, &settings, &mut Generator::new(seed), &mut |event| {
                 if let Event::Met { point, power, .. } = *event {
@@ -152,7 +152,7 @@ fn rays_that_never_get_past_an_interface_end_as_at_a_black_wall() {
     assert_eq!(scene.0.get(), MAX_INTERFACES + 1);
     assert!(scene.is_blocked(&ray));
     let sky = [Light::Constant(Spectrum::ONE)];
-    let world = World { medium: &Empty, scene: &scene, lights: &sky };
+    let world = World { medium: &Empty, scene: &scene, lights: (&sky).into() };
     let seen = path::radiance(&ray, &world, &Settings::default(), &mut Generator::new(1));
     assert_eq!(seen.total(), Spectrum::ZERO);
     let make = estimator(&Empty, &scene, &sky);
@@ -179,7 +179,7 @@ fn lamps_on_null_interfaces_are_seen() {
     let quad = QuadLight::new(Vec3::new(-0.5, -0.5, 1.0), edge(0.0, 1.0), edge(1.0, 0.0), Spectrum::ONE).unwrap();
     let lights = [Light::Quad(quad)];
     assert!(quad.normal().z < 0.0);
-    let world = World { medium: &Empty, scene: &Pane, lights: &lights };
+    let world = World { medium: &Empty, scene: &Pane, lights: (&lights).into() };
     let make = estimator(&Empty, &Pane, &lights);
     let ray = Ray::new(Vec3::ZERO, Vec3::Z);
     for lights_visible in [true, false] {

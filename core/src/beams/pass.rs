@@ -60,7 +60,7 @@ impl<'o> BeamOutput<'o> {
     /// # use fogbow::{spectrum::Spectrum, work, world::{Outline, World}};
     /// # let fog = Homogeneous::new(Spectrum::ONE, Spectrum::ONE, Phase::ISOTROPIC)?;
     /// # let lamps = [Light::Point(PointLight::from_flux(Vec3::ZERO, Spectrum::ONE)?)];
-    /// # let world = World { medium: &fog, scene: &Empty, lights: &lamps };
+    /// # let world = World { medium: &fog, scene: &Empty, lights: (&lamps).into() };
     /// # let outline = Outline::of(&world, Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE });
     /// let settings = Settings { paths: 16, ..Settings::for_outline(&outline) };
     /// let run = |slots: &mut [Piece]| {
@@ -86,7 +86,7 @@ impl<'o> BeamOutput<'o> {
 /// use fogbow::{sampling::Generator, spectrum::Spectrum, work, world::{Outline, World}};
 /// let fog = Homogeneous::new(Spectrum::ONE, Spectrum::ONE, Phase::ISOTROPIC)?;
 /// let lamps = [Light::Point(PointLight::from_flux(Vec3::ZERO, Spectrum::ONE)?)];
-/// let world = World { medium: &fog, scene: &Empty, lights: &lamps };
+/// let world = World { medium: &fog, scene: &Empty, lights: (&lamps).into() };
 /// let outline = Outline::of(&world, Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE });
 /// // A pilot tells how many paths leave 20 000 pieces.
 /// let settings = Settings { pieces: 20_000, ..Settings::for_outline(&outline) };
@@ -137,7 +137,7 @@ impl<'s> BeamPass<'s, fn(Vec3, f32) -> f32> {
     /// # use fogbow::{spectrum::Spectrum, work, world::{Outline, World}};
     /// # let fog = Homogeneous::new(Spectrum::ONE, Spectrum::ONE, Phase::ISOTROPIC)?;
     /// # let lamps = [Light::Point(PointLight::from_flux(Vec3::ZERO, Spectrum::ONE)?)];
-    /// # let world = World { medium: &fog, scene: &Empty, lights: &lamps };
+    /// # let world = World { medium: &fog, scene: &Empty, lights: (&lamps).into() };
     /// # let outline = Outline::of(&world, Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE });
     /// let settings = Settings { pieces: 20_000, ..Settings::for_outline(&outline) };
     /// let (mut pieces, mut slots) = (vec![Piece::default(); 100_000], [Piece::default(); 4096]);
@@ -174,7 +174,7 @@ impl<'s, R: Fn(Vec3, f32) -> f32> BeamPass<'s, R> {
     /// # use fogbow::{spectrum::Spectrum, work, world::{Outline, World}};
     /// # let fog = Homogeneous::new(Spectrum::ONE, Spectrum::ONE, Phase::ISOTROPIC)?;
     /// # let lamps = [Light::Point(PointLight::from_flux(Vec3::ZERO, Spectrum::ONE)?)];
-    /// # let world = World { medium: &fog, scene: &Empty, lights: &lamps };
+    /// # let world = World { medium: &fog, scene: &Empty, lights: (&lamps).into() };
     /// # let outline = Outline::of(&world, Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE });
     /// let settings = Settings { paths: 16, ..Settings::for_outline(&outline) };
     /// let (mut pieces, mut nodes) = ([Piece::default(); 2048], [BeamNode::default(); 2049]);
@@ -297,7 +297,7 @@ impl Beams<'_> {
     /// # let (mut pieces, mut nodes) = ([], []);
     /// # let beams = Beams::new(&mut pieces[..], &mut nodes[..]);
     /// // Without beams there is no light of the medium; surfaces and lights are seen all the same.
-    /// let world = World { medium: &Empty, scene: &Empty, lights: &[Light::Constant(Spectrum::ONE)] };
+    /// let world = World { medium: &Empty, scene: &Empty, lights: (&[Light::Constant(Spectrum::ONE)]).into() };
     /// let eye = Ray::new(Vec3::ZERO, Vec3::Z);
     /// let seen = beams.radiance(&eye, &world, &path::Settings::default(), 1.0, &mut Generator::new(1));
     /// assert_eq!(seen.emitted, Spectrum::ONE);
@@ -317,5 +317,58 @@ impl Beams<'_> {
             let light = self.gather(segment, world.medium, most, rng).light;
             InScattered { single: light.single * share, multiple: light.multiple * share }
         })
+    }
+}
+
+#[cfg(all(test, feature = "alloc"))]
+mod tests {
+    use super::*;
+    use crate::host::Empty;
+    use crate::light::{Light, SpotLight};
+    use crate::math::Bounds;
+    use crate::medium::Homogeneous;
+    use crate::phase::Phase;
+    use crate::spectrum::Spectrum;
+    use crate::work;
+    use crate::world::Outline;
+
+    #[test]
+    fn kernels_by_covariances_narrow_until_light_is_that_of_the_path_tracer() {
+        // A shaft a fifth of a metre wide, seen across its middle.
+        let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::splat(0.1), Phase::ISOTROPIC).unwrap();
+        let spot = SpotLight::new(Vec3::NEG_Z, Vec3::Z, 0.1, 0.1, Spectrum::ONE).unwrap();
+        let lights = [Light::Spot(spot)];
+        let world = World { medium: &fog, scene: &Empty, lights: (&lights).into() };
+        let outline = Outline::of(&world, Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE });
+        let walk = path::Settings { max_scatterings: 1, ..path::Settings::default() };
+        let settings = Settings { walk, paths: 64, radius: 0.03, ..Settings::for_outline(&outline) };
+        let ray = Ray::between(Vec3::NEG_X, Vec3::X);
+        let samples = 20_000;
+        let truth: f32 =
+            (0..samples).map(|i| path::radiance(&ray, &world, &walk, &mut Generator::new(i)).medium_single[0]).sum();
+        let truth = f64::from(truth) / samples as f64;
+        // Mean and standard error over many passes of one number: how far off they are.
+        let off = |number: u32| {
+            let (count, mut sum, mut squares) = (2000, 0.0, 0.0);
+            for seed in 0..count {
+                let settings = Settings { seed, ..settings };
+                let mut pass = BeamPass::new(&settings, number, |_, pass| settings.widened(0.3, pass));
+                work::finish(&mut pass, &world, &mut BeamOutput::default());
+                let beams = pass.finish().unwrap();
+                let light = beams.gather(&ray, &fog, u32::MAX, &mut Generator::new(seed)).light.single[0];
+                let found = f64::from(light) / truth - 1.0;
+                sum += found;
+                squares += found * found;
+            }
+            let n = count as f64;
+            (sum / n, libm::sqrt((squares / n - (sum / n) * (sum / n)) / n))
+        };
+        let [first, some, many] = [0, 1000, 100_000].map(off);
+        assert!(first.0 < -0.3, "a kernel wider than the shaft must show: {first:?}");
+        assert!(some.0 < -8.0 * some.1, "{some:?} is too noisy to tell");
+        // Radii like i^−0.2, blur like their square: after a hundred times as many passes it is 6.3 times less.
+        let error = libm::sqrt(many.1 * many.1 + some.1 * some.1 / 40.0);
+        assert!((many.0 - some.0 / 6.31).abs() < 0.005 + 4.0 * error, "{some:?}, then {many:?}");
+        assert!(many.0.abs() < 0.015 + 4.0 * many.1, "{many:?} is what is left");
     }
 }

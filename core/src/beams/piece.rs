@@ -200,7 +200,7 @@ pub fn pieces(
 /// # use fogbow::{path::Settings, sampling::Generator, spectrum::Spectrum, world::World};
 /// let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::ONE, Lobe::Isotropic)?;
 /// let lamps = [Light::Point(PointLight::from_flux(Vec3::ZERO, Spectrum::ONE)?)];
-/// let world = World { medium: &fog, scene: &Empty, lights: &lamps };
+/// let world = World { medium: &fog, scene: &Empty, lights: (&lamps).into() };
 /// let bounds = Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE };
 /// let settings = Settings { max_scatterings: 2, ..Settings::default() };
 /// let mut most = 0;

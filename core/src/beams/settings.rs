@@ -27,8 +27,14 @@ const PIECES_PER_PIXEL: u64 = 4;
 /// Pieces of a pass, for small and for large pictures: below, a pass is hardly more than its tree; above, 256 MB.
 const PIECES: [u32; 2] = [1 << 14, 1 << 22];
 
-/// Bias that a kernel by covariances may have, as a part of the light itself. Larger: less noise, borders blur.
-const BIAS: f32 = 0.02;
+/// Bias that a kernel by covariances may have in the first pass, as a part of the light itself. Kernels that are best for the noise have less
+/// unless there is much of it: this is a guard for where noise is not what [`Settings::noise`] foretells. Larger: no guard; smaller: more
+/// noise after few passes.
+const BIAS: f32 = 0.1;
+
+/// Length of an eye ray within a world over the diagonal of its bounds, about: the mean chord of a cube is 0.38 of its diagonal. It goes
+/// into radii by its fifth root.
+const CHORD: f32 = 0.38;
 
 /// Its greatest radius over the diagonal of the bounds. Larger: a beam in smooth fog is met by every eye ray.
 const WIDEST: f32 = 0.05;
@@ -59,10 +65,12 @@ pub struct Settings {
     pub alpha: f32,
     /// Length (m) above which pieces of beams are cut. Shorter: more pieces, tighter boxes. Changes nothing in the mean.
     pub longest: f32,
-    /// Bias that a kernel by covariances may have, as a part of the light itself. Nothing in this module reads it.
+    /// Bias that a kernel by covariances may have in the first pass, as a part of the light itself. Nothing in this module reads it.
     pub bias: f32,
-    /// Greatest radius (m) of such a kernel.
+    /// Greatest radius (m) of such a kernel in the first pass.
     pub widest: f32,
+    /// Length (m) along which an eye ray sees light, about: see [`Settings::noise`].
+    pub depth: f32,
     /// Changes all random numbers.
     pub seed: u64,
 }
@@ -75,7 +83,7 @@ impl Settings {
     /// # use fogbow::{beams::Settings, host::Empty, math::{Bounds, Vec3}, medium::Homogeneous, phase::Phase};
     /// # use fogbow::{spectrum::Spectrum, world::{Outline, World}};
     /// let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::ONE, Phase::ISOTROPIC)?;
-    /// let world = World { medium: &fog, scene: &Empty, lights: &[] };
+    /// let world = World { medium: &fog, scene: &Empty, lights: (&[]).into() };
     /// let bounds = Bounds { min: Vec3::ZERO, max: Vec3::new(3.0, 4.0, 0.0) };
     /// let settings = Settings::for_outline(&Outline::of(&world, bounds));
     /// assert!((settings.radius - 0.025).abs() < 1e-6 && (settings.longest - 0.5).abs() < 1e-6);
@@ -96,6 +104,8 @@ impl Settings {
             longest: LONGEST * size,
             bias: BIAS,
             widest: WIDEST * size,
+            // Beyond a free path little comes to the eye.
+            depth: 1.0 / (1.0 / (CHORD * size) + 1.0 / outline.mean_free_path),
             seed: 0,
         }
     }
@@ -104,7 +114,7 @@ impl Settings {
     ///
     /// ```
     /// # use fogbow::{beams::Settings, host::Empty, math::Bounds, world::{Outline, World}};
-    /// # let world = World { medium: &Empty, scene: &Empty, lights: &[] };
+    /// # let world = World { medium: &Empty, scene: &Empty, lights: (&[]).into() };
     /// let settings = Settings::for_outline(&Outline::of(&world, Bounds::EVERYTHING));
     /// assert_eq!(settings.for_pixels(640 * 480).pieces, 4 * 640 * 480);
     /// ```
@@ -127,7 +137,7 @@ impl Settings {
     ///
     /// ```
     /// # use fogbow::{beams::Settings, host::Empty, math::Bounds, world::{Outline, World}};
-    /// # let world = World { medium: &Empty, scene: &Empty, lights: &[] };
+    /// # let world = World { medium: &Empty, scene: &Empty, lights: (&[]).into() };
     /// let settings = Settings::for_outline(&Outline::of(&world, Bounds::EVERYTHING));
     /// let settings = Settings { pieces: 20_000, ..settings }.for_pieces(10_000, 2048);
     /// assert_eq!(settings.paths, 4096);
@@ -143,7 +153,7 @@ impl Settings {
     ///
     /// ```
     /// # use fogbow::{beams::Settings, host::Empty, math::Bounds, world::{Outline, World}};
-    /// # let world = World { medium: &Empty, scene: &Empty, lights: &[] };
+    /// # let world = World { medium: &Empty, scene: &Empty, lights: (&[]).into() };
     /// let settings = Settings::for_outline(&Outline::of(&world, Bounds::EVERYTHING));
     /// assert_eq!([settings.share(0), settings.share(1), settings.share(8)], [8.0, 0.0, 8.0]);
     /// ```
@@ -152,6 +162,43 @@ impl Settings {
     pub fn share(&self, sample: u32) -> f32 {
         let samples = self.samples.max(1);
         if sample.is_multiple_of(samples) { samples as f32 } else { 0.0 }
+    }
+
+    /// Relative variance of a pass, of light with a fluence of 1 W·m⁻², by kernels of 1 m (W·m⁻¹), where `power` (W) is what all lights send
+    /// out: over fluence and radius, that of other light and kernels. What radii by covariances are balanced against.
+    ///
+    /// ```text
+    /// Var L/L² = k Φ/(N d F r)        k of kernel::NOISE, N paths, an eye ray of length d in light of fluence F
+    /// ```
+    ///
+    /// Of beams that are as bright as they start, cross the eye ray at right angles and know nothing of each other.
+    ///
+    /// ```
+    /// # use fogbow::{beams::Settings, host::Empty, math::Bounds, world::{Outline, World}};
+    /// # let world = World { medium: &Empty, scene: &Empty, lights: (&[]).into() };
+    /// let settings = Settings { paths: 1000, depth: 2.0, ..Settings::for_outline(&Outline::of(&world, Bounds::EVERYTHING)) };
+    /// assert!((settings.noise(100.0) - 0.0383).abs() < 1e-4);
+    /// ```
+    #[must_use]
+    pub fn noise(&self, power: f32) -> f32 {
+        kernel::NOISE * power / (self.paths.max(1) as f32 * self.depth)
+    }
+
+    /// Radius (m) of a kernel by covariances in a pass whose own radius is `of_pass` (m), after `first` (m) in the first: both shrink alike, and
+    /// none is narrower than the pass's own.
+    ///
+    /// ```
+    /// # use fogbow::{beams::{Settings, kernel}, host::Empty, math::Bounds, world::{Outline, World}};
+    /// # let world = World { medium: &Empty, scene: &Empty, lights: (&[]).into() };
+    /// let settings = Settings { radius: 0.01, ..Settings::for_outline(&Outline::of(&world, Bounds::EVERYTHING)) };
+    /// let of_pass = kernel::radius(settings.radius, settings.alpha, 31);
+    /// let (wide, narrow) = (settings.widened(0.1, of_pass), settings.widened(0.001, of_pass));
+    /// assert!((wide / of_pass - 10.0).abs() < 1e-4 && narrow == of_pass);
+    /// ```
+    #[inline]
+    #[must_use]
+    pub fn widened(&self, first: f32, of_pass: f32) -> f32 {
+        (first / self.radius).max(1.0) * of_pass
     }
 
     /// Radius (m) of pass number `pass`.

@@ -3,7 +3,7 @@
 use glam::{Vec2, Vec3};
 
 use crate::host::Scene;
-use crate::light::Light;
+use crate::light::{FromPoint, Light, Lights};
 use crate::math::{Frame, Ray, float};
 use crate::sampling::discrete::choose;
 use crate::sampling::warp;
@@ -41,12 +41,13 @@ impl Aims {
     /// Those that `is_aim` and whose surroundings are seen from `point`.
     pub(super) fn new(
         point: Vec3,
-        lights: &[Light<'_>],
+        lights: &Lights<'_>,
         scene: &(impl Scene + ?Sized),
         is_aim: impl Fn(&Light<'_>) -> bool,
     ) -> Self {
         let mut cones = heapless::Vec::new();
-        for light in lights {
+        let strong = lights.strong(&FromPoint { sky: false, ..FromPoint::all(point) });
+        for light in strong.lights(lights) {
             let Some(field) = light.near_field().filter(|_| is_aim(light)) else { continue };
             let offset = field.centre() - point;
             let distance = offset.length();

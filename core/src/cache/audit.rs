@@ -20,6 +20,7 @@ use super::kind::Kind;
 use super::slot::ByKind;
 use crate::host::{Medium, Scene};
 use crate::math::Ray;
+use crate::multiple_scatter;
 use crate::path;
 use crate::sampling::uniform::mix;
 use crate::sampling::{even2, independent, uniform2};
@@ -146,7 +147,7 @@ pub struct Compared {
 /// # let fog = Homogeneous::new(Spectrum::ONE, Spectrum::ONE, Phase::ISOTROPIC)?;
 /// # let ball = Placed::new(fog, Region::sphere(Vec3::ZERO, 1.0)?);
 /// # let sky = [Light::Constant(Spectrum::ONE)];
-/// # let world = World { medium: &ball, scene: &Empty, lights: &sky };
+/// # let world = World { medium: &ball, scene: &Empty, lights: (&sky).into() };
 /// # let bounds = Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE };
 /// let settings = Settings { rays: 64, ..Settings::for_outline(&Outline::of(&world, bounds), 0.02).with_walks(64) };
 /// let camera = |at: [f32; 2]| Ray::new(3.0 * Vec3::Z, Vec3::new(at[0] - 0.5, at[1] - 0.5, -2.0).normalize());
@@ -229,7 +230,9 @@ where
         *output = Compared::default();
         let settings = &self.caches.settings;
         let cached = self.caches.estimator(world);
-        let alone = Estimator { surfaces: None, scattered: None, ..cached };
+        // Whole walks, whatever caches were made of.
+        let walk = multiple_scatter::Settings { max_vertices: u32::MAX, ..cached.walk };
+        let alone = Estimator { surfaces: None, photons: None, walk, ..cached };
         let seed = mix(settings.seed ^ 0x6175_6469_7421_0b5e);
         let shift = uniform2(&mut independent(seed, 0, 2)).to_array();
         for i in 0..GROUP {
@@ -303,7 +306,7 @@ mod tests {
         let ball = Placed::new(fog, Region::sphere(Vec3::ZERO, 1.0).unwrap());
         let lamp = PointLight::new(Vec3::new(0.2, 0.1, -0.3), Spectrum::ONE).unwrap();
         let lights = [Light::Point(lamp), Light::Constant(Spectrum::splat(0.3))];
-        let world = World { medium: &ball, scene: &crate::host::Empty, lights: &lights };
+        let world = World { medium: &ball, scene: &crate::host::Empty, lights: (&lights).into() };
         let bounds = Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE };
         let camera = |at: [f32; 2]| Ray::new(3.0 * Vec3::Z, Vec3::new(at[0] - 0.5, at[1] - 0.5, -2.0).normalize());
         let settings = Settings::for_outline(&Outline::of(&world, bounds), 0.02).with_walks(1024);
@@ -331,7 +334,7 @@ mod tests {
         assert_eq!(found.rays, COMPARED);
         assert!(found.all.error < 0.04 && found.cached.error < 0.005, "{found:?}");
         assert!(!found.all.exceeds(0.02) && !found.cached.exceeds(0.02), "{found:?}");
-        assert!(found.of(Kind::Irradiance).is_some() && found.of(Kind::CoarseMultiple).is_none());
+        assert!(found.of(Kind::Irradiance).is_some() && found.of(Kind::CoarseIrradiance).is_none());
     }
 
     #[test]
@@ -348,6 +351,7 @@ mod tests {
     fn walks_that_are_cut_are_found() {
         let cut = |mut settings: Settings| {
             settings.walk.max_vertices = 1;
+            settings.photons = None;
             settings
         };
         let found = audited(cut, |_| {});

@@ -23,7 +23,7 @@ use crate::world::World;
 /// let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::splat(0.8), Lobe::HenyeyGreenstein { g: 0.3 })?;
 /// let ball = Placed::new(fog, Region::sphere(Vec3::ZERO, 1.0)?);
 /// let lamps = [Light::Point(PointLight::from_flux(0.2 * Vec3::Y, Spectrum::ONE)?)];
-/// let world = World { medium: &ball, scene: &Empty, lights: &lamps };
+/// let world = World { medium: &ball, scene: &Empty, lights: (&lamps).into() };
 /// let bounds = Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE };
 ///
 /// // Anywhere in a box: coarser than usual, so that this example is quick.
@@ -105,7 +105,7 @@ impl<'s> RadianceCaches<'s> {
     /// # use fogbow::{host::Empty, math::{Bounds, Ray, Vec3}, medium::Homogeneous, phase::Phase, storage::Chunk};
     /// # use fogbow::{spectrum::Spectrum, work, world::{Outline, World}};
     /// # let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::ONE, Phase::ISOTROPIC)?;
-    /// # let world = World { medium: &fog, scene: &Empty, lights: &[] };
+    /// # let world = World { medium: &fog, scene: &Empty, lights: (&[]).into() };
     /// # let bounds = Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE };
     /// # let limits = Limits { min: 0.1, max: 1.0 };
     /// # let effort = Effort { tolerance: 0.5, samples: 16, degree: 1, limits, clearance: f32::INFINITY, free_paths: f32::INFINITY };
@@ -118,7 +118,7 @@ impl<'s> RadianceCaches<'s> {
     /// // As much for the fill and for its jobs; here there is none, so that no place is even looked for.
     /// let asked = Asked::<fn([f32; 2]) -> Ray>::Box(bounds);
     /// let mut filling = caches.fill_in(FillingMemory::lent(Slots::default()), asked);
-    /// work::finish(&mut filling, &world, &mut FilledRecords::lent(&mut [], &mut [], &mut []));
+    /// work::finish(&mut filling, &world, &mut FilledRecords::lent(&mut [], &mut [], &mut [], &mut []));
     /// assert!(filling.is_cut() && filling.finish().records(Kind::Surface).is_empty());
     /// # Ok::<(), fogbow::medium::MediumError>(())
     /// ```
@@ -185,7 +185,7 @@ impl RadianceCaches<'_> {
         Estimator {
             world: *world,
             surfaces: self.surface(Kind::Irradiance).map(|reader| (reader.cache, reader.reading)),
-            scattered: None,
+            photons: None,
             walk: self.settings.walk,
             paths: self.settings.paths,
             light_samples: 1,

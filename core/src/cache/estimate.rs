@@ -5,16 +5,16 @@ use glam::{Vec2, Vec3};
 use super::aim::Aims;
 use super::evidence::{Halves, Openings};
 use super::guide::{Guided, Looks};
-use super::lookup::{Reading, TurningBasis};
+use super::lookup::Reading;
+use super::photons::{self, PhotonGrid};
 use super::record::Facing;
-use super::store::{SurfaceCache, VolumeCache};
+use super::store::SurfaceCache;
 use crate::host::{Hit, Medium, Properties, Rng, Scene};
-use crate::light::{Light, sky};
+use crate::light::{FromPoint, Light};
 use crate::math::{Frame, Ray, float};
 use crate::multiple_scatter::{self, Cones, Incoming, Start, Walk};
 use crate::path;
 use crate::phase::Phase;
-use crate::sampling::discrete::choose;
 use crate::sampling::{Generator, uniform, uniform2, warp};
 use crate::sh::{Coefficient, MAX_DEGREE};
 use crate::single_scatter::{self, Arrival, Contribution, Directional, Sums, Towards};
@@ -82,10 +82,10 @@ impl Mixture<'_> {
 /// # use fogbow::world::World;
 /// // A lamp of 1 W/sr two metres above, and a grey floor; in vacuum, as if there were a last bit of fog.
 /// let lamps = [Light::Point(PointLight::new(2.0 * Vec3::Z, Spectrum::ONE)?)];
-/// let world = World { medium: &Empty, scene: &Empty, lights: &lamps };
+/// let world = World { medium: &Empty, scene: &Empty, lights: (&lamps).into() };
 /// # let walk = multiple_scatter::Settings::new(Steps::Length(0.1));
 /// # let (paths, light_samples) = (path::Settings::default(), 1);
-/// let estimator = Estimator { world, surfaces: None, scattered: None, walk, paths, light_samples, finest: 1e-3 };
+/// let estimator = Estimator { world, surfaces: None, photons: None, walk, paths, light_samples, finest: 1e-3 };
 /// let surface = Surface::Lambert { reflectance: Spectrum::splat(0.5) };
 /// let floor = Hit { distance: 1.0, normal: Vec3::Z, surface, light: None };
 /// # let near = |light: Spectrum, expected: f32| (light[0] / expected - 1.0).abs() < 1e-5;
@@ -103,7 +103,7 @@ impl Mixture<'_> {
 /// assert!(estimator.multiple_towards(at, Vec3::X, &phase, &mut rng).is_black());
 /// // A sky of 1 counts as light of surfaces: it is scattered as 1, and a floor receives π.
 /// let sky = [Light::Constant(Spectrum::ONE)];
-/// let outside = Estimator { world: World { lights: &sky, ..world }, ..estimator };
+/// let outside = Estimator { world: World { lights: (&sky).into(), ..world }, ..estimator };
 /// assert!(near(outside.surface(at, &phase, 8, &mut [], &mut rng).value, 1.0));
 /// assert!(near(outside.surface_towards(at, Vec3::X, &phase, &mut rng), 1.0));
 /// assert!(near(outside.irradiance(at, Vec3::Z, 8, &mut rng).0.value, PI));
@@ -116,9 +116,8 @@ pub struct Estimator<'a, M: ?Sized, S: ?Sized> {
     pub world: World<'a, M, S>,
     /// Indirect irradiance known so far, and how it is read.
     pub surfaces: Option<(&'a SurfaceCache<'a>, Reading)>,
-    /// Light of surfaces scattered once, and light scattered more than once, known so far: walks end where
-    /// both are.
-    pub scattered: Option<[(&'a VolumeCache<'a>, Reading); 2]>,
+    /// Light in cells: walks end at their first vertex in a cell that knows.
+    pub photons: Option<&'a PhotonGrid<'a>>,
     /// How random walks are made, and light marched to.
     pub walk: multiple_scatter::Settings,
     /// How paths are traced where nothing is cached.
@@ -150,7 +149,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
         self.expanded(phase, higher, |into| {
             let settings = single_scatter::Settings { samples: self.light_samples, steps: self.walk.steps };
             let mut sums = Sums::default();
-            for lights in self.lights_but_sky() {
+            for lights in self.world.lights.but_sky() {
                 let world = World { lights, ..self.world };
                 sums.merge(&single_scatter::sample_directional(point, into, &world, &settings, rng));
             }
@@ -172,7 +171,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
         let Looks { count, guide, mut learnt } = directions.into();
         let World { scene, lights, .. } = self.world;
         // Rectangles light what lies before them, not what surrounds them.
-        let aims = Aims::new(point, lights, scene, |light| !matches!(light, Light::Quad(_)));
+        let aims = Aims::new(point, &lights, scene, |light| !matches!(light, Light::Quad(_)));
         let mixture = Mixture { aims, guide, count, shift };
         self.expanded(phase, higher, |into| {
             let (mut sums, mut openings) = (Sums::default(), Openings::default());
@@ -213,7 +212,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
         let (walk, shift, offset) = (self.walker(), uniform2(rng), uniform(rng));
         let Looks { count, guide, mut learnt } = paths.into();
         let share = 1.0 / count.max(1) as f32;
-        let aims = Aims::new(point, self.world.lights, self.world.scene, |_| true);
+        let aims = Aims::new(point, &self.world.lights, self.world.scene, |_| true);
         let mixture = Mixture { aims, guide, count, shift };
         self.expanded(phase, higher, |into| {
             let (mut cones, mut halves) = (Cones::default(), Halves::default());
@@ -241,13 +240,12 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
     fn walked(&self, walk: &Walk<'_, M, S>, start: &Start, rng: &mut impl Rng) -> Incoming {
         let mut child = Generator::child(rng);
         let outgoing = |ray: &Ray, hit: &Hit| self.outgoing(ray, hit, &mut child);
-        let known = |point: Vec3, to_eye: Vec3, _: &Properties| {
-            let [surface, multiple] = self.scattered.as_ref()?;
-            let basis = TurningBasis::new(to_eye, surface.0.degree().max(multiple.0.degree()));
-            let (mut light, turned) = multiple.0.lookup_with_gradients(point, &basis, &multiple.1)?;
-            let (more, turned_more) = surface.0.lookup_with_gradients(point, &basis, &surface.1)?;
-            light += more;
-            Some((light, turned + turned_more))
+        // How much is left of what cells do not resolve.
+        let mut sharp = 1.0;
+        let known = |point: Vec3, to_eye: Vec3, properties: &Properties| {
+            let photons = self.photons?;
+            sharp *= photons::unresolved(&properties.phase);
+            if sharp > photons::SHARPEST { None } else { photons.scattered(point, to_eye, properties) }
         };
         self.steadied(walk.along(start, outgoing, known, rng))
     }
@@ -285,7 +283,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
         let (frame, walk, shift, offset) = (Frame::around(normal), self.walker(), uniform2(rng), uniform(rng));
         let share = 1.0 / count.max(1) as f32;
         let outside = leave(point, normal, normal, 0.0);
-        let aims = Aims::new(outside, self.world.lights, self.world.scene, |_| true);
+        let aims = Aims::new(outside, &self.world.lights, self.world.scene, |_| true);
         let mixture = Mixture { aims, guide, count, shift };
         for j in 0..count {
             let upwards = |u| frame.to_world(warp::cosine_hemisphere(u));
@@ -302,7 +300,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
             let ray = Ray::new(leave(point, normal, to_light, 0.0), to_light);
             let mut total = Contribution::ZERO;
             let end = nearest_surface(&ray, self.world.scene);
-            let shines = end.is_some() || !sky(self.world.lights, to_light).is_black();
+            let shines = end.is_some() || !self.world.lights.sky(to_light).is_black();
             let flown = walk.first(&ray, end.as_ref(), third(j, offset), shines, rng);
             // How the cosine changes as what is seen stays.
             let tilt = (to_light * cosine - normal) / cosine.max(MIN_COSINE);
@@ -330,12 +328,6 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
         (sums, Facing { normal, turn })
     }
 
-    /// Lights that are no sky, in runs.
-    fn lights_but_sky(&self) -> impl Iterator<Item = &[Light<'_>]> {
-        let runs = self.world.lights.chunk_by(|a, b| a.is_sky() == b.is_sky());
-        runs.filter(|run| run.first().is_some_and(|light| !light.is_sky()))
-    }
-
     /// Transmittance of a ray up to its `end`.
     fn through(&self, ray: &Ray, end: Option<&Hit>, marching: Marching) -> Transmittance {
         let length = end.map_or(f32::INFINITY, |hit| hit.distance);
@@ -351,7 +343,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
         through: impl FnOnce() -> Transmittance,
         rng: &mut Generator,
     ) -> Option<Arrival> {
-        let sky = || sky(self.world.lights, ray.direction);
+        let sky = || self.world.lights.sky(ray.direction);
         let radiance = end.map_or_else(sky, |hit| self.outgoing(ray, hit, rng));
         Arrival::from_end(ray, end, radiance, pdf, through)
     }
@@ -390,26 +382,23 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
     ) -> Spectrum {
         let origin = |to_light: Vec3| leave(point, hit.normal, to_light, hit.distance);
         let cosine = |to_light: Vec3| Spectrum::splat(hit.normal.dot(to_light).max(0.0));
-        let weight = |light: &Light<'_>| if light.is_sky() && !with_sky { 0.0 } else { light.importance(point) };
-        self.connected(point, origin, weight, cosine, random, rng)
+        let weight = FromPoint { sky: with_sky, ..FromPoint::all(point) };
+        self.connected(&weight, origin, cosine, random, rng)
     }
 
     /// Light of one of the lights, chosen by `weight`, times `value(to_light)`. Transmittance is marched:
     /// what ratio tracking adds in noise would rule pictures whose other parts have none.
     pub(super) fn connected(
         &self,
-        point: Vec3,
+        weight: &FromPoint,
         origin: impl Fn(Vec3) -> Vec3,
-        weight: impl Fn(&Light<'_>) -> f32,
         value: impl Fn(Vec3) -> Spectrum,
         random: (f32, Vec2),
         rng: &mut Generator,
     ) -> Spectrum {
         let World { medium, scene, lights } = self.world;
-        // Capped, so that a sum over all lights stays a number.
-        let weighted = lights.iter().map(|light| (weight(light).min(1e30), light));
-        let Some((light, chosen)) = choose(weighted, random.0) else { return Spectrum::ZERO };
-        let Some(sample) = light.sample(point, random.1) else { return Spectrum::ZERO };
+        let Some(chosen) = lights.pick(weight, random.0) else { return Spectrum::ZERO };
+        let Some(sample) = lights[chosen.index].sample(weight.point, random.1) else { return Spectrum::ZERO };
         let value = value(sample.incident.to_light);
         if value.is_black() {
             return Spectrum::ZERO;
@@ -429,7 +418,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
         let origin = leave(point, hit.normal, to_light, hit.distance);
         let ray = Ray::new(origin, to_light);
         let mut light = self.traced(&ray, rng);
-        let sky = sky(self.world.lights, to_light);
+        let sky = self.world.lights.sky(to_light);
         if !sky.is_black() && nearest_surface(&ray, self.world.scene).is_none() {
             let marching = Marching { steps: self.walk.steps, offset: uniform(rng) };
             light += sky * transmittance(&ray, self.world.medium, marching);
@@ -449,15 +438,16 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
         let origin = |to_light: Vec3| leave(point, hit.normal, to_light, hit.distance);
         let value =
             |to_light: Vec3| hit.surface.value(hit.normal, to_eye, to_light) * hit.normal.dot(to_light).max(0.0);
-        self.connected(point, origin, |light| light.importance(point), value, random, rng)
+        self.connected(&FromPoint::all(point), origin, value, random, rng)
     }
 
-    /// Light of all lights but a sky, scattered once at `point` towards `to_eye`: one sample of each.
+    /// Light of all lights but a sky, scattered once at `point` towards `to_eye`: one sample of each, or of those that stand
+    /// for many.
     pub fn towards(&self, point: Vec3, to_eye: Vec3, phase: &Phase, rng: &mut Generator) -> Spectrum {
         let (towards, world) = (Towards { to_eye, phase }, self.world);
         let settings = single_scatter::Settings { samples: 1, steps: self.walk.steps };
         let of = |lights| single_scatter::sample(point, &towards, &World { lights, ..world }, &settings, rng).value;
-        self.lights_but_sky().map(of).sum()
+        self.world.lights.but_sky().map(of).sum()
     }
 
     /// Light of surfaces and the sky, scattered once at `point` towards `to_eye`: one direction.
@@ -522,11 +512,10 @@ mod tests {
     #[test]
     fn no_bound_and_too_many_coefficients_leave_numbers() {
         let sky = [Light::Constant(Spectrum::new(1.0, 0.0, 0.0))];
-        let world = World { medium: &crate::host::Empty, scene: &crate::host::Empty, lights: &sky };
+        let world = World { medium: &crate::host::Empty, scene: &crate::host::Empty, lights: (&sky).into() };
         let walk = multiple_scatter::Settings::new(crate::transmittance::thickness::Steps::Length(0.1));
         let paths = path::Settings::default();
-        let estimator =
-            Estimator { world, surfaces: None, scattered: None, walk, paths, light_samples: 1, finest: 0.0 };
+        let estimator = Estimator { world, surfaces: None, photons: None, walk, paths, light_samples: 1, finest: 0.0 };
         let mut higher = [Coefficient::ZERO; 399];
         let sums = estimator.surface(Vec3::ZERO, &Phase::ISOTROPIC, 8, &mut higher, &mut Generator::new(1));
         assert!((sums.value[0] - 1.0).abs() < 1e-5 && sums.value[1] == 0.0, "{sums:?}");

@@ -6,11 +6,10 @@ use super::estimate::Estimator;
 use super::lookup::{Basis, Reading};
 use super::store::{SurfaceCache, VolumeCache};
 use crate::host::{Hit, Medium, Properties, Rng, Scene};
-use crate::light::{Light, LightSample};
+use crate::light::{Except, FromPoint, FromRay, LightSample, Survey};
 use crate::march::scattering_points;
 use crate::math::{Frame, Ray};
 use crate::phase::deflection;
-use crate::sampling::discrete::choose;
 use crate::sampling::{Generator, uniform, uniform2, warp};
 use crate::spectrum::Spectrum;
 use crate::surface::{Surface, lambert};
@@ -78,7 +77,7 @@ pub struct Caches<'a> {
 pub struct CachedRadiance {
     /// Lights, the environment and glowing media.
     pub emitted: Spectrum,
-    /// Surfaces lit by the lights; diffuse ones but for a sky ([`Light::is_sky`]), whose light is indirect.
+    /// Surfaces lit by the lights; diffuse ones but for a sky ([`Light::is_sky`](crate::light::Light::is_sky)), whose light is indirect.
     pub surface_direct: Spectrum,
     /// Surfaces lit by anything else.
     pub surface_indirect: Spectrum,
@@ -166,7 +165,7 @@ fn look<M: Medium + ?Sized, S: Scene + ?Sized>(
         }
         let Some(hit) = hit else {
             if lights_visible && !lights_done {
-                let light = world.lights.iter().map(|light| light.background(ray.direction)).sum::<Spectrum>();
+                let light = world.lights.distant().map(|(_, light)| light.background(ray.direction)).sum::<Spectrum>();
                 sight.emitted(throughput * light);
             }
             return;
@@ -209,6 +208,9 @@ pub struct Place {
     pub normal: Option<Vec3>,
     /// Whether the eye ray itself comes here; if not, a ray from one of its points.
     pub is_seen: bool,
+    /// How much of the light that leaves a surface here reaches the eye, in [0, 1]: fog, mirrors and panes take the rest. 1 in the medium, and
+    /// where the eye ray does not come.
+    pub share: f32,
 }
 
 /// Calls `visit` for every place where the light along `ray` would be looked up: where records are
@@ -219,7 +221,7 @@ pub struct Place {
 /// # use fogbow::{sampling::Generator, spectrum::Spectrum};
 /// # use fogbow::world::World;
 /// let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::ONE, Phase::ISOTROPIC)?;
-/// let world = World { medium: &fog, scene: &Empty, lights: &[] };
+/// let world = World { medium: &fog, scene: &Empty, lights: (&[]).into() };
 /// let settings = RaySettings { density: 8.0, connections: 1, lights_visible: true, indirect: true };
 /// let (ray, mut found) = (Ray::between(Vec3::ZERO, core::f32::consts::LN_2 * Vec3::X), Vec::new());
 /// places(&ray, &world, &settings, &mut Generator::new(1), |place| found.push(place));
@@ -248,7 +250,7 @@ pub(super) fn places_around<M: Medium + ?Sized, S: Scene + ?Sized>(
     if world.medium.properties(point).scattering.is_black() {
         return;
     }
-    visit(Place { point, normal: None, is_seen: true });
+    visit(Place { point, normal: None, is_seen: true, share: 1.0 });
     // One direction is given: no random numbers are drawn.
     Wanted { world, rng: Generator::new(0), visit }.beyond(&Ray::new(point, direction));
 }
@@ -262,29 +264,29 @@ struct Wanted<'a, M: ?Sized, S: ?Sized, F> {
 impl<M: Medium + ?Sized, S: Scene + ?Sized, F: FnMut(Place)> Wanted<'_, M, S, F> {
     fn beyond(&mut self, ray: &Ray) {
         if let Some(hit) = nearest_surface(ray, self.world.scene) {
-            self.on_surface(ray, &hit, false);
+            self.on_surface(ray, &hit, false, 1.0);
         }
     }
 
-    fn on_surface(&mut self, ray: &Ray, hit: &Hit, is_seen: bool) {
+    fn on_surface(&mut self, ray: &Ray, hit: &Hit, is_seen: bool, share: f32) {
         if let Surface::Lambert { reflectance } = hit.surface
             && !reflectance.is_black()
             && hit.normal.dot(ray.direction) < 0.0
         {
-            (self.visit)(Place { point: ray.at(hit.distance), normal: Some(hit.normal), is_seen });
+            (self.visit)(Place { point: ray.at(hit.distance), normal: Some(hit.normal), is_seen, share });
         }
     }
 }
 
 impl<M: Medium + ?Sized, S: Scene + ?Sized, F: FnMut(Place)> Sight for Wanted<'_, M, S, F> {
     fn scatter(&mut self, point: Vec3, _: Vec3, _: &Properties, _: Spectrum) {
-        (self.visit)(Place { point, normal: None, is_seen: true });
+        (self.visit)(Place { point, normal: None, is_seen: true, share: 1.0 });
         let direction = warp::uniform_sphere(uniform2(&mut self.rng));
         self.beyond(&Ray::new(point, direction));
     }
 
-    fn surface(&mut self, ray: &Ray, hit: &Hit, _: Spectrum) {
-        self.on_surface(ray, hit, true);
+    fn surface(&mut self, ray: &Ray, hit: &Hit, weight: Spectrum) {
+        self.on_surface(ray, hit, true, weight.mean().min(1.0));
         let point = ray.at(hit.distance);
         let direction = Frame::around(hit.normal).to_world(warp::cosine_hemisphere(uniform2(&mut self.rng)));
         let origin = leave(point, hit.normal, direction, hit.distance);
@@ -295,7 +297,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized, F: FnMut(Place)> Sight for Wanted<'_
 /// Radiance that arrives at the origin of `ray`, read from caches.
 ///
 /// Light of the lights but a sky is connected to at the points of the ray unless [`Caches::single`] is there: to
-/// lights within whose [`Light::steep_field`] it lies by an equiangular connection per segment.
+/// lights within whose [`Light::steep_field`](crate::light::Light::steep_field) it lies by an equiangular connection per segment.
 /// Where a cache has no record at a point, one sample of what it would hold takes its place, so that
 /// gaps make noise and no holes. `estimator` brings the world; its surface cache is what such
 /// samples use. The ray ends where less than 10⁻⁵ of the light behind would be seen, and what is behind is left out.
@@ -307,10 +309,10 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized, F: FnMut(Place)> Sight for Wanted<'_
 /// # use fogbow::world::World;
 /// # #[cfg(feature = "alloc")] {
 /// let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::ONE, Phase::ISOTROPIC)?;
-/// let world = World { medium: &fog, scene: &Empty, lights: &[] };
+/// let world = World { medium: &fog, scene: &Empty, lights: (&[]).into() };
 /// # let walk = multiple_scatter::Settings::new(Steps::Length(0.1));
 /// # let (paths, light_samples) = (path::Settings::default(), 1);
-/// # let estimator = Estimator { world, surfaces: None, scattered: None, walk, paths, light_samples, finest: 1e-3 };
+/// # let estimator = Estimator { world, surfaces: None, photons: None, walk, paths, light_samples, finest: 1e-3 };
 /// // One record says that light of 1 is scattered in from the lights, 50 m around.
 /// let mut cache: VolumeCache = Cache::growing(0);
 /// let record = Record { position: Vec3::ZERO, radius: 50.0, value: Spectrum::ONE, gradient: Gradient::ZERO };
@@ -343,10 +345,10 @@ pub fn radiance<M: Medium + ?Sized, S: Scene + ?Sized>(
 /// // A sky of 1, seen through a ball of fog two metres wide.
 /// let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::ONE, Phase::ISOTROPIC)?;
 /// let (ball, lights) = (Placed::new(fog, Region::sphere(Vec3::ZERO, 1.0)?), [Light::Constant(Spectrum::ONE)]);
-/// let world = World { medium: &ball, scene: &Empty, lights: &lights };
+/// let world = World { medium: &ball, scene: &Empty, lights: (&lights).into() };
 /// # let walk = multiple_scatter::Settings::new(Steps::Length(0.1));
 /// # let (paths, light_samples) = (path::Settings::default(), 1);
-/// # let estimator = Estimator { world, surfaces: None, scattered: None, walk, paths, light_samples, finest: 1e-3 };
+/// # let estimator = Estimator { world, surfaces: None, photons: None, walk, paths, light_samples, finest: 1e-3 };
 /// let settings = RaySettings { density: 8.0, connections: 1, lights_visible: true, indirect: true };
 /// let ray = Ray::new(-5.0 * Vec3::X, Vec3::X);
 /// let seen = radiance_beyond(&ray, &estimator, &Caches::default(), &settings, &mut Generator::new(1));
@@ -417,23 +419,16 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Gather<'_, M, S> {
             let x = self.light[i] + STEPS[i] * k as f32;
             (x - libm::floorf(x)).min(1.0 - f32::EPSILON)
         });
-        let weight = |light: &Light<'_>| {
-            let is_near = light.steep_field().is_some_and(|field| field.contains(point));
-            if is_near || (light.is_sky() && self.settings.indirect) { 0.0 } else { light.importance(point) }
-        };
+        let weight = FromPoint { point, except: Except::Steep, sky: !self.settings.indirect };
         let value = |to_light: Vec3| properties.phase.value(deflection(to_light, to_eye));
-        self.estimator.connected(point, |_| point, weight, value, (choice, Vec2::new(u, v)), &mut self.rng)
+        self.estimator.connected(&weight, |_| point, value, (choice, Vec2::new(u, v)), &mut self.rng)
     }
 
     /// Single scattering along a segment of one light within its near field.
-    fn near(&mut self, segment: &Ray, choice: f32, u: f32) -> Option<Spectrum> {
+    fn near(&mut self, segment: &Ray, lights: &Survey<'_, '_, FromRay>, choice: f32, u: f32) -> Option<Spectrum> {
         let world = &self.estimator.world;
-        let reached = world.lights.iter().filter_map(|light| {
-            light.steep_field()?;
-            let light = NearLight::of(light, segment, 0.0, segment.length)?;
-            Some((light.sent(segment), light))
-        });
-        let (light, chosen) = choose(reached, choice)?;
+        let chosen = lights.pick(choice)?;
+        let light = NearLight::of(&world.lights[chosen.index], segment, 0.0, segment.length)?;
         let joint = light.join(segment, u, uniform2(&mut self.rng))?;
         let properties = world.medium.properties(joint.point);
         if properties.scattering.is_black() {
@@ -482,10 +477,13 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Sight for Gather<'_, M, S> {
             return;
         }
         let count = self.settings.connections.max(1);
+        let sent = FromRay { ray: *segment, near: 0.0, far: segment.length, steep: true, until: None };
+        let lights = self.estimator.world.lights;
+        let lights = lights.survey(&sent);
         for k in 0..count {
             let choice = self.along[0] + STEPS[0] * k as f32;
             let u = (k as f32 + self.along[1]) / count as f32;
-            if let Some(light) = self.near(segment, choice - libm::floorf(choice), u) {
+            if let Some(light) = self.near(segment, &lights, choice - libm::floorf(choice), u) {
                 self.seen.medium_single += throughput * light / count as f32;
             }
         }

@@ -1,6 +1,6 @@
 //! Filling caches, as work in rounds.
 //!
-//! Eye rays (or points of a box) say where light is asked for. Where no record reaches, one is computed against the
+//! Eye rays (or points of a box) say where light is asked for. Photons light cells at which random walks end. Where no record reaches, one is computed against the
 //! frozen caches, many in a round; then they are inserted in order, and those left out that an earlier one of the same round
 //! covers. The order of kinds is that of [`STEPS`].
 //!
@@ -17,6 +17,7 @@ use super::guide::{Guide, Guided, Looks};
 use super::kind::{Kind, Pass, Places, STEPS, Step};
 use super::lookup::Reading;
 use super::memory::{Estimate, FilledRecords, FillingMemory};
+use super::photons::{CELLS_PER_JOB, PATHS_PER_JOB, PhotonEffort};
 use super::radius::clearance;
 use super::settings::{Effort, Settings};
 use super::slot::{Attached, ByKind, Inserted, learnt_near};
@@ -41,6 +42,9 @@ const LAST_BATCH: u32 = 4096;
 /// Eye rays of one job. More: jobs take longer than some milliseconds in dense worlds.
 const RAYS_PER_JOB: u32 = 16;
 
+/// Photons of the first round of them.
+const FIRST_PHOTONS: u32 = 4096;
+
 /// Places that one job looks up.
 pub(super) const PLACES_PER_JOB: u32 = 1024;
 
@@ -64,6 +68,9 @@ const FEW: usize = 64;
 /// Samples of any estimate at least.
 const LEAST_SAMPLES: u32 = 16;
 
+/// Share of the samples of a surface record that is hardly seen at all. Less: it is too noisy to tell how far it reaches.
+const LEAST_SEEN: f32 = 0.0625;
+
 /// Records that reach less far than usual take a share of the samples down to this.
 const LEAST_SHARE: f32 = 0.25;
 
@@ -72,6 +79,10 @@ const LEAST_SHARE: f32 = 0.25;
 enum Round {
     /// Follow eye rays.
     Search,
+    /// Shoot photons, so many up to a number.
+    Shoot,
+    /// Which cells do surfaces cut?
+    Divide,
     /// Look which places of a batch have no record.
     Look,
     /// Estimates for new records.
@@ -92,7 +103,7 @@ enum Round {
 /// # use fogbow::{host::Empty, math::{Bounds, Ray, Vec3}, medium::Homogeneous, phase::Phase, spectrum::Spectrum};
 /// # use fogbow::{work::step, world::{Outline, World}};
 /// # let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::ONE, Phase::ISOTROPIC)?;
-/// # let world = World { medium: &fog, scene: &Empty, lights: &[] };
+/// # let world = World { medium: &fog, scene: &Empty, lights: (&[]).into() };
 /// # let bounds = Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE };
 /// # let settings = Settings { rays: 20, ..Settings::for_outline(&Outline::of(&world, bounds), 0.02).with_walks(16) };
 /// # let asked = Asked::<fn([f32; 2]) -> Ray>::Box(bounds);
@@ -130,6 +141,8 @@ pub struct Filling<'s, F> {
     before: ByKind<usize>,
     /// All records computed, by kind.
     all_computed: ByKind<u64>,
+    /// Photons before this round.
+    photons_before: u32,
     is_cut: bool,
 }
 
@@ -152,7 +165,7 @@ impl<'s> RadianceCaches<'s> {
     /// # use fogbow::{host::Empty, math::{Bounds, Ray, Vec3}, medium::Homogeneous, phase::Phase, spectrum::Spectrum};
     /// # use fogbow::{work, world::{Outline, World}};
     /// # let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::ONE, Phase::ISOTROPIC)?;
-    /// # let world = World { medium: &fog, scene: &Empty, lights: &[] };
+    /// # let world = World { medium: &fog, scene: &Empty, lights: (&[]).into() };
     /// # let bounds = Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE };
     /// # let settings = Settings { rays: 20, ..Settings::for_outline(&Outline::of(&world, bounds), 0.02).with_walks(16) };
     /// # let asked = || Asked::<fn([f32; 2]) -> Ray>::Box(bounds);
@@ -194,6 +207,7 @@ impl<'s> RadianceCaches<'s> {
             usual: 0.0,
             before,
             all_computed: ByKind([0; Kind::COUNT]),
+            photons_before: 0,
             is_cut,
         }
     }
@@ -213,9 +227,10 @@ fn usual_radius(records: &[Record]) -> f32 {
 /// Samples for a record that reaches `radius` (m): what reaches less far than `usual` lights fewer pixels. If one sample is
 /// as noisy everywhere, the noise of a picture whose records light areas `R²` is least, for a given sum of samples, where
 /// these go as `R`. No fewer than a quarter, because dark corners are where that is not so.
-fn samples(effort: &Effort, radius: f32, usual: f32) -> u32 {
+/// Of what is seen through fog or in mirrors a share is as good as all of it.
+fn samples(effort: &Effort, radius: f32, usual: f32, seen: f32) -> u32 {
     let share = if radius < usual { (radius / usual).max(LEAST_SHARE) } else { 1.0 };
-    ((effort.samples as f32 * share) as u32).max(LEAST_SAMPLES)
+    ((effort.samples as f32 * share * seen) as u32).max(LEAST_SAMPLES)
 }
 
 impl<'s, F> Filling<'s, F> {
@@ -278,17 +293,13 @@ impl<'s, F> Filling<'s, F> {
         Some(Reading { margin: self.settings().margin, ..self.settings().reading(kind)? })
     }
 
-    /// The world lit by what a step is lit by.
-    fn estimator<'a, M: ?Sized, S: ?Sized>(&'a self, world: &World<'a, M, S>, step: Step) -> Estimator<'a, M, S> {
-        let scattered = step.ends_at.and_then(|multiple| {
-            let (surface, multiple) = (self.caches.volume(Kind::Surface)?, self.caches.volume(multiple)?);
-            Some([(surface.cache, surface.reading), (multiple.cache, multiple.reading)])
-        });
+    /// The world lit by coarse irradiance and photons.
+    fn estimator<'a, M: ?Sized, S: ?Sized>(&'a self, world: &World<'a, M, S>) -> Estimator<'a, M, S> {
         let settings = self.settings();
         Estimator {
             world: *world,
             surfaces: self.caches.surface(Kind::CoarseIrradiance).map(|reader| (reader.cache, reader.reading)),
-            scattered,
+            photons: Some(&self.memory.photons),
             walk: settings.walk,
             paths: settings.paths,
             light_samples: settings.light_samples,
@@ -358,9 +369,11 @@ impl<'s, F> Filling<'s, F> {
         let number = self.first.wrapping_add(self.computed + u64::from(job));
         let row = step.kind.row();
         let is_first = row.is_ground && self.first == 0 && number < FIRST.0;
-        let count = samples(&effort, limits.max, self.usual) * if is_first { FIRST.1 } else { 1 };
+        let seen = if step.kind == Kind::Irradiance { place.share.max(LEAST_SEEN) } else { 1.0 };
+        let count = samples(&effort, limits.max, self.usual, seen) * if is_first { FIRST.1 } else { 1 };
         let mut rng = Generator::new(mix(settings.seed ^ mix(row.stream + 1)) ^ number);
         let mut estimate = Estimate { job, place, limits, effort: 1.0, ..Estimate::default() };
+        estimate.learnt.seen = seen;
         let looks = Looks { count, guide: None, learnt: None };
         let is_made = self.estimate(step, world, looks, &mut estimate, &mut rng, output);
         output.estimate = is_made.then_some(estimate);
@@ -381,7 +394,8 @@ impl<'s, F> Filling<'s, F> {
         let around = learnt_near(slot, self.memory.guides[step.kind].as_slice(), self.before[step.kind], place.point);
         let guide = Guided::new(&around);
         let more = (around.relative_variance() / row.spread).clamp(1.0, MOST_SAMPLES);
-        let count = (samples(&effort, radius, self.usual) as f32 * more) as u32;
+        let seen = self.memory.guides[step.kind].as_slice().get(job as usize).map_or(1.0, |guide| guide.seen);
+        let count = (samples(&effort, radius, self.usual, seen) as f32 * more) as u32;
         let mut rng = Generator::new(mix(self.settings().seed ^ mix(stream + 16)) ^ number as u64);
         let mut estimate = Estimate { job, place, effort: more, ..Estimate::default() };
         let looks = Looks { count, guide: guide.as_ref(), learnt: None };
@@ -399,7 +413,7 @@ impl<'s, F> Filling<'s, F> {
         rng: &mut Generator,
         output: &mut FilledRecords<'_>,
     ) -> bool {
-        let estimator = self.estimator(world, step);
+        let estimator = self.estimator(world);
         let looks = Looks { learnt: Some(&mut estimate.learnt), ..looks };
         let point = estimate.place.point;
         if step.kind.is_on_surfaces() {
@@ -434,9 +448,7 @@ impl<'s, F> Filling<'s, F> {
         if effort.free_paths < f32::INFINITY {
             let properties = world.medium.properties(place.point);
             let straight = match kind {
-                Kind::Multiple | Kind::CoarseMultiple => {
-                    properties.phase.mean_cosine().map(|g| float::safe_sqrt(1.0 - g))
-                }
+                Kind::Multiple => properties.phase.mean_cosine().map(|g| float::safe_sqrt(1.0 - g)),
                 _ => Spectrum::ONE,
             };
             reach = reach.min(effort.free_paths / (properties.extinction() * straight).max_element());
@@ -451,10 +463,19 @@ impl<'s, F> Filling<'s, F> {
                 let is_settled = !self.caches.is_open();
                 if self.memory.wanted.is_empty() && is_settled {
                     self.complete();
+                } else if let Some(effort) = self.settings().photons {
+                    self.is_cut |= self.memory.photons.reset(&effort).is_err();
+                    self.shoot_more(&effort);
                 } else {
                     self.begin(0);
                 }
             }
+            Round::Shoot => {
+                if let Some(effort) = self.settings().photons {
+                    self.shoot_more(&effort);
+                }
+            }
+            Round::Divide => self.begin(0),
             Round::Look => {
                 core::mem::swap(&mut self.memory.open, &mut self.memory.still_open);
                 if !self.choose() {
@@ -473,6 +494,58 @@ impl<'s, F> Filling<'s, F> {
                 self.begin(self.step + 1);
             }
             Round::Done => {}
+        }
+    }
+
+    /// The next round of photons, as large as all before it, or after the last what follows.
+    fn shoot_more(&mut self, effort: &PhotonEffort) {
+        let (paths, flights) = (self.memory.photons.paths(), self.memory.photons.flights());
+        let mut more = if paths == 0 { FIRST_PHOTONS.min(effort.paths) } else { paths.min(effort.paths - paths) };
+        if paths > 0 {
+            let left = effort.flights.saturating_sub(flights) as f64 * f64::from(paths) / flights.max(1) as f64;
+            more = more.min(left as u32);
+        }
+        if self.memory.photons.is_known(effort.enough) {
+            more = 0;
+        }
+        let jobs = more / PATHS_PER_JOB;
+        self.photons_before = paths;
+        if jobs > 0 {
+            self.enter(Round::Shoot, jobs);
+        } else {
+            self.enter(Round::Divide, (self.memory.photons.len() as u32).div_ceil(CELLS_PER_JOB).max(1));
+        }
+    }
+
+    fn shoot<M: Medium + ?Sized, S: Scene + ?Sized>(
+        &self,
+        job: u32,
+        world: &World<'_, M, S>,
+        output: &mut FilledRecords<'_>,
+    ) {
+        let (photons, settings) = (&self.memory.photons, self.settings());
+        let Some(effort) = &settings.photons else { return };
+        for path in 0..PATHS_PER_JOB {
+            let path = self.photons_before + job * PATHS_PER_JOB + path;
+            match photons.shoot(path, world, (effort, &settings.paths, settings.seed), &mut output.deposits) {
+                Ok(flights) => output.flights += u64::from(flights),
+                Err(_) => output.is_cut = true,
+            }
+            output.paths += 1;
+        }
+    }
+
+    fn divide<M: Medium + ?Sized, S: Scene + ?Sized>(
+        &self,
+        job: u32,
+        world: &World<'_, M, S>,
+        output: &mut FilledRecords<'_>,
+    ) {
+        let cells = self.memory.photons.len() as u32;
+        for cell in job * CELLS_PER_JOB..((job + 1) * CELLS_PER_JOB).min(cells) {
+            if self.memory.photons.is_whole(cell, world.scene) {
+                output.is_cut |= output.open.push(cell).is_err();
+            }
         }
     }
 
@@ -682,9 +755,13 @@ where
         output.wanted.clear();
         output.open.clear();
         output.higher.clear();
+        output.deposits.clear();
+        (output.paths, output.flights) = (0, 0);
         (output.estimate, output.is_cut) = (None, false);
         match self.round {
             Round::Search => self.search(job, world, output),
+            Round::Shoot => self.shoot(job, world, output),
+            Round::Divide => self.divide(job, world, output),
             Round::Look => self.look(job, output),
             Round::Make => self.make(job, world, output),
             Round::Again { from } => self.again(from, job, world, output),
@@ -697,8 +774,14 @@ where
             return;
         }
         let memory = &mut self.memory;
+        if self.round == Round::Divide {
+            memory.photons.mark(output.open.as_slice());
+        }
+        memory.photons.accept(output.deposits.as_slice(), output.paths, output.flights);
         let mut kept = memory.wanted.extend_from_slice(output.wanted.as_slice());
-        kept = kept.and(memory.still_open.extend_from_slice(output.open.as_slice()));
+        if self.round == Round::Look {
+            kept = kept.and(memory.still_open.extend_from_slice(output.open.as_slice()));
+        }
         if let Some(estimate) = output.estimate {
             // Both or none, so that the coefficients of the others stay where they are looked for.
             kept = kept.and(if memory.higher.room() < output.higher.len() {
@@ -717,11 +800,12 @@ where
     fn stage(&self) -> &'static str {
         match self.round {
             Round::Search => "fill search",
+            Round::Shoot | Round::Divide => "fill photons",
             Round::Done => "",
             Round::Look | Round::Make | Round::Again { .. } => match STEPS[self.step].kind {
                 Kind::Single => "fill single",
                 Kind::Surface => "fill surface",
-                Kind::Multiple | Kind::CoarseMultiple => "fill multiple",
+                Kind::Multiple => "fill multiple",
                 Kind::Irradiance | Kind::CoarseIrradiance => "fill irradiance",
             },
         }

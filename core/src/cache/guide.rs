@@ -25,11 +25,13 @@ pub struct Guide {
     sum_of_squares: f32,
     /// How many estimates have been summed, weighted.
     weight: f32,
+    /// [`Place::share`](super::Place::share) of the record.
+    pub(super) seen: f32,
 }
 
 impl Default for Guide {
     fn default() -> Self {
-        Self { squares: [0.0; CELLS], sum: 0.0, sum_of_squares: 0.0, weight: 0.0 }
+        Self { squares: [0.0; CELLS], sum: 0.0, sum_of_squares: 0.0, weight: 0.0, seen: 1.0 }
     }
 }
 

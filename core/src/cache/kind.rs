@@ -12,19 +12,17 @@ pub enum Kind {
     Multiple,
     /// Indirect irradiance on surfaces that eye rays see.
     Irradiance,
-    /// Light scattered more than once, coarsely: where the walks of [`Kind::Multiple`] end.
-    CoarseMultiple,
     /// Indirect irradiance on all surfaces, coarsely: lights all other kinds.
     CoarseIrradiance,
 }
 
 impl Kind {
     /// How many there are.
-    pub const COUNT: usize = 6;
+    pub const COUNT: usize = 5;
 
     /// All, in the order of their numbers.
     pub const ALL: [Self; Self::COUNT] =
-        [Self::Single, Self::Surface, Self::Multiple, Self::Irradiance, Self::CoarseMultiple, Self::CoarseIrradiance];
+        [Self::Single, Self::Surface, Self::Multiple, Self::Irradiance, Self::CoarseIrradiance];
 
     /// Those that pictures are made from; the others serve their making.
     pub const FINAL: [Self; 4] = [Self::Single, Self::Surface, Self::Multiple, Self::Irradiance];
@@ -33,7 +31,7 @@ impl Kind {
     ///
     /// ```
     /// # use fogbow::cache::Kind;
-    /// assert_eq!(Kind::CoarseMultiple.name(), "coarse multiple");
+    /// assert_eq!(Kind::CoarseIrradiance.name(), "coarse irradiance");
     /// ```
     #[must_use]
     pub const fn name(self) -> &'static str {
@@ -88,7 +86,6 @@ const TABLE: [Row; Kind::COUNT] = {
         Row { name: "surface", places: InMedium, stream: 1, spread: 3.0, is_ground: false },
         Row { name: "multiple", places: InMedium, stream: 2, spread: 12.0, is_ground: false },
         Row { name: "irradiance", places: InSight, stream: 3, spread: 6.0, is_ground: false },
-        Row { name: "coarse multiple", places: InMedium, stream: 5, spread: 12.0, is_ground: true },
         Row { name: "coarse irradiance", places: OnSurfaces, stream: 4, spread: 6.0, is_ground: true },
     ]
 };
@@ -103,43 +100,36 @@ pub(super) enum Pass {
     Again { stream: u64, share: f32 },
 }
 
-/// One step of a fill.
+/// One step of a fill. All steps are lit by photons and by coarse irradiance.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Step {
     pub(super) kind: Kind,
     pub(super) pass: Pass,
-    /// Multiple scattering, beside light of surfaces, that walks end at; `None`: whole walks. All steps are lit by coarse irradiance.
-    pub(super) ends_at: Option<Kind>,
 }
 
 /// Share of the second estimate in a final record. The first, from which the radius comes, had to draw its samples
 /// blindly: larger, and it is wasted; smaller, and its noise, which has a say in the radius, makes light too dark.
 const SECOND: f32 = 0.67;
 
-/// Steps in their order: first coarse records, made of whole walks; these estimated anew, twice, each from what was revised before
-/// it, so that one far too bright does not stay in the others; then the final ones, whose walks have one segment.
-pub(super) const STEPS: [Step; 14] = {
-    use Kind::{CoarseIrradiance, CoarseMultiple, Irradiance, Multiple, Single, Surface};
-    const fn make(kind: Kind, ends_at: Option<Kind>) -> Step {
-        Step { kind, pass: Pass::Make, ends_at }
+/// Steps in their order: first coarse irradiance, by which surfaces light everything else, and once more, from what it was revised to;
+/// then the final kinds, none of which needs another.
+pub(super) const STEPS: [Step; 9] = {
+    use Kind::{CoarseIrradiance, Irradiance, Multiple, Single, Surface};
+    const fn make(kind: Kind) -> Step {
+        Step { kind, pass: Pass::Make }
     }
-    const fn again(kind: Kind, stream: u64, share: f32, ends_at: Kind) -> Step {
-        Step { kind, pass: Pass::Again { stream, share }, ends_at: Some(ends_at) }
+    const fn again(kind: Kind, stream: u64, share: f32) -> Step {
+        Step { kind, pass: Pass::Again { stream, share } }
     }
     [
-        make(CoarseIrradiance, None),
-        make(Surface, None),
-        make(CoarseMultiple, None),
-        again(CoarseIrradiance, 0, 1.0, CoarseMultiple),
-        again(Surface, 1, 1.0, CoarseMultiple),
-        again(CoarseMultiple, 2, 1.0, CoarseMultiple),
-        again(CoarseIrradiance, 3, 1.0, CoarseMultiple),
-        again(Surface, 4, 1.0, CoarseMultiple),
-        again(CoarseMultiple, 5, 1.0, CoarseMultiple),
-        make(Single, None),
-        make(Multiple, Some(CoarseMultiple)),
-        again(Multiple, 100, SECOND, Multiple),
-        make(Irradiance, Some(Multiple)),
-        again(Irradiance, 101, SECOND, Multiple),
+        make(CoarseIrradiance),
+        again(CoarseIrradiance, 0, 1.0),
+        make(Surface),
+        again(Surface, 1, SECOND),
+        make(Single),
+        make(Multiple),
+        again(Multiple, 100, SECOND),
+        make(Irradiance),
+        again(Irradiance, 101, SECOND),
     ]
 };

@@ -128,6 +128,18 @@ impl TurningBasis {
         Self { basis, slopes }
     }
 
+    /// The value of a function of the basis, and how it changes as the direction turns.
+    #[inline]
+    pub(super) fn value(&self, k: usize) -> f32 {
+        self.basis.values[k]
+    }
+
+    /// See [`TurningBasis::value`].
+    #[inline]
+    pub(super) fn slope(&self, k: usize) -> Vec3 {
+        self.slopes[k]
+    }
+
     /// How an expansion changes as the direction turns.
     fn turned(&self, higher: &[Spectrum]) -> Gradient {
         let slopes = self.slopes.get(1..self.basis.count).unwrap_or(&[]);

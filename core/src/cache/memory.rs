@@ -3,6 +3,7 @@
 use super::asked::Wanted;
 use super::eye::Place;
 use super::guide::Guide;
+use super::photons::{PhotonDeposit, PhotonGrid};
 use super::radius::Limits;
 use super::record::Facing;
 use super::room::Slots;
@@ -33,36 +34,54 @@ pub struct FilledRecords<'o> {
     pub(super) open: List<'o, u32>,
     pub(super) estimate: Option<Estimate>,
     pub(super) higher: List<'o, Coefficient>,
+    pub(super) deposits: List<'o, PhotonDeposit>,
+    pub(super) paths: u32,
+    pub(super) flights: u64,
     pub(super) is_cut: bool,
 }
 
 impl<'o> FilledRecords<'o> {
     /// In lent memory: for the places that a job finds, the numbers of those it looks up, and the coefficients of the estimate it
-    /// makes. [`room_for`](super::room_for) says how many; where that is too small, [`Filling::is_cut`](super::Filling::is_cut) says so.
+    /// makes, and for what its photons leave. [`room_for`](super::room_for) says how many; where that is too small, [`Filling::is_cut`](super::Filling::is_cut) says so.
     ///
     /// ```
     /// # #[cfg(feature = "alloc")] {
-    /// # use fogbow::cache::{Asked, FilledRecords, RadianceCaches, Settings, Wanted, room_for};
+    /// # use fogbow::cache::{Asked, PhotonDeposit, FilledRecords, RadianceCaches, Settings, Wanted, room_for};
     /// # use fogbow::sh::Coefficient;
     /// # use fogbow::{host::Empty, math::{Bounds, Ray, Vec3}, medium::Homogeneous, phase::Phase, spectrum::Spectrum};
     /// # use fogbow::{work, world::{Outline, World}};
     /// # let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::ONE, Phase::ISOTROPIC)?;
-    /// # let world = World { medium: &fog, scene: &Empty, lights: &[] };
+    /// # let world = World { medium: &fog, scene: &Empty, lights: (&[]).into() };
     /// # let bounds = Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE };
     /// # let settings = Settings { rays: 20, ..Settings::for_outline(&Outline::of(&world, bounds), 0.02).with_walks(16) };
     /// # let asked = || Asked::<fn([f32; 2]) -> Ray>::Box(bounds);
     /// let room = room_for(&settings, 2000, 100);
     /// let (mut wanted, mut open) = (vec![Wanted::default(); room.of_job_wanted], vec![0; room.of_job_open]);
     /// let mut higher = vec![Coefficient::ZERO; room.of_job_higher];
+    /// let mut deposits = vec![PhotonDeposit::default(); room.of_job_deposits];
     /// let mut filling = RadianceCaches::new(settings).fill(asked());
-    /// work::finish(&mut filling, &world, &mut FilledRecords::lent(&mut wanted, &mut open, &mut higher));
+    /// work::finish(&mut filling, &world, &mut FilledRecords::lent(&mut wanted, &mut open, &mut higher, &mut deposits));
     /// assert!(!filling.is_cut());
     /// # }
     /// # Ok::<(), Box<dyn core::error::Error>>(())
     /// ```
     #[must_use]
-    pub fn lent(wanted: &'o mut [Wanted], open: &'o mut [u32], higher: &'o mut [Coefficient]) -> Self {
-        Self { wanted: wanted.into(), open: open.into(), estimate: None, higher: higher.into(), is_cut: false }
+    pub fn lent(
+        wanted: &'o mut [Wanted],
+        open: &'o mut [u32],
+        higher: &'o mut [Coefficient],
+        deposits: &'o mut [PhotonDeposit],
+    ) -> Self {
+        Self {
+            wanted: wanted.into(),
+            open: open.into(),
+            estimate: None,
+            higher: higher.into(),
+            deposits: deposits.into(),
+            paths: 0,
+            flights: 0,
+            is_cut: false,
+        }
     }
 }
 
@@ -80,6 +99,7 @@ pub struct FillingMemory<'s> {
     pub(super) higher: List<'s, Coefficient>,
     /// What the records of this fill have learnt, kind by kind.
     pub(super) guides: ByKind<List<'s, Guide>>,
+    pub(super) photons: PhotonGrid<'s>,
 }
 
 impl<'s> FillingMemory<'s> {
@@ -87,12 +107,12 @@ impl<'s> FillingMemory<'s> {
     ///
     /// ```
     /// # #[cfg(feature = "alloc")] {
-    /// # use fogbow::cache::{Asked, Estimate, FilledRecords, FillingMemory, Guide, RadianceCaches, Settings, Slots, Wanted, room_for};
+    /// # use fogbow::cache::{Asked, Estimate, FilledRecords, FillingMemory, Guide, PhotonCell, RadianceCaches, Settings, Slots, Wanted, room_for};
     /// # use fogbow::sh::Coefficient;
     /// # use fogbow::{host::Empty, math::{Bounds, Ray, Vec3}, medium::Homogeneous, phase::Phase, spectrum::Spectrum};
     /// # use fogbow::{work, world::{Outline, World}};
     /// # let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::ONE, Phase::ISOTROPIC)?;
-    /// # let world = World { medium: &fog, scene: &Empty, lights: &[] };
+    /// # let world = World { medium: &fog, scene: &Empty, lights: (&[]).into() };
     /// # let bounds = Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE };
     /// # let settings = Settings { rays: 20, ..Settings::for_outline(&Outline::of(&world, bounds), 0.02).with_walks(16) };
     /// # let asked = || Asked::<fn([f32; 2]) -> Ray>::Box(bounds);
@@ -101,6 +121,7 @@ impl<'s> FillingMemory<'s> {
     /// let [mut open, mut still_open] = [(); 2].map(|()| vec![0; room.open]);
     /// let mut chosen = vec![(0, 0.0); room.chosen];
     /// let (mut estimates, mut higher) = (vec![Estimate::default(); room.estimates], vec![Coefficient::ZERO; room.higher]);
+    /// let mut photons = vec![PhotonCell::default(); room.photons];
     /// let mut guides = room.guides.map(|count| vec![Guide::default(); count]);
     /// let memory = FillingMemory::lent(Slots {
     ///     wanted: &mut wanted,
@@ -108,6 +129,7 @@ impl<'s> FillingMemory<'s> {
     ///     chosen: &mut chosen,
     ///     estimates: &mut estimates,
     ///     higher: &mut higher,
+    ///     photons: &mut photons,
     ///     guides: guides.each_mut().map(|guides| &mut guides[..]),
     /// });
     /// let mut filling = RadianceCaches::new(settings).fill_in(memory, asked());
@@ -127,6 +149,7 @@ impl<'s> FillingMemory<'s> {
             estimates: slots.estimates.into(),
             higher: slots.higher.into(),
             guides: ByKind(slots.guides.map(List::from)),
+            photons: PhotonGrid::new(slots.photons.into()),
         }
     }
 

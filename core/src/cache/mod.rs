@@ -9,8 +9,8 @@
 //! Every part has a cache of its own ([`Kind`]) with its own tolerance and effort. [`RadianceCaches`] holds them all:
 //!
 //! 1. [`Settings::for_outline`] says how fine each is in this world;
-//! 2. [`RadianceCaches::fill`] is work in rounds ([`crate::work`]): [`places`] along eye rays or in a box, and where no record
-//!    reaches, one from an [`Estimator`] against the frozen caches;
+//! 2. [`RadianceCaches::fill`] is work in rounds ([`crate::work`]): [`places`] along eye rays or in a box, photons that light a
+//!    [`PhotonGrid`], and where no record reaches, one from an [`Estimator`], whose walks end in that grid;
 //! 3. [`Filling::finish`] gives the caches, to be read: [`RadianceCaches::radiance`] of an eye ray,
 //!    [`RadianceCaches::in_scattered_sh`] of a probe.
 //!
@@ -22,6 +22,7 @@
 //! | `asked` | [`Asked`]: where light is asked for |
 //! | `fill` | [`Filling`]: which places get records, rounds of new ones, better estimates for old ones |
 //! | `memory` | [`FillingMemory`], [`FilledRecords`]: what a fill remembers, and what its jobs leave |
+//! | `photons` | [`PhotonEffort`]: light in cells, brought by photons, at which walks end |
 //! | `slot` | a cache of either sort, as filling needs it |
 //! | `readers` | probes, fluence, irradiance, in-scattered light; many at a time |
 //! | `set_bytes` | all caches as bytes |
@@ -55,6 +56,7 @@ mod index;
 mod kind;
 mod lookup;
 mod memory;
+mod photons;
 mod presets;
 mod radius;
 mod readers;
@@ -77,6 +79,7 @@ pub use index::{Block, Index, IndexNode};
 pub use kind::Kind;
 pub use lookup::{Basis, Reading, TURNING_DEGREE, TurningBasis};
 pub use memory::{Estimate, FilledRecords, FillingMemory};
+pub use photons::{PhotonCell, PhotonDeposit, PhotonEffort, PhotonGrid};
 pub use presets::{ERROR_BOUNDS, MOST_SAMPLES, USUAL_ERROR};
 pub use radius::{Limits, clamp_gradient, clearance, log_gradient_radius, neighbour_clamped, valid_radius};
 pub use readers::ScatteredLight;

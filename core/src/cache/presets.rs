@@ -1,6 +1,7 @@
 //! Every tuned number of radiance caching, from an outline of the world.
 
 use super::kind::Kind;
+use super::photons::PhotonEffort;
 use super::radius::Limits;
 use super::settings::{Effort, LEAST_RAYS, MOST_RAYS, Settings};
 use crate::math::float;
@@ -12,7 +13,14 @@ use crate::world::Outline;
 
 /// Random walks of each of the two estimates of a record of multiple scattering. The error that noise leaves in a picture falls with the
 /// root of it, and time goes with it.
-pub(super) const WALKS: u32 = 2048;
+pub(super) const WALKS: u32 = 512;
+
+/// One less the mean cosine from which on records of multiple scattering take more walks, in inverse proportion to it, and how many times
+/// as many at most: sharp phase functions make walks differ more. Fewer: wild records; more: time.
+const SHARP: f64 = 0.4;
+
+/// See [`SHARP`].
+const MOST_WALKS: u32 = 4;
 
 /// Directions of the other kinds, as a share of [`WALKS`]. Light of surfaces varies least from direction to direction; of single
 /// scattering only lights with extent need any.
@@ -43,10 +51,25 @@ const LEAST_REACH: f32 = 1e-3;
 const CLEARANCES: [f32; 2] = [0.3, 1.0];
 
 /// Greatest radius in free paths, of light of surfaces and of multiple scattering: see [`Effort::free_paths`]. Light of a wall falls off
-/// within one free path. Records that reach farther than walks do between two scatterings are lit by themselves for the most part, and
-/// `n` scatterings make `n` times their error: in fog of 25 free paths across, radii of 1.3 free paths leave pictures 17 % too
-/// dark, of 0.6 about 3 %.
-const FREE_PATHS: [f32; 2] = [0.7, 0.6];
+/// within one free path, and so does the light of the outermost layer of fog. Larger: borders of fog blur; smaller: records, by the cube.
+const FREE_PATHS: [f32; 2] = [0.7, 1.3];
+
+/// Cells of light for each free path along the longest side of the bounds, and the least and the most of them: memory goes by the cube. More:
+/// noise in each; fewer: light near lamps and in the outermost layer of fog is blurred.
+const CELLS_PER_FREE_PATH: f32 = 2.0;
+
+/// See [`CELLS_PER_FREE_PATH`].
+const CELLS: [u32; 2] = [32, 64];
+
+/// Photons, and their flights, at most; in fog that hardly absorbs, photons fly for long. More: time; fewer: dark parts of a picture
+/// are too bright or too dark as a whole, for their cells see the same few photons.
+const PHOTONS: u32 = 1 << 20;
+
+/// See [`PHOTONS`].
+const FLIGHTS: f64 = 3e7;
+
+/// Photons that know the light of a cell: 9 % of noise, of which a walk meets a mean over many cells.
+const ENOUGH: u32 = 128;
 
 /// Most vertices of a walk. More: nothing, as roulette ends walks long before; fewer: dense fog that hardly absorbs turns out too dark.
 const VERTICES: u32 = 4096;
@@ -92,7 +115,7 @@ impl Settings {
     /// # use fogbow::{medium::Homogeneous, phase::Lobe, spectrum::Spectrum, world::{Outline, World}};
     /// let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::ONE, Lobe::HenyeyGreenstein { g: 0.6 })?;
     /// let lamps = [Light::Point(PointLight::new(Vec3::Z, Spectrum::ONE)?)];
-    /// let world = World { medium: &fog, scene: &Empty, lights: &lamps };
+    /// let world = World { medium: &fog, scene: &Empty, lights: (&lamps).into() };
     /// let bounds = Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE };
     /// let settings = Settings::for_outline(&Outline::of(&world, bounds), 0.02);
     /// // One lamp is connected to; the sharper fog scatters, the finer are records of light scattered often.
@@ -113,6 +136,8 @@ impl Settings {
         let phase = &outline.phase;
         let sharpness = f64::from(phase.mean_cosine().map(f32::abs).max_element());
         let breadth = (1.0 - sharpness).clamp(BREADTH[0], BREADTH[1]) as f32;
+        let sharper = (SHARP / (1.0 - sharpness)).clamp(1.0, f64::from(MOST_WALKS));
+        let sharper_walks = (f64::from(walks) * sharper) as u32;
         let free_paths = |kind| match kind {
             Kind::Surface => FREE_PATHS[0] * coarser.min(1.0),
             // What comes back with every scattering cannot be made up for.
@@ -121,7 +146,7 @@ impl Settings {
         };
         let effort = |kind: Kind, tolerance: f32, degree: usize, most: f32, clearance: f32| Effort {
             tolerance: tolerance * coarser,
-            samples: samples(kind, walks),
+            samples: samples(kind, if kind == Kind::Multiple { sharper_walks } else { walks }),
             degree,
             limits: Limits { min: LEAST_REACH * size, max: most * size },
             clearance,
@@ -133,6 +158,7 @@ impl Settings {
             surface: Some(effort(Kind::Surface, TOLERANCES[1], degree(1, SURFACE_FALL_OFF), REACHES[1], CLEARANCES[1])),
             multiple: Some(effort(Kind::Multiple, breadth, degree(2, 0.0), multiple_reach, f32::INFINITY)),
             irradiance: Some(effort(Kind::Irradiance, TOLERANCES[2], 0, REACHES[0], CLEARANCES[0])),
+            photons: Some(photons(outline, scale)),
             walk: multiple_scatter::Settings {
                 one_light: outline.lights.all > 1,
                 lengths: Lengths::Marched,
@@ -150,7 +176,7 @@ impl Settings {
     ///
     /// ```
     /// # use fogbow::{cache::Settings, host::Empty, math::{Bounds, Vec3}, world::{Outline, World}};
-    /// # let world = World { medium: &Empty, scene: &Empty, lights: &[] };
+    /// # let world = World { medium: &Empty, scene: &Empty, lights: (&[]).into() };
     /// # let outline = Outline::of(&world, Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE });
     /// let settings = Settings::for_outline(&outline, 0.02);
     /// assert!(settings.single.is_none() && settings.with_single_cached(&outline).single.is_some());
@@ -198,8 +224,23 @@ impl Settings {
             Kind::Surface => self.surface.as_mut(),
             Kind::Multiple => self.multiple.as_mut(),
             Kind::Irradiance => self.irradiance.as_mut(),
-            Kind::CoarseMultiple | Kind::CoarseIrradiance => None,
+            Kind::CoarseIrradiance => None,
         }
+    }
+}
+
+/// The photons of a world, for so many times the usual error.
+fn photons(outline: &Outline, scale: f32) -> PhotonEffort {
+    let thickness = outline.bounds.size().max_element() * outline.extinction;
+    // Casts saturate, and take NaN to 0.
+    let cells = ((CELLS_PER_FREE_PATH * thickness) as u32).clamp(CELLS[0], CELLS[1]);
+    let finer = f64::from(1.0 / (scale * scale));
+    PhotonEffort {
+        bounds: outline.bounds,
+        cells,
+        paths: (f64::from(PHOTONS) * finer) as u32,
+        flights: (FLIGHTS * finer) as u64,
+        enough: (f64::from(ENOUGH) * finer) as u32,
     }
 }
 

@@ -3,6 +3,7 @@
 use super::fill::{PLACES_OF_JOB, PLACES_PER_JOB};
 use super::guide::Guide;
 use super::kind::Kind;
+use super::photons::{DEPOSITS_OF_JOB, PhotonCell};
 use super::record::MAX_STRIDE;
 use super::settings::Settings;
 use super::{Estimate, SurfaceCache, VolumeCache, Wanted};
@@ -31,6 +32,10 @@ pub struct Room {
     pub of_job_open: usize,
     /// Coefficients of the estimate that a job makes: the third.
     pub of_job_higher: usize,
+    /// What the photons of a job leave: the fourth. In fog so dense that they leave more, the rest is lost.
+    pub of_job_deposits: usize,
+    /// [`Slots::photons`].
+    pub photons: usize,
 }
 
 /// Room for `records` of every kind that the settings use, made of `places` where light is asked for. Crowds of records within crowds may
@@ -66,6 +71,9 @@ pub fn room_for(settings: &Settings, places: usize, records: usize) -> Room {
     room.of_job_wanted = places.min(PLACES_OF_JOB);
     room.of_job_open = places.min(PLACES_PER_JOB as usize);
     room.of_job_higher = stride;
+    if let Some(effort) = &settings.photons {
+        (room.photons, room.of_job_deposits) = (effort.room(), DEPOSITS_OF_JOB);
+    }
     room
 }
 
@@ -99,4 +107,6 @@ pub struct Slots<'s> {
     pub higher: &'s mut [Coefficient],
     /// For what records have learnt, kind by kind in the order of [`Kind::ALL`].
     pub guides: [&'s mut [Guide]; Kind::COUNT],
+    /// For the cells that photons light.
+    pub photons: &'s mut [PhotonCell],
 }

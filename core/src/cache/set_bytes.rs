@@ -32,7 +32,7 @@ use crate::storage::Full;
 const MAGIC: [u8; 8] = *b"\x89FOGSET\n";
 
 /// Of the layout above.
-const VERSION: u32 = 4;
+const VERSION: u32 = 5;
 
 /// Length of the header, of a part's row and of a view's (bytes).
 const HEADER: usize = 40;

@@ -4,6 +4,7 @@ use super::extrapolate::Extrapolation;
 use super::eye::RaySettings;
 use super::kind::Kind;
 use super::lookup::Reading;
+use super::photons::PhotonEffort;
 use super::radius::Limits;
 use crate::multiple_scatter;
 use crate::path;
@@ -46,7 +47,7 @@ impl Effort {
 /// let effort = Effort { tolerance: 0.5, samples: 1024, degree: 2, limits, clearance: 2.0, free_paths: 1.0 };
 /// let settings = Settings { multiple: Some(effort), ..Settings::default() };
 /// // The records at which walks end follow from those of the picture.
-/// assert_eq!(settings.effort(Kind::CoarseMultiple).unwrap().samples, 256);
+/// assert_eq!(settings.effort(Kind::Multiple).unwrap().samples, 1024);
 /// assert!(settings.effort(Kind::Single).is_none());
 ///
 /// // Four times the walks halve the noise of records.
@@ -65,6 +66,8 @@ pub struct Settings {
     pub multiple: Option<Effort>,
     /// Indirect irradiance on surfaces.
     pub irradiance: Option<Effort>,
+    /// How photons light the cells that walks end at; `None` for walks that go on.
+    pub photons: Option<PhotonEffort>,
     /// How records are carried to other points.
     pub extrapolation: Extrapolation,
     /// Eye rays that say where records are needed.
@@ -97,6 +100,7 @@ impl Default for Settings {
             surface: None,
             multiple: None,
             irradiance: None,
+            photons: None,
             extrapolation: Extrapolation::default(),
             rays: LEAST_RAYS,
             margin: 0.15,
@@ -131,11 +135,7 @@ impl Settings {
             Kind::Surface => self.surface,
             Kind::Multiple => self.multiple,
             Kind::Irradiance => self.irradiance,
-            // As fine as the final ones, with a quarter of the samples. What they get wrong is what all walks bring along,
-            // more of it with every scattering, and in corners most: so none reaches past a surface.
-            Kind::CoarseMultiple => {
-                self.multiple.map(|e| Effort { clearance: e.clearance.min(1.0), ..e.coarser(1.0, 4) })
-            }
+            // What it gets wrong is what all else brings along, in a mean over many surfaces.
             Kind::CoarseIrradiance => self.irradiance.map(|e| e.coarser(3.0, 8)),
         }
     }

@@ -99,9 +99,9 @@ impl<'s> Slot<'s> {
         Some(match self {
             Self::Surface(cache) => {
                 let normal = cache.attached(number as u32).first().map(|facing| facing.normal);
-                Place { point, normal, is_seen: false }
+                Place { point, normal, is_seen: false, share: 1.0 }
             }
-            Self::Off | Self::Volume(_) => Place { point, normal: None, is_seen: true },
+            Self::Off | Self::Volume(_) => Place { point, normal: None, is_seen: true, share: 1.0 },
         })
     }
 

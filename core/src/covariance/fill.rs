@@ -98,7 +98,7 @@ impl Settings {
     /// ```
     /// # use fogbow::{covariance::Settings, host::Empty, math::{Bounds, Vec3}, world::{Outline, World}};
     /// let bounds = Bounds { min: Vec3::ZERO, max: Vec3::ONE };
-    /// let outline = Outline::of(&World { medium: &Empty, scene: &Empty, lights: &[] }, bounds);
+    /// let outline = Outline::of(&World { medium: &Empty, scene: &Empty, lights: (&[]).into() }, bounds);
     /// assert_eq!(Settings::for_outline(&outline), Settings::new(bounds));
     /// ```
     #[must_use]
@@ -182,7 +182,7 @@ impl<'o> GridOutput<'o> {
     /// # use fogbow::{host::Empty, light::{Light, PointLight}, math::{Bounds, Vec3}, spectrum::Spectrum, work, world::World};
     /// use fogbow::covariance::{Deposit, Fill, GridOutput, Settings};
     /// let lamps = [Light::Point(PointLight::new(Vec3::splat(0.5), Spectrum::ONE)?)];
-    /// let world = World { medium: &Empty, scene: &Empty, lights: &lamps };
+    /// let world = World { medium: &Empty, scene: &Empty, lights: (&lamps).into() };
     /// let settings = Settings { photons: 100, edge: 8, ..Settings::new(Bounds { min: Vec3::ZERO, max: Vec3::ONE }) };
     /// let is_cut = |deposits: &mut [Deposit]| -> Result<bool, Box<dyn core::error::Error>> {
     ///     let mut fill = Fill::new(settings)?;
@@ -235,7 +235,7 @@ enum Round {
 /// use fogbow::covariance::{Fill, GridOutput, Settings};
 /// let fog = Homogeneous::new(Spectrum::splat(0.1), Spectrum::splat(0.1), Lobe::Isotropic)?;
 /// let spot = [Light::Phong(PhongLight::new(Vec3::ZERO, Vec3::Z, 200.0, Spectrum::ONE)?)];
-/// let world = World { medium: &fog, scene: &Empty, lights: &spot };
+/// let world = World { medium: &fog, scene: &Empty, lights: (&spot).into() };
 /// let bounds = Bounds { min: Vec3::new(-0.5, -0.5, 0.0), max: Vec3::new(0.5, 0.5, 2.0) };
 /// let mut fill = Fill::new(Settings { photons: 2000, edge: 16, ..Settings::new(bounds) })?;
 /// assert_eq!((fill.sent(), fill.share()), (0, 0.0));
@@ -287,7 +287,7 @@ impl<'s> Fill<'s> {
     /// let mut cells = [OccluderCell::default(); 64];
     /// let memory = GridMemory { voxels: (&mut all[..]).into(), part: (&mut part[..]).into(), occluders: (&mut cells[..]).into() };
     /// let lamps = [Light::Point(PointLight::new(Vec3::splat(0.6), fogbow::spectrum::Spectrum::ONE)?)];
-    /// let world = World { medium: &Empty, scene: &Empty, lights: &lamps };
+    /// let world = World { medium: &Empty, scene: &Empty, lights: (&lamps).into() };
     /// let bounds = Bounds { min: Vec3::ZERO, max: Vec3::ONE };
     /// let mut fill = Fill::new_in(memory, Settings { photons: 100, edge: 4, ..Settings::new(bounds) })?;
     /// let (mut surface, mut deposits) = ([SurfacePoint::default(); 64], [Deposit::default(); 8192]);
@@ -484,7 +484,7 @@ mod tests {
         let fog = Homogeneous::new(Spectrum::splat(0.1), Spectrum::splat(0.8), Lobe::Isotropic).unwrap();
         let point = PointLight::new(Vec3::new(-0.7, 0.1, 0.2), Spectrum::ONE).unwrap();
         let spot = PhongLight::new(Vec3::NEG_ONE, Vec3::ONE, 30.0, Spectrum::new(1.0, 0.5, 0.2)).unwrap();
-        test(&World { medium: &fog, scene: &Slit, lights: &[Light::Point(point), Light::Phong(spot)] });
+        test(&World { medium: &fog, scene: &Slit, lights: (&[Light::Point(point), Light::Phong(spot)]).into() });
     }
 
     /// Walks of all parts in a plain loop, into voxels of each part.

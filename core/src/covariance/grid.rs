@@ -82,9 +82,13 @@ impl<'a> GridView<'a> {
     /// Fluence (W·m⁻²) at `point`, interpolated: flux times length in a cell over its volume. `None` outside.
     #[must_use]
     pub fn fluence(&self, point: Vec3) -> Option<f32> {
-        let voxel = self.voxel(point)?;
+        Some(self.fluence_of(&self.voxel(point)?))
+    }
+
+    /// Fluence (W·m⁻²) of what a cell gathered.
+    pub(super) fn fluence_of(&self, voxel: &Voxel) -> f32 {
         let volume = self.lattice.cell();
-        Some(voxel.weight / (volume.x * volume.y * volume.z * self.paths.max(1) as f32))
+        voxel.weight / (volume.x * volume.y * volume.z * self.paths.max(1) as f32)
     }
 }
 

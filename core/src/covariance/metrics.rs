@@ -171,6 +171,42 @@ pub fn kernel_radius(trace: f32, relative_bias: f32, moment: f32, most: f32) -> 
     float::sqrt(relative_bias / (2.0 * PI * PI * moment * trace)).min(most)
 }
 
+/// Radius (m) that a kernel has best in the first of many passes, whose radii then go like `i^−1/5`, where
+/// blur and noise of light are balanced; infinite where neither is known to limit it.
+///
+/// ```text
+/// rᵢ = h i^{−1/5}:   E²(n) = (B h² · 5/3 · n^{−2/5})² + (V/h) · 5/6 · n^{−4/5}   least for   h = (3/40 · V/B²)^{1/5}
+/// B = 2π² a tr Γ,   B r² the relative bias,   V/r the relative variance of a pass
+/// ```
+///
+/// Both terms shrink like `n^{−4/5}`, so that the same `h` is best for any number of passes, and the mean of all passes goes
+/// to the truth. `trace` (cycles²/m²) and `moment` are those of [`kernel_radius`]; `noise` (m) is `V`, for kernels
+/// that are blurred along the eye ray, so that their variance goes like `1/r`. Silverman 1986, § 3.3, for kernels that narrow from pass
+/// to pass (Knaus and Zwicker 2011).
+///
+/// ```
+/// # use fogbow::covariance::balanced_radius;
+/// let error = |h: f32, passes: f32| {
+///     let b = 2.0 * core::f32::consts::PI.powi(2) * 0.125 * 3.0;
+///     let bias = b * h * h * (5.0 / 3.0) * passes.powf(-0.4);
+///     bias * bias + 0.01 / h * (5.0 / 6.0) * passes.powf(-0.8)
+/// };
+/// let best = balanced_radius(3.0, 0.01, 0.125);
+/// for passes in [16.0, 256.0] {
+///     assert!(error(best, passes) < error(0.9 * best, passes).min(error(1.1 * best, passes)));
+/// }
+/// ```
+#[inline]
+#[must_use]
+pub fn balanced_radius(trace: f32, noise: f32, moment: f32) -> f32 {
+    let blur = 2.0 * PI * PI * moment * trace;
+    if !(blur > 0.0 && noise < f32::INFINITY) {
+        return f32::INFINITY;
+    }
+    // Roots before the quotient: the square of a large blur would leave the range of f32.
+    float::powf(0.075 * noise, 0.2) * float::powf(blur, -0.4)
+}
+
 /// The covariance of an image, gathered along an eye ray from the camera outwards: B Eq. 17, with the
 /// attenuation on the way to the camera accumulated (sheet § 2.6).
 ///

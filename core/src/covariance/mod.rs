@@ -55,7 +55,8 @@ pub use light_field::{LightField, Patch};
 pub use lobe::{phase_covariance, phase_hessian};
 pub use matrix::{LIMIT, Symmetric4};
 pub use metrics::{
-    ImageCovariance, Voxel, divergence, filter_precision, hessian_bound, kernel_radius, sample_density, step,
+    ImageCovariance, Voxel, balanced_radius, divergence, filter_precision, hessian_bound, kernel_radius,
+    sample_density, step,
 };
 pub use occluders::{NEAREST, OccluderCell, Occluders};
 pub use photon::FrequencyPhotons;

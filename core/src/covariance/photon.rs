@@ -28,7 +28,7 @@ use crate::world::World;
 /// # use fogbow::world::World;
 /// // A lamp of 4π W in the middle of a vacuum: at 2 m its fluence is 1/4 W·m⁻².
 /// let lamps = [Light::Point(PointLight::from_flux(Vec3::ZERO, Spectrum::splat(4.0 * PI))?)];
-/// let world = World { medium: &Empty, scene: &Empty, lights: &lamps };
+/// let world = World { medium: &Empty, scene: &Empty, lights: (&lamps).into() };
 /// let lattice = Lattice::new(Bounds { min: Vec3::splat(-2.5), max: Vec3::splat(2.5) }, [5, 5, 5])?;
 /// let (mut voxels, mut rng) = ([Voxel::EMPTY; 125], Generator::new(1));
 /// let mut photons = FrequencyPhotons::new(world, None, lattice);

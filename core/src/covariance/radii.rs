@@ -4,7 +4,7 @@ use glam::Vec3;
 
 use super::grid::GridView;
 use super::lattice::{Lattice, LatticeError};
-use super::metrics::kernel_radius;
+use super::metrics::{balanced_radius, kernel_radius};
 
 /// Kernel radii (m), one per cell of a lattice.
 ///
@@ -46,13 +46,55 @@ impl<'a> Radii<'a> {
         most: f32,
         radii: &'a mut [f32],
     ) -> Result<Self, LatticeError> {
+        Self::of_cells(grid, radii, |trace, _| kernel_radius(trace, relative_bias, moment, most))
+    }
+
+    /// Those of a first pass that make the mean of all passes best, however many there will be, if radii shrink from pass to
+    /// pass like `i^−1/5`: [`balanced_radius`]. They are wide where light is even, and where little comes by: there noise is greatest.
+    /// `noise` (W·m⁻¹) is the relative variance of a pass at a fluence of 1 W·m⁻² with kernels of 1 m. The other arguments are those of
+    /// [`Radii::new`], by whose radii these are bounded.
+    ///
+    /// # Errors
+    /// Storage of another length.
+    ///
+    /// ```
+    /// # use fogbow::{covariance::{GridView, Lattice, Radii, Voxel}, math::*};
+    /// // Light that varies alike in both cells, one of them 32 times as dark: its kernels are twice as wide.
+    /// let lattice = Lattice::new(Bounds { min: Vec3::ZERO, max: Vec3::new(2.0, 1.0, 1.0) }, [2, 1, 1])?;
+    /// let voxel = |weight| Voxel { sum: Symmetric3::from_upper([2.0 * weight, 0.0, 0.0, 0.0, 0.0, 0.0]), weight };
+    /// let voxels = [voxel(32.0), voxel(1.0)];
+    /// let (grid, mut storage) = (GridView::new(lattice, &voxels, 1)?, [0.0; 2]);
+    /// let radii = Radii::balanced(&grid, 0.1, 10.0, 0.125, 10.0, &mut storage)?;
+    /// assert!((radii.values()[1] / radii.values()[0] - 2.0).abs() < 1e-4);
+    /// # Ok::<(), fogbow::covariance::LatticeError>(())
+    /// ```
+    pub fn balanced(
+        grid: &GridView<'_>,
+        noise: f32,
+        relative_bias: f32,
+        moment: f32,
+        most: f32,
+        radii: &'a mut [f32],
+    ) -> Result<Self, LatticeError> {
+        Self::of_cells(grid, radii, |trace, fluence| {
+            let bound = kernel_radius(trace, relative_bias, moment, most);
+            balanced_radius(trace, noise / fluence, moment).min(bound)
+        })
+    }
+
+    /// `radius` gets the trace of Γ (cycles²/m²) and the fluence (W·m⁻²) of a cell.
+    fn of_cells(
+        grid: &GridView<'_>,
+        radii: &'a mut [f32],
+        radius: impl Fn(f32, f32) -> f32,
+    ) -> Result<Self, LatticeError> {
         let lattice = *grid.lattice();
         if radii.len() != lattice.cell_count() {
             return Err(LatticeError::Storage);
         }
-        for (radius, voxel) in radii.iter_mut().zip(grid.voxels()) {
+        for (of_cell, voxel) in radii.iter_mut().zip(grid.voxels()) {
             let trace = voxel.covariance().map_or(0.0, |gamma| gamma.trace());
-            *radius = kernel_radius(trace, relative_bias, moment, most);
+            *of_cell = radius(trace, grid.fluence_of(voxel));
         }
         spread(&lattice, radii);
         Ok(Self { lattice, radii })

@@ -5,8 +5,8 @@ use glam::{Vec2, Vec3};
 
 use super::geometry::{Falloff, Incident, Source};
 use super::{LightError, LightSample};
-use crate::math::Frame;
 use crate::math::float::{self, PI};
+use crate::math::{Bounds, Frame};
 use crate::sampling::{discrete, warp};
 use crate::spectrum::Spectrum;
 
@@ -396,6 +396,10 @@ impl<'a> MeshLight<'a> {
     #[must_use]
     pub fn centre(&self) -> Vec3 {
         self.centre
+    }
+
+    pub(super) fn bounds(&self) -> Bounds {
+        Bounds::of(self.triangles.iter().flat_map(|triangle| triangle.corners))
     }
 
     #[inline]

@@ -7,15 +7,22 @@
 //! | [`point`] | point, Phong and spot lights |
 //! | [`area`] | quad, sphere and triangle-mesh lights |
 //! | [`distant`] | sun, constant and image environments |
+//! | `lights` | [`Lights`]: all of a world, and choices among them |
+//! | `tree` | [`LightTree`]: boxes around many lights |
+//! | `question`, `cut` | what lights send to a place; nodes small enough to choose by it |
 //! | [`emission`] | [`Emission`]: rays that leave a light, with their power |
 //!
 //! Point lights take radiant **intensity** (W/sr); the constructors from flux say so.
 
 pub mod area;
+mod cut;
 pub mod distant;
 pub mod emission;
 pub mod geometry;
+mod lights;
 pub mod point;
+mod question;
+mod tree;
 
 use glam::{Vec2, Vec3};
 
@@ -23,7 +30,12 @@ pub use area::{MeshLight, QuadLight, SphereLight, Triangle};
 pub use distant::{EnvironmentMap, Sun};
 pub use emission::Emission;
 pub use geometry::{Falloff, Incident, Source};
+pub use lights::Lights;
+pub(crate) use lights::{Strong, Survey};
 pub use point::{PhongLight, PointLight, SpotLight};
+pub(crate) use question::{Except, FromPoint, FromRay, Guess, Question};
+pub(crate) use tree::Kind;
+pub use tree::{LightNode, LightTree};
 
 use crate::math::{Bounds, Ray};
 use crate::sampling::distance::Equiangular;
@@ -428,6 +440,22 @@ impl Light<'_> {
         match self {
             Self::Spot(light) => light.lit_interval(ray, near, far),
             _ => self.near_field()?.interval(ray, near, far),
+        }
+    }
+
+    /// A box around all points (m) it shines from; at the origin for lights at infinity.
+    fn bounds(&self) -> Bounds {
+        match self {
+            Self::Point(light) => Bounds::of([light.position]),
+            Self::Phong(light) => Bounds::of([light.position]),
+            Self::Spot(light) => Bounds::of([light.position]),
+            Self::Quad(light) => {
+                let (half, centre) = (light.edges().map(|edge| edge.abs() * 0.5), light.centre());
+                Bounds { min: centre - half[0] - half[1], max: centre + half[0] + half[1] }
+            }
+            Self::Sphere(light) => Bounds { min: light.centre - light.radius, max: light.centre + light.radius },
+            Self::Mesh(light) => light.bounds(),
+            Self::Sun(_) | Self::Constant(_) | Self::Environment(_) => Bounds::of([Vec3::ZERO]),
         }
     }
 

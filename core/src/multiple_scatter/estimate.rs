@@ -48,7 +48,7 @@ fn for_each_path<M: Medium + ?Sized, S: Scene + ?Sized>(
 /// # use fogbow::{sampling::Generator, single_scatter::Towards, spectrum::Spectrum, transmittance::thickness::Steps, world::World};
 /// let dark = Homogeneous::new(Spectrum::ONE, Spectrum::ZERO, Lobe::Isotropic)?;
 /// let lights = [Light::Sun(Sun::new(Vec3::Z, Spectrum::ONE)?)];
-/// let world = World { medium: &dark, scene: &Empty, lights: &lights };
+/// let world = World { medium: &dark, scene: &Empty, lights: (&lights).into() };
 /// let walk = Walk { world, settings: Settings::new(Steps::Length(0.1)) };
 /// let towards = Towards { to_eye: Vec3::X, phase: &Phase::ISOTROPIC };
 /// let sums = sample(Vec3::ZERO, &towards, &walk, |_, _| Spectrum::ZERO, 8, &mut Generator::new(1));
@@ -82,7 +82,7 @@ pub fn sample<M: Medium + ?Sized, S: Scene + ?Sized>(
 /// let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::ONE, Phase::ISOTROPIC)?;
 /// let ball = Placed::new(fog, Region::sphere(Vec3::ZERO, 1.0)?);
 /// let lights = [Light::Sun(Sun::new(Vec3::Z, Spectrum::ONE)?)];
-/// let world = World { medium: &ball, scene: &Empty, lights: &lights };
+/// let world = World { medium: &ball, scene: &Empty, lights: (&lights).into() };
 /// let walk = Walk { world, settings: Settings::new(Steps::Length(0.1)) };
 /// let f = moments(&Phase::ISOTROPIC, 0);
 /// let mut coefficients = [Coefficient::ZERO];

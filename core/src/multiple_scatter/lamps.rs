@@ -5,7 +5,7 @@
 
 use glam::Vec3;
 
-use crate::light::Light;
+use crate::light::{FromPoint, Guess, Kind, Light, LightNode, Lights, Question, Strong};
 use crate::math::{Frame, float};
 use crate::phase::{Phase, PhaseSample, deflection};
 use crate::sampling::discrete::choose;
@@ -20,6 +20,34 @@ const SHARE: f32 = 0.25;
 /// Half angle of the cone around a lamp (rad). Farther from it nothing is steep.
 const WIDEST: f32 = 0.5;
 
+/// Nodes of the cut through many lights, of which single lamps are aimed at. More: weaker lamps are, too, and what passes them has a bound;
+/// fewer: a vertex takes less time.
+const CUT: usize = 8;
+
+/// `I/r`, what rays about a lamp collect together.
+struct Glare {
+    point: Vec3,
+}
+
+impl Question for Glare {
+    fn asks(&self, kind: Kind) -> bool {
+        kind == Kind::Lamp
+    }
+
+    fn light(&self, light: &Light<'_>) -> f32 {
+        let Some(field) = light.near_field().filter(|field| field.radius().is_none()) else { return 0.0 };
+        (light.importance(self.point) * field.centre().distance(self.point)).min(1e30)
+    }
+
+    fn node(&self, node: &LightNode) -> Guess {
+        FromPoint::all(self.point).node(node) * node.away(self.point)
+    }
+
+    fn limit(&self) -> usize {
+        CUT
+    }
+}
+
 /// A lamp as a vertex sees it.
 struct Aim {
     /// Unit direction to it.
@@ -30,8 +58,13 @@ struct Aim {
     clear: f32,
 }
 
-fn aims<'a>(point: Vec3, lights: &'a [Light<'_>], extinction: f32) -> impl Iterator<Item = Aim> + 'a {
-    lights.iter().filter_map(move |light| {
+fn aims<'a>(
+    point: Vec3,
+    strong: &'a Strong,
+    lights: &'a Lights<'_>,
+    extinction: f32,
+) -> impl Iterator<Item = Aim> + 'a {
+    strong.lights(lights).filter_map(move |light| {
         let field = light.steep_field().filter(|field| field.radius().is_none())?;
         let offset = field.centre() - point;
         let distance = offset.length();
@@ -49,12 +82,14 @@ pub(super) fn turn(
     (point, to_eye): (Vec3, Vec3),
     phase: &Phase,
     extinction: f32,
-    lights: &[Light<'_>],
+    lights: &Lights<'_>,
     rng: &mut Generator,
 ) -> PhaseSample {
     let mut turn = phase.sample(to_eye, uniform2(rng));
-    let (mut all, mut seen) = (0.0, 0.0);
-    for aim in aims(point, lights, extinction) {
+    let strong = lights.strong(&Glare { point });
+    let aims = || aims(point, &strong, lights, extinction);
+    let (mut all, mut seen) = (strong.others, 0.0);
+    for aim in aims() {
         all += aim.weight;
         seen += aim.weight * aim.clear;
     }
@@ -63,7 +98,7 @@ pub(super) fn turn(
     }
     let share = SHARE * (seen / all);
     let (aimed, choice, on_cone) = (uniform(rng), uniform(rng), uniform2(rng));
-    let to_lamps = aims(point, lights, extinction).map(|aim| (aim.weight * aim.clear, aim.axis));
+    let to_lamps = aims().map(|aim| (aim.weight * aim.clear, aim.axis));
     if aimed < share
         && let Some((axis, _)) = choose(to_lamps, choice)
     {
@@ -73,7 +108,7 @@ pub(super) fn turn(
         let (across, along) = (aim.axis.cross(turn.to_light).length(), aim.axis.dot(turn.to_light));
         aim.weight * aim.clear * steep_cone_pdf(across, along, WIDEST)
     };
-    let pdf = aims(point, lights, extinction).map(steep).sum::<f32>() / seen;
+    let pdf = aims().map(steep).sum::<f32>() / seen;
     let deflected = deflection(turn.to_light, to_eye);
     turn.pdf = (1.0 - share) * phase.pdf(deflected) + share * pdf;
     turn.weight = phase.value(deflected) / turn.pdf;
@@ -101,7 +136,7 @@ mod tests {
             let (rng, to_eye, count) = (&mut Generator::new(5), Vec3::new(0.6, 0.0, -0.8), 200_000);
             let (mut most, mut sum, mut squares) = (0.0_f32, [0.0_f64; 2], [0.0_f64; 2]);
             for _ in 0..count {
-                let turn = turn((Vec3::ZERO, to_eye), &phase, 0.2, &lights, rng);
+                let turn = turn((Vec3::ZERO, to_eye), &phase, 0.2, &(&lights).into(), rng);
                 assert!((turn.to_light.length() - 1.0).abs() < 1e-5 && turn.pdf > 0.0);
                 let collected = |light: &Light<'_>| {
                     let axis = light.steep_field().unwrap().centre().normalize();
@@ -129,7 +164,7 @@ mod tests {
     #[test]
     fn lamps_that_fog_hides_and_the_sun_change_next_to_nothing() {
         let sample = |lights: &[Light<'_>], extinction| {
-            turn((Vec3::ZERO, Vec3::X), &Phase::ISOTROPIC, extinction, lights, &mut Generator::new(2))
+            turn((Vec3::ZERO, Vec3::X), &Phase::ISOTROPIC, extinction, &lights.into(), &mut Generator::new(2))
         };
         let plain = Phase::ISOTROPIC.sample(Vec3::X, uniform2(&mut Generator::new(2)));
         assert_eq!(sample(&[Light::Sun(Sun::new(Vec3::Z, Spectrum::ONE).unwrap())], 1.0), plain);

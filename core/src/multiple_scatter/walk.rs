@@ -6,10 +6,9 @@ use super::flight::{Collision, Flown, Flying, Lengths, fly, own};
 use super::lamps;
 use super::weight::{Shift, Weight};
 use crate::host::{Hit, Medium, Properties, Rng, Scene};
-use crate::light::{Falloff, Light, sky};
+use crate::light::{Except, Falloff, FromPoint, FromRay, Light, Question};
 use crate::math::{Ray, float};
 use crate::phase::{Phase, deflection};
-use crate::sampling::discrete::choose;
 use crate::sampling::{Generator, uniform, uniform2, warp};
 use crate::single_scatter::{Arrival, Contribution};
 use crate::spectrum::{Gradient, Spectrum};
@@ -109,7 +108,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Walk<'_, M, S> {
     /// let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::ONE, Phase::ISOTROPIC)?;
     /// let ball = Placed::new(fog, Region::sphere(Vec3::ZERO, 2.0)?);
     /// let lights = [Light::Sun(Sun::new(Vec3::Z, Spectrum::ONE)?)];
-    /// let world = World { medium: &ball, scene: &Empty, lights: &lights };
+    /// let world = World { medium: &ball, scene: &Empty, lights: (&lights).into() };
     /// let walk = Walk { world, settings: Settings::new(Steps::Length(0.1)) };
     /// // The mean over many paths is the light that was scattered before it came to the middle of the ball.
     /// let rng = &mut Generator::new(1);
@@ -142,7 +141,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Walk<'_, M, S> {
     /// # use fogbow::{multiple_scatter::{Settings, Walk}, spectrum::Spectrum, transmittance::thickness::Steps, world::World};
     /// let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::splat(2.0), Lobe::Isotropic).unwrap();
     /// let settings = Settings::new(Steps::Length(0.1));
-    /// let walk = Walk { world: World { medium: &fog, scene: &Empty, lights: &[] }, settings };
+    /// let walk = Walk { world: World { medium: &fog, scene: &Empty, lights: (&[]).into() }, settings };
     /// let flown = walk.first(&Ray::new(Vec3::ZERO, Vec3::X), None, 0.5, false, &mut Generator::new(1));
     /// let median = flown.collision.unwrap().distance;
     /// assert!((median - core::f32::consts::LN_2 / 2.0).abs() < 1e-6);   // half of all light comes farther
@@ -170,7 +169,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Walk<'_, M, S> {
     /// use fogbow::multiple_scatter::{Settings, Start, Walk};
     /// // Endless fog that absorbs nothing, in which light of radiance 1 is scattered into every direction, everywhere.
     /// let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::ONE, Phase::ISOTROPIC)?;
-    /// let world = World { medium: &fog, scene: &Empty, lights: &[] };
+    /// let world = World { medium: &fog, scene: &Empty, lights: (&[]).into() };
     /// let walk = Walk { world, settings: Settings::new(Steps::Length(0.1)) };
     /// let (ray, rng) = (Ray::new(Vec3::ZERO, Vec3::X), &mut Generator::new(1));
     /// let collision = walk.first(&ray, None, 0.5, false, rng).collision;
@@ -227,13 +226,13 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Walk<'_, M, S> {
             }
 
             let extinction = properties.extinction().mean();
-            let turn = lamps::turn((at, to_eye), &properties.phase, extinction, lights, rng);
+            let turn = lamps::turn((at, to_eye), &properties.phase, extinction, &lights, rng);
             let bend = (!properties.phase.is_isotropic()).then_some((to_eye, properties.phase));
             carried = Carried { weight, bend, kappa: turn.weight };
             ray = Ray { origin: at, direction: turn.to_light, length: f32::INFINITY };
             end = nearest_surface(&ray, scene);
             ray.length = end.map_or(f32::INFINITY, |hit| hit.distance);
-            let radiance = end.as_ref().map_or_else(|| sky(lights, ray.direction), |hit| outgoing(&ray, hit));
+            let radiance = end.as_ref().map_or_else(|| lights.sky(ray.direction), |hit| outgoing(&ray, hit));
             if end.is_none() && radiance.is_black() {
                 continue;
             }
@@ -251,8 +250,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Walk<'_, M, S> {
     }
 
     fn leg(&self, ray: Ray, end: Option<Hit>) -> Leg {
-        let away = |light: &Light<'_>| light.near_field().map(|field| field.centre().distance_squared(ray.origin));
-        let nearest2 = self.world.lights.iter().filter_map(away).fold(f32::INFINITY, f32::min);
+        let nearest2 = self.world.lights.nearest2(ray.origin);
         let ray = ray.with_length(end.map_or(f32::INFINITY, |hit| hit.distance));
         Leg { ray, end, reach: REACH * float::sqrt(nearest2) }
     }
@@ -269,12 +267,9 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Walk<'_, M, S> {
 
     /// Single scattering at a vertex of the lights in whose near field it does not lie.
     fn lights_at(&self, at: Vec3, weight: &Weight, towards: (Vec3, &Phase), total: &mut Incoming, rng: &mut Generator) {
-        let World { medium, scene, lights } = self.world;
-        let lights = lights.iter().filter_map(|light| {
-            let near = light.steep_field().is_some_and(|field| field.contains(at));
-            (!near && !light.is_sky()).then(|| (light.importance(at), light))
-        });
-        self.each(lights, rng, |light, share, rng| {
+        let World { medium, scene, .. } = self.world;
+        let question = FromPoint { point: at, except: Except::Steep, sky: false };
+        self.each(&question, rng, |light, share, rng| {
             let mut sample = light.sample(at, uniform2(rng))?;
             sample.source.weight = sample.source.weight / share;
             let arrival = Arrival::from_source(at, medium, &sample.source, self.marching(rng), 0.0)?;
@@ -287,16 +282,13 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Walk<'_, M, S> {
 
     /// Light scattered somewhere along a segment within a light's near field, carried to the start.
     fn near_lights(&self, leg: &Leg, carried: &Carried, total: &mut Incoming, rng: &mut Generator) {
-        let World { medium, scene, lights } = self.world;
+        let World { medium, scene, .. } = self.world;
         let ray = &leg.ray;
         let lit = until_the_end(ray, medium);
-        let lights = lights.iter().filter_map(|light| {
-            let centre = light.steep_field()?.centre();
-            let farthest = lit.length.min(ENDLESS * ray.origin.distance(centre).max(medium.resolution()));
-            let light = NearLight::of(light, &lit, 0.0, farthest)?;
-            Some((light.sent(&lit), light))
-        });
-        self.each(lights, rng, |light, share, rng| {
+        let until = Some((ENDLESS, medium.resolution()));
+        let question = FromRay { ray: lit, near: 0.0, far: lit.length, steep: true, until };
+        self.each(&question, rng, |light, share, rng| {
+            let light = NearLight { light, interval: question.part(light)? };
             let on_light = uniform2(rng);
             let joint = light.join(ray, uniform(rng), on_light)?;
             let (at, distance, marching) = (joint.point, joint.distance, self.marching(rng));
@@ -320,22 +312,21 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Walk<'_, M, S> {
     }
 
     /// Calls `connect(light, probability)` for all lights with positive importance, or for one of them.
-    fn each<L>(
+    fn each(
         &self,
-        lights: impl Iterator<Item = (f32, L)>,
+        question: &impl Question,
         rng: &mut Generator,
-        mut connect: impl FnMut(L, f32, &mut Generator) -> Option<()>,
+        mut connect: impl FnMut(&Light<'_>, f32, &mut Generator) -> Option<()>,
     ) {
+        let lights = &self.world.lights;
         if self.settings.one_light {
-            if let Some((light, choice)) = choose(lights, uniform(rng)) {
-                connect(light, choice.probability, rng);
+            if let Some(choice) = lights.pick(question, uniform(rng)) {
+                connect(&lights[choice.index], choice.probability, rng);
             }
             return;
         }
-        for (importance, light) in lights {
-            if importance > 0.0 {
-                connect(light, 1.0, rng);
-            }
+        for light in lights.iter().filter(|light| question.light(light) > 0.0) {
+            connect(light, 1.0, rng);
         }
     }
 }

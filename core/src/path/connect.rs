@@ -3,20 +3,19 @@
 use glam::{Vec2, Vec3};
 
 use crate::host::{Medium, Scene};
-use crate::light::{Falloff, Incident, Light, LightSample, Source};
+use crate::light::{Except, Falloff, FromPoint, FromRay, Incident, Light, LightSample, Lights, Source};
 use crate::math::Ray;
 use crate::phase::deflection;
-use crate::sampling::{Generator, discrete, mis};
+use crate::sampling::{Generator, mis};
 use crate::spectrum::Spectrum;
 use crate::transmittance::{Flight, transmittance};
 use crate::world::{NearLight, World, short_of_end};
 
-/// How important a light is for next-event estimation at `point`. In the medium, a light's near
+/// How important lights are for next-event estimation at `point`. In the medium, a light's near
 /// field is left to [`along`].
 #[inline]
-fn importance(light: &Light<'_>, point: Vec3, in_medium: bool) -> f32 {
-    // Capped, so that a sum over all lights stays a number.
-    if in_medium && is_near(light, point) { 0.0 } else { light.importance(point).min(1e30) }
+fn importance(point: Vec3, in_medium: bool) -> FromPoint {
+    FromPoint { point, except: if in_medium { Except::Near } else { Except::Nothing }, sky: true }
 }
 
 #[inline]
@@ -31,7 +30,7 @@ fn is_near(light: &Light<'_>, point: Vec3) -> bool {
 /// any partition of 1.
 #[inline]
 pub(super) fn pdf(
-    lights: &[Light<'_>],
+    lights: &Lights<'_>,
     index: usize,
     vertex: (Vec3, bool),
     to_light: Vec3,
@@ -46,27 +45,24 @@ pub(super) fn pdf(
     if lights.len() == 1 || pdf <= 0.0 {
         return pdf;
     }
-    let own = importance(light, point, in_medium);
-    let total: f32 = lights.iter().map(|light| importance(light, point, in_medium)).sum();
-    if total > 0.0 { pdf * own / total } else { 0.0 }
+    pdf * lights.share(&importance(point, in_medium), index)
 }
 
 /// A light chosen and sampled for next-event estimation; `pdf` includes the choice.
 #[inline]
 pub(super) fn choose(
-    lights: &[Light<'_>],
+    lights: &Lights<'_>,
     point: Vec3,
     in_medium: bool,
     choice: f32,
     u: Vec2,
 ) -> Option<(LightSample, f32)> {
-    if let [light] = lights {
+    if let [light] = &lights[..] {
         // What cannot be reached, sampling itself finds out.
         return if in_medium && is_near(light, point) { None } else { Some((light.sample(point, u)?, 1.0)) };
     }
-    let weighted = lights.iter().map(|light| (importance(light, point, in_medium), light));
-    let (light, chosen) = discrete::choose(weighted, choice)?;
-    Some((light.sample(point, u)?, chosen.probability))
+    let chosen = lights.pick(&importance(point, in_medium), choice)?;
+    Some((lights[chosen.index].sample(point, u)?, chosen.probability))
 }
 
 /// The way from `origin` to a light. A surface point is moved off its surface before, so direction
@@ -101,7 +97,7 @@ pub(super) fn next_event<M: Medium + ?Sized, S: Scene + ?Sized>(
     random: (f32, Vec2),
     rng: &mut Generator,
 ) -> Spectrum {
-    let Some((sample, probability)) = choose(world.lights, point, in_medium, random.0, random.1) else {
+    let Some((sample, probability)) = choose(&world.lights, point, in_medium, random.0, random.1) else {
         return Spectrum::ZERO;
     };
     let incident = sample.incident;
@@ -130,13 +126,15 @@ pub(super) fn along<M: Medium + ?Sized, S: Scene + ?Sized>(
 ) -> Option<Spectrum> {
     let flown = world.medium.is_grey();
     let (near, far) = (flight.span.0, if flown { flight.span.1 } else { segment.length });
-    let lights = world.lights;
-    let reached = lights.iter().filter_map(|light| {
-        let light = NearLight::of(light, segment, near, far)?;
-        let sent = if lights.len() == 1 { 1.0 } else { light.sent(segment) };
-        Some((sent, light))
-    });
-    let (light, chosen) = discrete::choose(reached, random.0)?;
+    let lights = &world.lights;
+    let (light, probability) = if let [light] = &lights[..] {
+        (light, 1.0)
+    } else {
+        let sent = FromRay { ray: *segment, near, far, steep: false, until: None };
+        let chosen = lights.pick(&sent, random.0)?;
+        (&lights[chosen.index], chosen.probability)
+    };
+    let light = NearLight::of(light, segment, near, far)?;
     let joint = light.join(segment, random.1, random.2)?;
     let LightSample { incident, pdf, .. } = joint.light(|| random.2)?;
     let properties = world.medium.properties(joint.point);
@@ -154,5 +152,5 @@ pub(super) fn along<M: Medium + ?Sized, S: Scene + ?Sized>(
     if !flown {
         arriving *= transmittance(world.medium, &segment.with_length(joint.distance), rng);
     }
-    Some(scattered * arriving * incident.irradiance * (weight / (joint.pdf * chosen.probability)))
+    Some(scattered * arriving * incident.irradiance * (weight / (joint.pdf * probability)))
 }

@@ -42,7 +42,7 @@ fn connected<M: Medium + ?Sized, S: Scene + ?Sized>(
     }
     // The random numbers are shared: what differs from light to light is no noise between points then.
     let of = |light| {
-        let world = World { lights: core::slice::from_ref(light), ..*world };
+        let world = World { lights: core::slice::from_ref(light).into(), ..*world };
         connect::next_event(&world, point, false, &origin, value, random, rng)
     };
     world.lights.iter().map(of).sum()
@@ -59,7 +59,7 @@ fn connected<M: Medium + ?Sized, S: Scene + ?Sized>(
 /// # use fogbow::{host::Empty, light::{Light, PointLight}, math::*, path::{self, Settings}};
 /// # use fogbow::{phase::Phase, sampling::Generator, spectrum::Spectrum, world::World};
 /// let lamp = [Light::Point(PointLight::new(Vec3::X * 2.0, Spectrum::ONE)?)];
-/// let world = World { medium: &Empty, scene: &Empty, lights: &lamp };
+/// let world = World { medium: &Empty, scene: &Empty, lights: (&lamp).into() };
 /// let one = Settings { max_scatterings: 1, ..Settings::default() };
 /// let seen = path::in_scattered(&world, Vec3::ZERO, Vec3::Y, &Phase::ISOTROPIC, &one, &mut Generator::new(1));
 /// assert!((seen.single[0] - 0.25 / (4.0 * core::f32::consts::PI)).abs() < 1e-6);

@@ -77,7 +77,7 @@ impl Path {
 /// // Fog that glows and absorbs: from within, everything looks like ε/σₐ.
 /// let fog = Homogeneous::new(Spectrum::splat(2.0), Spectrum::ZERO, Lobe::Isotropic)?
 ///     .with_emission(Spectrum::splat(6.0))?;
-/// let world = World { medium: &fog, scene: &Empty, lights: &[] };
+/// let world = World { medium: &fog, scene: &Empty, lights: (&[]).into() };
 /// let ray = Ray::new(Vec3::ZERO, Vec3::Z);
 /// let seen = path::radiance(&ray, &world, &Settings::default(), &mut Generator::new(1));
 /// assert_eq!(seen.total(), Spectrum::splat(3.0));
@@ -109,7 +109,7 @@ pub fn radiance<M: Medium + ?Sized, S: Scene + ?Sized>(
 ///     }
 /// }
 /// let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::ONE, Phase::ISOTROPIC)?;
-/// let world = World { medium: &fog, scene: &Empty, lights: &[] };
+/// let world = World { medium: &fog, scene: &Empty, lights: (&[]).into() };
 /// let (ray, mut rng) = (Ray::new(Vec3::ZERO, Vec3::X), Generator::new(1));
 /// let seen = radiance_beyond(&ray, &world, &Settings::default(), &mut rng, Known);
 /// assert_eq!((seen.medium_single, seen.total()), (Spectrum::ONE, Spectrum::ONE));
@@ -156,7 +156,7 @@ impl<F: FnMut(&Ray, u32, &mut Generator) -> InScattered> Delegate for F {
 /// # use fogbow::{host::Empty, math::*, medium::Homogeneous, phase::Lobe, spectrum::Spectrum};
 /// # use fogbow::{path::{self, InScattered, Settings}, sampling::Generator, world::World};
 /// let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::ONE, Lobe::Isotropic)?;
-/// let world = World { medium: &fog, scene: &Empty, lights: &[] };
+/// let world = World { medium: &fog, scene: &Empty, lights: (&[]).into() };
 /// let ray = Ray::new(Vec3::ZERO, Vec3::Z);
 /// let haze = |_: &Ray, _: u32, _: &mut Generator| InScattered { single: Spectrum::ONE, ..InScattered::default() };
 /// let seen = path::radiance_beyond(&ray, &world, &Settings::default(), &mut Generator::new(1), haze);
@@ -340,7 +340,7 @@ fn emitted<M: ?Sized, S: ?Sized>(path: &mut Path, world: &World<'_, M, S>, ray: 
         Some(vertex) if vertex.pdf > 0.0 => {
             let distance = vertex.point.distance(point);
             let from = (vertex.point, vertex.in_medium);
-            let pdf = connect::pdf(world.lights, index, from, ray.direction, distance, hit.normal);
+            let pdf = connect::pdf(&world.lights, index, from, ray.direction, distance, hit.normal);
             mis::power(vertex.pdf, pdf)
         }
         _ => 1.0,
@@ -354,7 +354,7 @@ fn background<M: ?Sized, S: ?Sized>(path: &mut Path, world: &World<'_, M, S>, ra
     if path.scatterings == 0 && !settings.lights_visible {
         return;
     }
-    for (index, light) in world.lights.iter().enumerate() {
+    for (index, light) in world.lights.distant() {
         let radiance = light.background(ray.direction);
         if radiance.is_black() {
             continue;
@@ -362,7 +362,7 @@ fn background<M: ?Sized, S: ?Sized>(path: &mut Path, world: &World<'_, M, S>, ra
         let weight = match path.last {
             Some(vertex) if vertex.pdf > 0.0 => {
                 let from = (vertex.point, vertex.in_medium);
-                let pdf = connect::pdf(world.lights, index, from, ray.direction, f32::INFINITY, Vec3::ZERO);
+                let pdf = connect::pdf(&world.lights, index, from, ray.direction, f32::INFINITY, Vec3::ZERO);
                 mis::power(vertex.pdf, pdf)
             }
             _ => 1.0,

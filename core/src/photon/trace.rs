@@ -4,7 +4,7 @@ use super::Event;
 use crate::host::{Hit, Medium, Rng, Scene};
 use crate::math::{Bounds, Ray};
 use crate::path::Settings;
-use crate::sampling::{Generator, discrete, uniform, uniform2};
+use crate::sampling::{Generator, uniform, uniform2};
 use crate::spectrum::Spectrum;
 use crate::surface::{Surface, SurfaceSample};
 use crate::transmittance::flight;
@@ -43,7 +43,7 @@ const MAX_SURVIVAL: f32 = 0.99;
 /// // A lamp in fog that absorbs: of its power, all is absorbed, after 1/σₐ on average.
 /// let fog = Homogeneous::new(Spectrum::splat(2.0), Spectrum::ZERO, Lobe::Isotropic)?;
 /// let lamps = [Light::Point(PointLight::from_flux(Vec3::ZERO, Spectrum::ONE)?)];
-/// let world = World { medium: &fog, scene: &Empty, lights: &lamps };
+/// let world = World { medium: &fog, scene: &Empty, lights: (&lamps).into() };
 /// let bounds = Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE };
 /// let (mut rng, mut absorbed, mut length) = (Generator::new(1), 0.0, 0.0);
 /// for _ in 0..4000 {
@@ -68,9 +68,8 @@ pub fn trace<M: Medium + ?Sized, S: Scene + ?Sized>(
     if settings.max_scatterings == 0 {
         return;
     }
-    let lights = world.lights.iter().enumerate().map(|(i, light)| (light.power(bounds).mean(), (i, light)));
-    let Some(((index, light), chosen)) = discrete::choose(lights, choice) else { return };
-    let Some(emission) = light.emit(bounds, position, direction) else { return };
+    let Some(chosen) = world.lights.emitting(bounds, choice) else { return };
+    let Some(emission) = world.lights[chosen.index].emit(bounds, position, direction) else { return };
     let mut power = emission.power * (1.0 / chosen.probability);
     if power.is_black() {
         return;
@@ -79,7 +78,7 @@ pub fn trace<M: Medium + ?Sized, S: Scene + ?Sized>(
     if let Some(normal) = emission.normal {
         ray.origin = leave(ray.origin, normal, ray.direction, 0.0);
     }
-    visit(&Event::Emitted { light: index, ray: &ray, normal: emission.normal, power });
+    visit(&Event::Emitted { light: chosen.index, ray: &ray, normal: emission.normal, power });
     // Roulette keeps powers near this one.
     let usual = power.max_element();
 

@@ -4,7 +4,7 @@ use glam::{Vec2, Vec3};
 
 use super::{Arrival, Sums};
 use crate::host::{Hit, Medium, Rng, Scene};
-use crate::light::{Light, Source};
+use crate::light::{FromPoint, Light, Source};
 use crate::math::Ray;
 use crate::phase::Phase;
 use crate::sampling::uniform::ONE_MINUS_EPSILON;
@@ -54,7 +54,8 @@ pub(crate) fn lattice(j: u32, count: u32, shift: Vec2) -> Vec2 {
 }
 
 /// Calls `visit(arrival, visible)` for [`Settings::samples`] samples of every light with extent and one of every
-/// light without, each weighted so that the sum over the calls is the estimate.
+/// light without, each weighted so that the sum over the calls is the estimate. With a [tree](crate::light::LightTree) some dozens of lights,
+/// chosen by what they send, stand for all.
 ///
 /// Per-light samples form a randomly shifted lattice. Visibility is asked of the scene along
 /// [`shadow_ray`]; samples in shadow are visited, too, for the unshadowed sums.
@@ -63,7 +64,7 @@ pub(crate) fn lattice(j: u32, count: u32, shift: Vec2) -> Vec2 {
 /// # use fogbow::{host::Empty, light::{Light, Sun}, math::Vec3, sampling::Generator, spectrum::Spectrum};
 /// # use fogbow::{single_scatter::{Settings, visit_lights}, transmittance::thickness::Steps, world::World};
 /// let lights = [Light::Sun(Sun::new(Vec3::Z, Spectrum::ONE)?), Light::Constant(Spectrum::ONE)];
-/// let world = World { medium: &Empty, scene: &Empty, lights: &lights };
+/// let world = World { medium: &Empty, scene: &Empty, lights: (&lights).into() };
 /// let settings = Settings { samples: 8, steps: Steps::Length(0.1) };
 /// let mut irradiance = Spectrum::ZERO;
 /// visit_lights(Vec3::ZERO, &world, &settings, &mut Generator::new(1), |arrival, visible| {
@@ -80,7 +81,8 @@ pub fn visit_lights<M: Medium + ?Sized, S: Scene + ?Sized>(
     rng: &mut (impl Rng + ?Sized),
     mut visit: impl FnMut(&Arrival, bool),
 ) {
-    for light in world.lights {
+    let question = FromPoint::all(point);
+    world.lights.representatives(&question, rng, |light, share, rng| {
         let count = match light {
             Light::Point(_) | Light::Phong(_) | Light::Spot(_) | Light::Sun(_) => 1,
             _ => settings.samples.max(1),
@@ -89,12 +91,12 @@ pub fn visit_lights<M: Medium + ?Sized, S: Scene + ?Sized>(
         for j in 0..count {
             let marching = Marching { steps: settings.steps, offset: uniform(rng) };
             let Some(sample) = light.sample(point, lattice(j, count, shift)) else { continue };
-            let source = Source { weight: sample.source.weight / count as f32, ..sample.source };
+            let source = Source { weight: sample.source.weight / (count as f32 * share), ..sample.source };
             let Some(arrival) = Arrival::from_source(point, world.medium, &source, marching, 0.0) else { continue };
             let visible = !world.scene.is_blocked(&shadow_ray(point, &source));
             visit(&arrival, visible);
         }
-    }
+    });
 }
 
 /// Calls `visit(arrival)` for every surface that [`Settings::samples`] uniformly sampled directions hit.
@@ -113,7 +115,7 @@ pub fn visit_lights<M: Medium + ?Sized, S: Scene + ?Sized>(
 ///         Some(Hit { distance: 2.0, normal: -ray.direction, surface: Surface::BLACK, light: None })
 ///     }
 /// }
-/// let world = World { medium: &Empty, scene: &Shell, lights: &[] };
+/// let world = World { medium: &Empty, scene: &Shell, lights: (&[]).into() };
 /// let settings = Settings { samples: 8, steps: Steps::Length(0.1) };
 /// let mut irradiance = 0.0;
 /// let glow = |_: &Ray, _: &Hit| Spectrum::ONE;
@@ -152,7 +154,7 @@ pub fn visit_surfaces<M: Medium + ?Sized, S: Scene + ?Sized>(
 /// # use fogbow::{sampling::Generator, single_scatter::{Settings, Towards, sample}};
 /// # use fogbow::{transmittance::thickness::Steps, world::World};
 /// let lights = [Light::Point(PointLight::new(Vec3::new(0.0, 0.0, 2.0), Spectrum::ONE)?)];
-/// let world = World { medium: &Empty, scene: &Empty, lights: &lights };
+/// let world = World { medium: &Empty, scene: &Empty, lights: (&lights).into() };
 /// let towards = Towards { to_eye: Vec3::X, phase: &Phase::ISOTROPIC };
 /// let settings = Settings { samples: 1, steps: Steps::Length(0.1) };
 /// let sums = sample(Vec3::ZERO, &towards, &world, &settings, &mut Generator::new(1));
@@ -183,7 +185,7 @@ pub fn sample<M: Medium + ?Sized, S: Scene + ?Sized>(
 /// # use fogbow::single_scatter::{Directional, Settings, moments, sample_directional};
 /// # use fogbow::{sh::{Coefficient, expansion}, spectrum::Spectrum, transmittance::thickness::Steps, world::World};
 /// let lights = [Light::Sun(Sun::new(Vec3::Z, Spectrum::ONE)?)];
-/// let world = World { medium: &Empty, scene: &Empty, lights: &lights };
+/// let world = World { medium: &Empty, scene: &Empty, lights: (&lights).into() };
 /// let f = moments(&Phase::from(Lobe::HenyeyGreenstein { g: 0.4 }), 2);
 /// let mut coefficients = [Coefficient::ZERO; 9];
 /// let mut into = Directional { moments: &f[..3], coefficients: &mut coefficients };
@@ -214,7 +216,7 @@ pub fn sample_directional<M: Medium + ?Sized, S: Scene + ?Sized>(
 /// # use fogbow::{host::Empty, math::Vec3, phase::Phase, sampling::Generator, spectrum::Spectrum};
 /// # use fogbow::single_scatter::{Settings, Towards, sample_surfaces};
 /// # use fogbow::{transmittance::thickness::Steps, world::World};
-/// let world = World { medium: &Empty, scene: &Empty, lights: &[] };
+/// let world = World { medium: &Empty, scene: &Empty, lights: (&[]).into() };
 /// let towards = Towards { to_eye: Vec3::X, phase: &Phase::ISOTROPIC };
 /// let settings = Settings { samples: 16, steps: Steps::Length(0.1) };
 /// let sums = sample_surfaces(Vec3::ZERO, &towards, &world, |_, _| Spectrum::ONE, &settings, &mut Generator::new(1));
@@ -249,7 +251,7 @@ pub fn sample_surfaces<M: Medium + ?Sized, S: Scene + ?Sized>(
 ///         Some(Hit { distance: 2.0, normal: -ray.direction, surface: Surface::BLACK, light: None })
 ///     }
 /// }
-/// let world = World { medium: &Empty, scene: &Shell, lights: &[] };
+/// let world = World { medium: &Empty, scene: &Shell, lights: (&[]).into() };
 /// let f = moments(&Phase::ISOTROPIC, 0);
 /// let mut into = Directional { moments: &f[..1], coefficients: &mut [Coefficient::ZERO] };
 /// let settings = Settings { samples: 16, steps: Steps::Length(0.1) };

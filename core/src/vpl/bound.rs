@@ -195,7 +195,7 @@ const MOST_FREE_PATHS: f32 = 8.0;
 ///
 /// ```
 /// # use fogbow::{host::Empty, math::{Bounds, Vec3}, vpl::usual_bound, world::{Outline, World}};
-/// let world = World { medium: &Empty, scene: &Empty, lights: &[] };
+/// let world = World { medium: &Empty, scene: &Empty, lights: (&[]).into() };
 /// let bounds = Bounds { min: Vec3::ZERO, max: Vec3::new(3.0, 4.0, 0.0) };
 /// assert!((usual_bound(&Outline::of(&world, bounds)).radius() - 0.45).abs() < 1e-6);
 /// ```

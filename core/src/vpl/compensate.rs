@@ -89,7 +89,7 @@ const MEAN_WITHIN: f32 = 0.5;
 /// # use fogbow::{spectrum::Spectrum, vpl::{Bound, Compensation, Receiver, contraction, next_vertex}};
 /// # use fogbow::world::World;
 /// let fog = Homogeneous::new(Spectrum::splat(0.2), Spectrum::splat(0.8), Phase::ISOTROPIC)?;
-/// let world = World { medium: &fog, scene: &Empty, lights: &[] };
+/// let world = World { medium: &fog, scene: &Empty, lights: (&[]).into() };
 /// let receiver = Receiver::in_medium(Vec3::ZERO, Vec3::Z, &fog.properties(Vec3::ZERO)).unwrap();
 /// let (bound, mut rng) = (Bound::within(1.2)?, Generator::new(1));
 /// let mut next = || next_vertex(&world, &receiver, bound, &Compensation::APPROXIMATE, &mut rng);

@@ -3,6 +3,7 @@
 use super::gather::{GatheredVpls, Gatherer, LEVELS};
 use super::light::VirtualLight;
 use super::scatterer::Receiver;
+use super::single::{is_local, single};
 use crate::host::{Hit, Medium, Rng, Scene};
 use crate::march::scattering_points;
 use crate::math::{Ray, float};
@@ -62,8 +63,9 @@ pub struct VplRadiance {
 /// Radiance that arrives at the origin of `ray`, from `lights` a part of all virtual lights: they count `share` times, so
 /// that a host may show each ray a part of them, one of `share` equal ones.
 ///
-/// Light that is scattered once, and what is seen in mirrors, comes as in path tracing; light of surfaces and of the
-/// medium scattered more often from the virtual lights. In segments through a medium, points are drawn by the light
+/// Light that is scattered once comes from connections to the lights, at points of the ray where smoke is and light is near; where lights lie at
+/// infinity, and for what is seen in mirrors, it comes as in path tracing. Light of surfaces and of the
+/// medium scattered more often comes from the virtual lights. In segments through a medium, points are drawn by the light
 /// they scatter ([`scattering_points`]).
 ///
 /// ```
@@ -71,7 +73,7 @@ pub struct VplRadiance {
 /// # use fogbow::{spectrum::Spectrum, vpl::{Bound, EyeSettings, Gatherer, VirtualLight, radiance}};
 /// # use fogbow::world::World;
 /// let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::splat(0.1), Phase::ISOTROPIC)?;
-/// let world = World { medium: &fog, scene: &Empty, lights: &[] };
+/// let world = World { medium: &fog, scene: &Empty, lights: (&[]).into() };
 /// let gatherer = Gatherer { world, bound: Bound::NONE, compensation: None, has_mirrors: false };
 /// let settings = EyeSettings::new(Settings::default());
 /// let ray = Ray::between(Vec3::ZERO, 2.0 * Vec3::Z);
@@ -105,7 +107,7 @@ pub fn radiance<M: Medium + ?Sized, S: Scene + ?Sized>(
 /// # use fogbow::{spectrum::Spectrum, vpl::receivers};
 /// # use fogbow::world::World;
 /// let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::splat(0.5), Phase::ISOTROPIC)?;
-/// let world = World { medium: &fog, scene: &Empty, lights: &[] };
+/// let world = World { medium: &fog, scene: &Empty, lights: (&[]).into() };
 /// let (ray, mut rng, mut opacity) = (Ray::between(Vec3::ZERO, 2.0 * Vec3::Z), Generator::new(1), 0.0);
 /// for _ in 0..1000 {
 ///     receivers(&ray, &world, &Settings::default(), &mut rng, |receiver, weight| {
@@ -206,12 +208,14 @@ fn points_on(
 
 impl<M: Medium + ?Sized, S: Scene + ?Sized> Eye<'_, M, S> {
     fn single(&self, segment: &Ray, rng: &mut Generator) -> Spectrum {
-        let once = path::Settings { max_scatterings: 1, lights_visible: false, ..self.settings.paths };
         // It ends before the surface.
-        let way = short_of_end(segment);
+        let (way, world) = (short_of_end(segment), &self.gatherer.world);
         let count = self.settings.single.max(1);
-        let sum: Spectrum =
-            (0..count).map(|_| path::radiance(&way, &self.gatherer.world, &once, rng).medium_single).sum();
+        if is_local(&world.lights) {
+            return single(&way, world, count, rng);
+        }
+        let once = path::Settings { max_scatterings: 1, lights_visible: false, ..self.settings.paths };
+        let sum: Spectrum = (0..count).map(|_| path::radiance(&way, world, &once, rng).medium_single).sum();
         sum * (1.0 / count as f32)
     }
 

@@ -79,7 +79,7 @@ impl GatheredVpls {
 /// # use fogbow::world::World;
 /// // Thin fog, and a virtual light of 1 W at half the distance within which connections are clamped.
 /// let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::splat(1e-3), Phase::ISOTROPIC)?;
-/// let world = World { medium: &fog, scene: &Empty, lights: &[] };
+/// let world = World { medium: &fog, scene: &Empty, lights: (&[]).into() };
 /// let bound = Bound::within(2.0)?;
 /// let gatherer = Gatherer { world, bound, compensation: Some(Compensation::FULL), has_mirrors: false };
 /// let receiver = Receiver::in_medium(Vec3::ZERO, Vec3::Z, &fog.properties(Vec3::ZERO)).unwrap();

@@ -20,7 +20,7 @@ use crate::world::World;
 /// # use fogbow::{phase::Phase, sampling::Generator, spectrum::Spectrum, vpl, world::World};
 /// let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::ONE, Phase::ISOTROPIC)?;
 /// let lamps = [Light::Point(PointLight::from_flux(Vec3::ZERO, Spectrum::ONE)?)];
-/// let world = World { medium: &fog, scene: &Empty, lights: &lamps };
+/// let world = World { medium: &fog, scene: &Empty, lights: (&lamps).into() };
 /// let bounds = Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE };
 /// let mut lights = Vec::new();
 /// let settings = Settings { max_scatterings: 4, ..Settings::default() };

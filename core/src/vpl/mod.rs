@@ -20,6 +20,7 @@
 //! | `compensate` | [`Compensation`]; [`next_vertex`] of a compensation path |
 //! | [`gather`] | [`Gatherer`]: clamped light and compensation at a point |
 //! | [`eye`] | [`radiance`]: eye rays |
+//! | `single` | light that the medium scatters once, along an eye ray |
 //! | `settings` | [`Settings`]: every tuned number, from an [`Outline`](crate::world::Outline) |
 //! | `pass` | [`VplPass`]: the lights of a pass, as work in rounds; [`witnesses`] of what matters |
 
@@ -32,6 +33,7 @@ pub mod light;
 mod pass;
 mod scatterer;
 mod settings;
+mod single;
 
 pub use bound::{Bound, NoBound, contraction, geometry, radius_for, usual_bound};
 pub use compensate::{Compensation, Flights, next_vertex};

@@ -18,8 +18,12 @@ use crate::storage::List;
 use crate::work::Rounds;
 use crate::world::World;
 
-/// Paths of one job. More: jobs take longer than some milliseconds in dense worlds. Changes no result.
+/// Paths of one job at most. More: jobs take longer than some milliseconds in dense worlds. Changes no result.
 const PATHS_PER_JOB: u32 = 64;
+
+/// Jobs that paths are dealt out to, if there are so many. Fewer: where a path leaves hundreds of lights, a pass has few paths, and other
+/// threads wait for the last job; more: hosts are busy with handing out jobs. Changes no result.
+const TRACE_JOBS: u32 = 128;
 
 /// Lights that one job connects to a witness. The same.
 const LIGHTS_PER_JOB: u32 = 512;
@@ -64,7 +68,7 @@ impl core::error::Error for VplPassError {}
 /// # use fogbow::{host::Empty, math::*, medium::Homogeneous, phase::Phase, sampling::Generator};
 /// # use fogbow::{spectrum::Spectrum, vpl::{self, Settings}, world::{Outline, World}};
 /// let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::ONE, Phase::ISOTROPIC)?;
-/// let world = World { medium: &fog, scene: &Empty, lights: &[] };
+/// let world = World { medium: &fog, scene: &Empty, lights: (&[]).into() };
 /// let settings = Settings::for_outline(&Outline::of(&world, Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE }));
 /// let mut found = Vec::new();
 /// let eye = |[x, y]: [f32; 2], _: &mut Generator| Ray::between(Vec3::NEG_Z, Vec3::new(x, y, 0.0));
@@ -107,10 +111,10 @@ impl<'o> VplOutput<'o> {
     /// # use fogbow::{spectrum::Spectrum, work, world::{Outline, World}};
     /// # let fog = Homogeneous::new(Spectrum::ONE, Spectrum::ONE, Phase::ISOTROPIC)?;
     /// # let lamps = [Light::Point(PointLight::from_flux(Vec3::ZERO, Spectrum::ONE)?)];
-    /// # let world = World { medium: &fog, scene: &Empty, lights: &lamps };
+    /// # let world = World { medium: &fog, scene: &Empty, lights: (&lamps).into() };
     /// # let outline = Outline::of(&world, Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE });
     /// # let light = VirtualLight::in_medium(Vec3::ZERO, Vec3::Z, Spectrum::ONE, 1, &Phase::ISOTROPIC);
-    /// let settings = Settings { paths: 64, ..Settings::for_outline(&outline) };
+    /// let settings = Settings { paths: 8192, ..Settings::for_outline(&outline) };
     /// let run = |lights: &mut [VirtualLight]| {
     ///     let mut pass = VplPass::new(&settings, 0, Independent, &[]);
     ///     work::finish(&mut pass, &world, &mut VplOutput::new(lights, &mut [0.0; 512][..]));
@@ -152,7 +156,7 @@ impl<'s> VplMemory<'s> {
     /// # use fogbow::{spectrum::Spectrum, work, world::{Outline, World}};
     /// # let fog = Homogeneous::new(Spectrum::ONE, Spectrum::ONE, Phase::ISOTROPIC)?;
     /// # let lamps = [Light::Point(PointLight::from_flux(Vec3::ZERO, Spectrum::ONE)?)];
-    /// # let world = World { medium: &fog, scene: &Empty, lights: &lamps };
+    /// # let world = World { medium: &fog, scene: &Empty, lights: (&lamps).into() };
     /// # let outline = Outline::of(&world, Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE });
     /// # let light = VirtualLight::in_medium(Vec3::ZERO, Vec3::Z, Spectrum::ONE, 1, &Phase::ISOTROPIC);
     /// // Half of all light is absorbed in every collision: 64 paths leave about 64 lights, of which 20 are kept by what a witness sees.
@@ -210,7 +214,7 @@ enum Round {
 /// use fogbow::{spectrum::Spectrum, work, world::{Outline, World}};
 /// let fog = Homogeneous::new(Spectrum::ONE, Spectrum::ONE, Phase::ISOTROPIC)?;
 /// let lamps = [Light::Point(PointLight::from_flux(Vec3::ZERO, Spectrum::ONE)?)];
-/// let world = World { medium: &fog, scene: &Empty, lights: &lamps };
+/// let world = World { medium: &fog, scene: &Empty, lights: (&lamps).into() };
 /// let outline = Outline::of(&world, Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE });
 /// // A pilot tells how many paths leave as many candidates.
 /// let settings = Settings { lights: 100, candidates: 4, ..Settings::for_outline(&outline) };
@@ -270,7 +274,7 @@ impl<'s, Q: GeneratorSource> VplPass<'s, Q> {
     /// # use fogbow::{spectrum::Spectrum, work, world::{Outline, World}};
     /// # let fog = Homogeneous::new(Spectrum::ONE, Spectrum::ONE, Phase::ISOTROPIC)?;
     /// # let lamps = [Light::Point(PointLight::from_flux(Vec3::ZERO, Spectrum::ONE)?)];
-    /// # let world = World { medium: &fog, scene: &Empty, lights: &lamps };
+    /// # let world = World { medium: &fog, scene: &Empty, lights: (&lamps).into() };
     /// # let outline = Outline::of(&world, Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE });
     /// # let light = VirtualLight::in_medium(Vec3::ZERO, Vec3::Z, Spectrum::ONE, 1, &Phase::ISOTROPIC);
     /// let settings = Settings { lights: 100, candidates: 1, ..Settings::for_outline(&outline) };
@@ -305,7 +309,7 @@ impl<'s, Q: GeneratorSource> VplPass<'s, Q> {
     /// # use fogbow::{spectrum::Spectrum, work, world::{Outline, World}};
     /// # let fog = Homogeneous::new(Spectrum::ONE, Spectrum::ONE, Phase::ISOTROPIC)?;
     /// # let lamps = [Light::Point(PointLight::from_flux(Vec3::ZERO, Spectrum::ONE)?)];
-    /// # let world = World { medium: &fog, scene: &Empty, lights: &lamps };
+    /// # let world = World { medium: &fog, scene: &Empty, lights: (&lamps).into() };
     /// # let outline = Outline::of(&world, Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE });
     /// # let light = VirtualLight::in_medium(Vec3::ZERO, Vec3::Z, Spectrum::ONE, 1, &Phase::ISOTROPIC);
     /// let settings = Settings { paths: 256, ..Settings::for_outline(&outline) };
@@ -337,7 +341,7 @@ impl<'s, Q: GeneratorSource> VplPass<'s, Q> {
             memory,
             rng: independent(mix(settings.seed ^ 0x0d1b_7a5e_66c2_93f4), u64::from(number), 0),
             round: Round::Trace,
-            jobs: settings.paths.div_ceil(PATHS_PER_JOB),
+            jobs: settings.paths.div_ceil(paths_per_job(settings)),
             taken: 0,
             traced: 0,
             error: (!settings.is_valid()).then_some(VplPassError::Settings),
@@ -380,7 +384,7 @@ impl<'s, Q> VplPass<'s, Q> {
     /// Paths whose lights are in.
     fn paths(&self) -> u32 {
         if self.round == Round::Trace {
-            self.taken.saturating_mul(PATHS_PER_JOB).min(self.settings.paths)
+            self.taken.saturating_mul(paths_per_job(&self.settings)).min(self.settings.paths)
         } else {
             self.settings.paths
         }
@@ -501,8 +505,9 @@ where
         };
         if self.round == Round::Trace {
             let seed = mix(settings.seed ^ 0x51f2_90ad_c13b_7e66) ^ u64::from(self.number);
-            let from = job * PATHS_PER_JOB;
-            for path in from..from.saturating_add(PATHS_PER_JOB).min(settings.paths) {
+            let count = paths_per_job(settings);
+            let from = job * count;
+            for path in from..from.saturating_add(count).min(settings.paths) {
                 let mut rng = self.source.start(seed, u64::from(self.number), path);
                 shoot(world, &settings.bounds, &settings.walk, &mut rng, &mut |light| note(lights.push(light)));
             }
@@ -554,6 +559,11 @@ where
             Round::Done => "",
         }
     }
+}
+
+/// Paths of one job.
+fn paths_per_job(settings: &Settings) -> u32 {
+    (settings.paths / TRACE_JOBS).clamp(1, PATHS_PER_JOB)
 }
 
 /// Place of a point along a curve that fills the box: 16 bits of each coordinate, interleaved (Morton 1966).

@@ -75,7 +75,7 @@ impl Settings {
     /// # use fogbow::{host::Empty, math::{Bounds, Vec3}, medium::Homogeneous, phase::Phase, vpl::Settings};
     /// # use fogbow::{spectrum::Spectrum, world::{Outline, World}};
     /// let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::splat(10.0), Phase::ISOTROPIC)?;
-    /// let world = World { medium: &fog, scene: &Empty, lights: &[] };
+    /// let world = World { medium: &fog, scene: &Empty, lights: (&[]).into() };
     /// let outline = Outline::of(&world, Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE });
     /// let settings = Settings::for_outline(&outline);
     /// // Clamped within some part of a mean free path.
@@ -104,7 +104,7 @@ impl Settings {
     ///
     /// ```
     /// # use fogbow::{host::Empty, math::Bounds, vpl::Settings, world::{Outline, World}};
-    /// # let world = World { medium: &Empty, scene: &Empty, lights: &[] };
+    /// # let world = World { medium: &Empty, scene: &Empty, lights: (&[]).into() };
     /// let settings = Settings::for_outline(&Outline::of(&world, Bounds::EVERYTHING));
     /// let settings = Settings { lights: 100, candidates: 4, ..settings }.for_lights(200, 1000);
     /// assert_eq!(settings.paths, 2000);
@@ -123,14 +123,14 @@ impl Settings {
     /// # use fogbow::{host::{Empty, Medium}, math::{Bounds, Vec3}, medium::{Homogeneous, Pyramid}, phase::Phase};
     /// # use fogbow::{spectrum::Spectrum, vpl::Settings, world::{Outline, World}};
     /// let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::ONE, Phase::ISOTROPIC)?;
-    /// let world = World { medium: &fog, scene: &Empty, lights: &[] };
+    /// let world = World { medium: &fog, scene: &Empty, lights: (&[]).into() };
     /// let outline = Outline::of(&world, Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE });
     /// let (bounds, size) = Settings::for_outline(&outline).pyramid();
     /// let mut cells = vec![Spectrum::ZERO; Pyramid::<()>::cell_count(size)];
     /// let averaged = Pyramid::new(&fog, bounds, size, &mut cells)?;
     /// // The mean of what is the same everywhere.
     /// assert!((averaged.mean_extinction(Vec3::ZERO, 0.5)[0] - 1.0).abs() < 1e-5);
-    /// let world = World { medium: &averaged, scene: &Empty, lights: &[] };
+    /// let world = World { medium: &averaged, scene: &Empty, lights: (&[]).into() };
     /// # let _ = world;
     /// # Ok::<(), fogbow::medium::MediumError>(())
     /// ```
@@ -147,7 +147,7 @@ impl Settings {
     ///
     /// ```
     /// # use fogbow::{host::Empty, math::Bounds, vpl::Settings, world::{Outline, World}};
-    /// let world = World { medium: &Empty, scene: &Empty, lights: &[] };
+    /// let world = World { medium: &Empty, scene: &Empty, lights: (&[]).into() };
     /// let settings = Settings::for_outline(&Outline::of(&world, Bounds::EVERYTHING));
     /// assert_eq!(settings.gatherer(&world).bound, settings.bound);
     /// ```
@@ -160,7 +160,7 @@ impl Settings {
     ///
     /// ```
     /// # use fogbow::{host::Empty, math::Bounds, vpl::Settings, world::{Outline, World}};
-    /// # let world = World { medium: &Empty, scene: &Empty, lights: &[] };
+    /// # let world = World { medium: &Empty, scene: &Empty, lights: (&[]).into() };
     /// let settings = Settings::for_outline(&Outline::of(&world, Bounds::EVERYTHING));
     /// assert_eq!(settings.eye().points, 1);
     /// ```
@@ -175,7 +175,7 @@ impl Settings {
     /// ```
     /// # use fogbow::{host::Empty, math::{Bounds, Vec3}, phase::Phase, spectrum::Spectrum, world::{Outline, World}};
     /// # use fogbow::vpl::{Settings, VirtualLight};
-    /// # let world = World { medium: &Empty, scene: &Empty, lights: &[] };
+    /// # let world = World { medium: &Empty, scene: &Empty, lights: (&[]).into() };
     /// # let light = VirtualLight::in_medium(Vec3::ZERO, Vec3::Z, Spectrum::ONE, 1, &Phase::ISOTROPIC);
     /// let settings = Settings { samples: 4, ..Settings::for_outline(&Outline::of(&world, Bounds::EVERYTHING)) };
     /// let lights = [light; 8];

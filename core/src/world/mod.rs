@@ -20,7 +20,7 @@ pub use near::{Joint, NearLight};
 pub use outline::{LightCounts, Outline};
 pub use rays::{shadow_ray, short_of_end};
 
-use crate::light::Light;
+use crate::light::Lights;
 
 /// What light travels through, and where it comes from.
 ///
@@ -30,7 +30,7 @@ use crate::light::Light;
 /// let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::splat(0.1), Phase::ISOTROPIC)?;
 /// let lamps = [Light::Point(PointLight::new(Vec3::Z, Spectrum::ONE)?)];
 /// // Fog without end and a lamp, but no surfaces.
-/// let world = World { medium: &fog, scene: &Empty, lights: &lamps };
+/// let world = World { medium: &fog, scene: &Empty, lights: (&lamps).into() };
 /// assert_eq!(world.lights.len(), 1);
 /// # Ok::<(), Box<dyn core::error::Error>>(())
 /// ```
@@ -41,13 +41,14 @@ pub struct World<'a, M: ?Sized, S: ?Sized> {
     pub medium: &'a M,
     /// The surfaces; [`Empty`](crate::host::Empty) for none.
     pub scene: &'a S,
-    /// The lights; [`Hit::light`](crate::host::Hit::light) counts in this order.
+    /// The lights; [`Hit::light`](crate::host::Hit::light) counts in this order. A few are `(&lights).into()`; many have a
+    /// [`LightTree`](crate::light::LightTree).
     ///
     /// An area light (quad, sphere, mesh) is half of a lamp: the other half is its surface, which `scene` must find where the
     /// light says it is, with that number in `Hit::light`. Paths meet it by chance as well as by connections, and the weights of both
     /// add up to one; of a lamp that rays pass through, what chance would bring is missing, a quarter of its light or so. Nothing
     /// can tell: a ray that meets something else may well meet it before the lamp.
-    pub lights: &'a [Light<'a>],
+    pub lights: Lights<'a>,
 }
 
 impl<M: ?Sized, S: ?Sized> Clone for World<'_, M, S> {

@@ -87,7 +87,7 @@ fn is_distant(light: &Light<'_>) -> bool {
 /// # use fogbow::{spectrum::Spectrum, world::{Outline, World}};
 /// let fog = Homogeneous::new(Spectrum::splat(0.5), Spectrum::splat(1.5), Lobe::HenyeyGreenstein { g: 0.6 })?;
 /// let lamps = [Light::Point(PointLight::new(Vec3::Z, Spectrum::ONE)?)];
-/// let world = World { medium: &fog, scene: &Empty, lights: &lamps };
+/// let world = World { medium: &fog, scene: &Empty, lights: (&lamps).into() };
 /// let outline = Outline::of(&world, Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE });
 /// assert_eq!((outline.mean_free_path, outline.least_free_path, outline.albedo), (0.5, 0.5, 0.75));
 /// assert!(outline.is_constant && !outline.has_surfaces && outline.lights.delta == 1);
@@ -170,7 +170,7 @@ impl Outline {
             extinction: matter.over_extinction(matter.squared),
             albedo: matter.over_extinction(matter.scattering),
             phase: matter.phase,
-            lights: LightCounts::of(world.lights),
+            lights: LightCounts::of(&world.lights),
             has_surfaces,
             has_mirrors,
             is_grey: medium.is_grey(),
@@ -296,7 +296,7 @@ mod tests {
 
     #[test]
     fn lengths_are_those_of_the_medium_and_scale_with_it() {
-        let outline = Outline::of(&World { medium: &Halves, scene: &Empty, lights: &[] }, BOX);
+        let outline = Outline::of(&World { medium: &Halves, scene: &Empty, lights: (&[]).into() }, BOX);
         assert_eq!((outline.mean_free_path, outline.least_free_path), (1.0 / 1.5, 0.5));
         // (1 + 4)/(1 + 2)
         assert!((outline.extinction - 5.0 / 3.0).abs() < 1e-6 && outline.albedo == 0.5);
@@ -306,7 +306,7 @@ mod tests {
             let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::splat(1.0 / scale), Phase::ISOTROPIC).unwrap();
             let ball = Placed::new(fog, Region::sphere(Vec3::ZERO, scale).unwrap());
             let bounds = Bounds { min: BOX.min * scale, max: BOX.max * scale };
-            let outline = Outline::of(&World { medium: &ball, scene: &Empty, lights: &[] }, bounds);
+            let outline = Outline::of(&World { medium: &ball, scene: &Empty, lights: (&[]).into() }, bounds);
             assert_eq!((outline.least_free_path, outline.is_constant), (scale, true));
             // The ball takes π/6 of its box; a lattice sees that to a percent.
             let share = outline.least_free_path / outline.mean_free_path;
@@ -316,9 +316,9 @@ mod tests {
 
     #[test]
     fn mirrors_are_seen_through_null_interfaces() {
-        let outline = Outline::of(&World { medium: &Empty, scene: &Mirror, lights: &[] }, BOX);
+        let outline = Outline::of(&World { medium: &Empty, scene: &Mirror, lights: (&[]).into() }, BOX);
         assert!(outline.has_mirrors && outline.has_surfaces);
-        let outline = Outline::of(&World { medium: &Empty, scene: &Empty, lights: &[] }, BOX);
+        let outline = Outline::of(&World { medium: &Empty, scene: &Empty, lights: (&[]).into() }, BOX);
         assert!(!outline.has_mirrors && !outline.has_surfaces && outline.is_constant);
         assert_eq!((outline.mean_free_path, outline.extinction, outline.albedo), (f32::INFINITY, 0.0, 0.0));
     }
@@ -327,7 +327,7 @@ mod tests {
     fn bounds_without_size_or_end_still_show_the_medium() {
         let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::ONE, Phase::ISOTROPIC).unwrap();
         for bounds in [Bounds::EMPTY, Bounds::EVERYTHING, Bounds { min: Vec3::ONE, max: Vec3::ONE }] {
-            let outline = Outline::of(&World { medium: &fog, scene: &Empty, lights: &[] }, bounds);
+            let outline = Outline::of(&World { medium: &fog, scene: &Empty, lights: (&[]).into() }, bounds);
             assert_eq!((outline.mean_free_path, outline.extinction, outline.albedo), (1.0, 1.0, 1.0));
         }
     }

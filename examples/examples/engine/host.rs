@@ -48,7 +48,7 @@ pub(crate) fn film_point(sample: &Sample<'_, ()>) -> [f32; 2] {
 /// Fills caches, some jobs a frame, with breaks; saves and loads them; makes a picture of what was loaded.
 pub(crate) fn run() -> Result<(u64, u64), Box<dyn core::error::Error>> {
     let level = level()?;
-    let world = World { medium: &level.fog, scene: &level.room, lights: &level.lamps };
+    let world = World { medium: &level.fog, scene: &level.room, lights: (&level.lamps).into() };
     let mut queue = Queue::new(WORKERS, JOBS_PER_FRAME);
 
     // set-up {

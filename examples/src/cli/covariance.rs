@@ -9,7 +9,7 @@ use fogbow::covariance::{
     AdaptiveSteps, CovarianceGrid, EVEN_STEP, Fill, GridView, LEAST_STEP, LONGEST_STEP, Rule, STEP_COUNT, Settings,
 };
 use fogbow::host::Medium;
-use fogbow::light::Light;
+use fogbow::light::Lights;
 use fogbow::math::Ray;
 use fogbow::path;
 use fogbow_std::covariance::{load, save};
@@ -121,7 +121,7 @@ pub(crate) struct GridJob<'a> {
     /// Whether nothing but kernels of photon beams come from it.
     pub(crate) is_for_kernels: bool,
     pub(crate) world: &'a World<'a>,
-    pub(crate) lights: &'a [Light<'a>],
+    pub(crate) lights: Lights<'a>,
     pub(crate) paths: path::Settings,
     pub(crate) threads: usize,
     pub(crate) seed: u64,

@@ -9,7 +9,7 @@ use fogbow::world::{Outline, World};
 
 /// A world without anything in it whose diagonal is 1: lengths of its presets are shares of the diagonal.
 pub(super) fn unit_outline() -> Outline {
-    let world = World { medium: &Empty, scene: &Empty, lights: &[] };
+    let world = World { medium: &Empty, scene: &Empty, lights: (&[]).into() };
     Outline::of(&world, Bounds { min: Vec3::ZERO, max: Vec3::X })
 }
 
@@ -38,14 +38,14 @@ mod tests {
         let help = |id: &str| render.get_arguments().find(|option| option.get_id() == id).unwrap().get_help().unwrap();
         let due = [
             ("radius", "in the scene's unit of length [default: 0.005 of the scene's diagonal]"),
-            ("bias", "as a part of the light itself [default: 0.02]"),
+            ("bias", "it shrinks with further ones [default: 0.1]"),
             ("beams", "[default: as many as leave 4 pieces of beams for every pixel]"),
             ("pass_samples", "[default: 8, for virtual lights 64]"),
             ("share", "[default: 1, for abc 4]"),
             ("grid_paths", "[default: 100000, for kernels of photon beams 10000]"),
             ("step_length", "[default: 1/32 of the scene's diagonal, with covariances 1/8]"),
             ("image_share", "[from 0.05 to 1]"),
-            ("paths", "[default: 2048]"),
+            ("paths", "[default: 512, up to 2048 where the phase function is sharp]"),
             ("noise", "[at least 8 samples, without --spp at most 65536]"),
         ];
         for (id, end) in due {

@@ -4,7 +4,7 @@ use clap::{Arg, Args, ValueEnum};
 use fogbow::covariance::image_sampling::{self, Computed, FillingIn, LEAST_PLAN, Plan, Planning, USUAL_SHARE};
 use fogbow::covariance::{GridView, filter_precision};
 use fogbow::host::Medium;
-use fogbow::light::Light;
+use fogbow::light::Lights;
 use fogbow::math::{Ray, Vec2};
 use fogbow::spectrum::Spectrum;
 use fogbow::storage::Full;
@@ -85,7 +85,7 @@ impl SamplingArguments {
 #[derive(Clone, Copy)]
 pub(super) struct Sight<'a> {
     pub(super) world: &'a World<'a>,
-    pub(super) lights: &'a [Light<'a>],
+    pub(super) lights: Lights<'a>,
     pub(super) camera: Camera,
     pub(super) grid: GridView<'a>,
 }

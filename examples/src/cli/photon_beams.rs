@@ -37,10 +37,10 @@ pub struct BeamArguments {
     /// Radius of the blur in the first pass, in the scene's unit of length.
     #[arg(long, value_name = "R", value_parser = output::positive)]
     pub radius: Option<f64>,
-    /// Bias that `--kernel covariance` allows, as a part of the light itself.
+    /// Bias that `--kernel covariance` allows in the first pass, as a part of the light itself; it shrinks with further ones.
     #[arg(long, value_name = "BETA", value_parser = output::positive)]
     pub bias: Option<f64>,
-    /// Greatest radius of `--kernel covariance`.
+    /// Greatest radius of `--kernel covariance` in the first pass.
     #[arg(long, value_name = "R", value_parser = output::positive)]
     pub radius_most: Option<f64>,
     /// How fast the blur narrows, in (0, 1]: after i passes its square has shrunk by about i^(alpha-1).
@@ -124,11 +124,16 @@ impl WithMedium for BeamJob<'_> {
         }
         let grid = shot.grid.filter(|_| self.arguments.kernel == Kernel::Covariance);
         let mut storage = vec![0.0; grid.map_or(0, |grid| grid.lattice().cell_count())];
+        let power: f32 = shot.lights.iter().map(|light| light.power(&settings.bounds).mean()).sum();
+        let Settings { bias, widest, .. } = settings;
         let radii = match grid {
-            Some(grid) => Some(Radii::new(grid, settings.bias, kernel::SECOND_MOMENT, settings.widest, &mut storage)?),
+            Some(grid) => {
+                let noise = settings.noise(power);
+                Some(Radii::balanced(grid, noise, bias, kernel::SECOND_MOMENT, widest, &mut storage)?)
+            }
             None => None,
         };
-        let radius = |point: Vec3, pass: f32| radii.map_or(pass, |radii| radii.at(point).max(pass));
+        let radius = |point: Vec3, pass: f32| radii.map_or(pass, |radii| settings.widened(radii.at(point), pass));
         let length = NonZero::new(settings.samples).unwrap_or(NonZero::<u32>::MIN);
         let outcome = progressive::render(
             self.film,

@@ -133,7 +133,7 @@ fn hessian(arguments: &HessianArguments) -> Result<Ending, Failure> {
         scene: &arguments.scene,
         is_for_kernels: false,
         world: &world,
-        lights: &lights,
+        lights: (&lights).into(),
         paths: path_settings(&scene, arguments.max_depth),
         threads: arguments.threads,
         seed: arguments.seed,

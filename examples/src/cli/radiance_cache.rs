@@ -9,7 +9,7 @@ use fogbow::cache::{
 };
 use fogbow::covariance::image_sampling::Plan;
 use fogbow::host::Medium;
-use fogbow::light::Light;
+use fogbow::light::Lights;
 use fogbow::math::{Ray, Vec2};
 use fogbow::path;
 use fogbow::phase::Lobe;
@@ -125,7 +125,10 @@ fn told(option: Arg) -> Arg {
                 ),
             )
         }
-        "paths" => with_default(option, even.multiple.map_or(0, |effort| effort.samples)),
+        "paths" => {
+            let [few, many] = [even.multiple, sharp.multiple].map(|effort| effort.map_or(0, |effort| effort.samples));
+            with_default(option, format!("{few}, up to {many} where the phase function is sharp"))
+        }
         _ => option,
     }
 }
@@ -216,7 +219,7 @@ pub(super) fn check_depth(paths: &path::Settings) -> Result<(), String> {
 /// A render by radiance caching, to be done with a medium of any type.
 pub(super) struct CacheJob<'a> {
     pub(super) world: &'a World<'a>,
-    pub(super) lights: &'a [Light<'a>],
+    pub(super) lights: Lights<'a>,
     pub(super) camera: Camera,
     pub(super) paths: path::Settings,
     pub(super) film: &'a mut Film,

@@ -18,7 +18,7 @@ use super::report::Bar;
 use super::{Ending, Failure, output};
 use crate::camera::Camera;
 use crate::scene_file::SceneFile;
-use crate::world::{Storage, World};
+use crate::world::{Storage, World, light_tree, view};
 
 /// Draws where the records of radiance caches lie.
 #[derive(Debug, Args)]
@@ -92,6 +92,7 @@ pub(super) fn run(arguments: &RecordsArguments) -> Result<Ending, Failure> {
     let (width, height) = arguments.size.unwrap_or((scene.sensor.width, scene.sensor.height));
     let camera = world.camera_for(width, height);
     let lights = world.lights();
+    let tree = light_tree(&lights);
     let mut film = Film::new(width, height, &["total"])?;
     let bar = Bar::new(arguments.quiet);
     let progress = |progress: &Progress| bar.show(progress, u64::from(width) * u64::from(height));
@@ -106,7 +107,7 @@ pub(super) fn run(arguments: &RecordsArguments) -> Result<Ending, Failure> {
     let paths = path_settings(&scene, arguments.max_depth);
     let cached = world.media().with(CacheJob {
         world: &world,
-        lights: &lights,
+        lights: view(&lights, tree.as_ref()),
         camera,
         paths,
         film: &mut film,

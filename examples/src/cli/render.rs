@@ -9,7 +9,7 @@ use fogbow::cache::{self, Findings, Kind, RadianceCaches};
 use fogbow::covariance::image_sampling::Plan;
 use fogbow::covariance::{CovarianceGrid, GridView};
 use fogbow::host::Medium;
-use fogbow::light::Light;
+use fogbow::light::Lights;
 use fogbow::math::{Ray, Vec2};
 use fogbow::path::{self, InScattered, Radiance};
 use fogbow::picture;
@@ -37,7 +37,7 @@ use super::{Ending, Failure, ellipsoids, output};
 use crate::camera::Camera;
 use crate::scene_file::SceneFile;
 use crate::statistics::Statistics;
-use crate::world::{Storage, WithMedium, World};
+use crate::world::{Storage, WithMedium, World, light_tree, view};
 
 /// Renders a Mitsuba 3 scene.
 #[derive(Debug, Args)]
@@ -263,6 +263,8 @@ pub(crate) fn render(arguments: &RenderArguments) -> Result<Rendered, Failure> {
         ..tiles::Settings::default()
     };
     let lights = world.lights();
+    let tree = light_tree(&lights);
+    let lights = view(&lights, tree.as_ref());
     let camera = world.camera_for(width, height);
     let covariances = if arguments.needs_grid() {
         Some(world.media().with(GridJob {
@@ -270,7 +272,7 @@ pub(crate) fn render(arguments: &RenderArguments) -> Result<Rendered, Failure> {
             scene: &arguments.scene,
             is_for_kernels: arguments.method == Method::PhotonBeams && arguments.sampling.is_uniform(),
             world: &world,
-            lights: &lights,
+            lights,
             paths,
             threads: arguments.threads,
             seed: arguments.seed,
@@ -284,14 +286,14 @@ pub(crate) fn render(arguments: &RenderArguments) -> Result<Rendered, Failure> {
     let threads = Threads::new(arguments.threads)?;
     let plan = match grid {
         Some(grid) => {
-            let sight = Sight { world: &world, lights: &lights, camera, grid };
+            let sight = Sight { world: &world, lights, camera, grid };
             arguments.sampling.plan(sight, (width, height), &threads, &mut statistics)?
         }
         None => None,
     };
     let shot = Shot {
         world: &world,
-        lights: &lights,
+        lights,
         camera,
         paths,
         settings: &settings,
@@ -316,7 +318,7 @@ pub(crate) fn render(arguments: &RenderArguments) -> Result<Rendered, Failure> {
         Method::RadianceCache => {
             let done = world.media().with(CacheJob {
                 world: &world,
-                lights: &lights,
+                lights,
                 camera,
                 paths,
                 film: &mut film,
@@ -451,7 +453,7 @@ pub(crate) fn path_settings(scene: &SceneFile, max_depth: Option<u32>) -> path::
 #[derive(Clone, Copy)]
 pub(super) struct Shot<'a> {
     pub(super) world: &'a World<'a>,
-    pub(super) lights: &'a [Light<'a>],
+    pub(super) lights: Lights<'a>,
     pub(super) camera: Camera,
     pub(super) paths: path::Settings,
     pub(super) settings: &'a tiles::Settings,

@@ -62,9 +62,9 @@ const HEAD: &str =
 /// The section of the page.
 pub(super) fn section(plan: &Plan) -> Result<String, Failure> {
     let effort = if plan.quick {
-        Effort { size: [64, 64], passes: "8", judging: "56", paths: "20000" }
+        Effort { size: [64, 64], passes: "8", judging: "56", paths: "10000" }
     } else {
-        Effort { size: [160, 160], passes: "16", judging: "128", paths: "200000" }
+        Effort { size: [160, 160], passes: "16", judging: "128", paths: "10000" }
     };
     let (mut rows, mut table, mut gains, mut grids) = (Vec::new(), HEAD.to_owned(), String::new(), HEAD.to_owned());
     for scene in SCENES {

@@ -118,7 +118,7 @@ fn laplacian_across(r: f64, z: f64) -> f64 {
 /// Sends photons from `lights` and calls `look` with the grid after each number of paths in `stops`.
 fn fill(lights: &[Light<'_>], scatterings: u32, seed: u64, stops: &[u64], mut look: impl FnMut(&GridView<'_>)) {
     let (lattice, fog) = (lattice(), fog());
-    let world = World { medium: &fog, scene: &Empty, lights };
+    let world = World { medium: &fog, scene: &Empty, lights: lights.into() };
     let settings = Settings { max_scatterings: scatterings, ..Settings::default() };
     let mut voxels = vec![Voxel::EMPTY; lattice.cell_count()];
     let mut photons = FrequencyPhotons::new(world, None, lattice);

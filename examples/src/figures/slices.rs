@@ -57,7 +57,7 @@ fn fill(plan: &Plan, edge: u32, paths: u64, seed: u64) -> Result<Filled, Failure
         scene: &file,
         is_for_kernels: false,
         world: &world,
-        lights: &world.lights(),
+        lights: (&world.lights()).into(),
         paths: path_settings(&scene, Some(2)),
         threads: plan.threads,
         seed,

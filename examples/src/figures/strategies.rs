@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use fogbow::host::Medium;
-use fogbow::light::Light;
+use fogbow::light::Lights;
 use fogbow::math::Vec2;
 use fogbow::medium::Pyramid;
 use fogbow::path;
@@ -44,7 +44,7 @@ const STRATEGIES: [(&str, &str, Compensation); 5] = [
 /// What is rendered: all samples see all of the same virtual lights, and no other.
 struct Job<'a> {
     world: &'a World<'a>,
-    lamps: &'a [Light<'a>],
+    lamps: Lights<'a>,
     paths: path::Settings,
     /// Virtual lights, about.
     wanted: u32,
@@ -80,7 +80,7 @@ impl WithMedium for Job<'_> {
         threads::run(&mut pass, &lit, &threads, &Control::default(), None, |_| {});
         let lights = pass.finish()?;
         // The lamps are off: what comes straight from them is the same for all strategies.
-        let world = LitWorld { lights: &[], ..lit };
+        let world = LitWorld { lights: (&[]).into(), ..lit };
         let gatherer = Gatherer { world, bound, compensation: Some(self.compensation), has_mirrors: false };
         let eye = EyeSettings { single: 1, primary: 1, ..EyeSettings::new(paths) };
         let camera = self.world.camera_for(self.film.width(), self.film.height());
@@ -152,7 +152,7 @@ pub(super) fn section(plan: &Plan) -> Result<String, Failure> {
         let paths = path_settings(&scene, None);
         let job = Job {
             world: &world,
-            lamps: &lamps,
+            lamps: (&lamps).into(),
             paths,
             wanted: lights,
             run,

@@ -1,7 +1,8 @@
 //! Emitters, and the tables they borrow.
 
 use fogbow::light::{
-    EnvironmentMap, Light, LightError, MeshLight, PointLight, QuadLight, SphereLight, SpotLight, Sun, Triangle,
+    EnvironmentMap, Light, LightError, LightTree, MeshLight, PointLight, QuadLight, SphereLight, SpotLight, Sun,
+    Triangle,
 };
 use fogbow::math::{Mat3, Vec3};
 use fogbow::spectrum::Spectrum;
@@ -152,6 +153,21 @@ impl<'a> Lights<'a> {
     pub(super) fn all(&self) -> Vec<Light<'_>> {
         self.lights.iter().copied().chain(self.environment.iter().map(Light::Environment)).collect()
     }
+}
+
+/// Lights from which on a tree pays: below, looking at all of them is as quick, and chooses best.
+const MANY: usize = 16;
+
+/// A tree over a world's lights, where they are many.
+#[must_use]
+pub fn light_tree(lights: &[Light<'_>]) -> Option<LightTree<'static>> {
+    if lights.len() <= MANY { None } else { LightTree::new(lights, Vec::new()).ok() }
+}
+
+/// Lights with their tree, if there is one.
+#[must_use]
+pub fn view<'a>(lights: &'a [Light<'a>], tree: Option<&'a LightTree<'_>>) -> fogbow::light::Lights<'a> {
+    tree.map_or_else(|| lights.into(), |tree| fogbow::light::Lights::with_tree(lights, tree))
 }
 
 fn area_light<'a>(

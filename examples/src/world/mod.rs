@@ -29,7 +29,7 @@ use fogbow::surface::Surface;
 use fogbow::world::{Outline, World as LitWorld};
 
 pub use build::bounds_of;
-pub use lights::Storage;
+pub use lights::{Storage, light_tree, view};
 pub use media::{Media, WithMedium};
 
 use crate::camera::Camera;

@@ -89,7 +89,7 @@ pub(crate) fn single_scatter(out: &mut Digest) {
     let samples = |samples| single_scatter::Settings { samples, steps: STEPS };
     let done = with_lights(|lights| {
         media::each(|medium| {
-            let world = World { medium, scene: &Balls, lights };
+            let world = World { medium, scene: &Balls, lights: lights.into() };
             for _ in 0..ESTIMATES {
                 let (at, to_eye) = (point(&mut rng) * 0.4, direction(&mut rng));
                 let phase = medium.properties(at).phase;
@@ -115,7 +115,7 @@ pub(crate) fn multiple_scatter(out: &mut Digest) {
     let done = with_lights(|lights| {
         media::each(|medium| {
             let settings = multiple_scatter::Settings::new(STEPS);
-            let walk = Walk { world: World { medium, scene: &Balls, lights }, settings };
+            let walk = Walk { world: World { medium, scene: &Balls, lights: lights.into() }, settings };
             for _ in 0..ESTIMATES {
                 let (at, to_eye) = (point(&mut rng) * 0.4, direction(&mut rng));
                 let phase = medium.properties(at).phase;

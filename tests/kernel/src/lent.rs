@@ -4,8 +4,8 @@
 
 use fogbow::beams::{self, Beams};
 use fogbow::cache::{
-    self, Asked, Effort, Estimate, FillingMemory, Guide, Kind, Limits, Place, RadianceCaches, Slots, SurfaceCache,
-    TurningBasis, VolumeCache, Wanted,
+    self, Asked, Effort, Estimate, FillingMemory, Guide, Kind, Limits, PhotonCell, PhotonDeposit, PhotonEffort, Place,
+    RadianceCaches, Slots, SurfaceCache, TurningBasis, VolumeCache, Wanted,
 };
 use fogbow::host::{Hit, Scene};
 use fogbow::light::{Light, PointLight, SphereLight};
@@ -58,7 +58,7 @@ pub fn with_world<T>(f: impl FnOnce(&Foggy<'_>) -> T) -> Option<T> {
         Light::Sphere(SphereLight::new(SHINING.0, SHINING.1, white).ok()?),
         Light::Point(PointLight::new(Vec3::new(1.0, 1.0, -1.0), white).ok()?),
     ];
-    Some(f(&World { medium: &medium, scene: &OverPaleFloor, lights: &lights }))
+    Some(f(&World { medium: &medium, scene: &OverPaleFloor, lights: (&lights).into() }))
 }
 
 /// The eye ray of a point of the film.
@@ -107,6 +107,8 @@ pub fn cache_settings() -> cache::Settings {
         surface: effort(DEGREE),
         multiple: effort(DEGREE),
         irradiance: effort(0),
+        // Four cells a side, in all of which surfaces may be.
+        photons: Some(PHOTONS),
         rays: 16,
         round: ROUND as u32,
         light_samples: 1,
@@ -116,11 +118,18 @@ pub fn cache_settings() -> cache::Settings {
     }
 }
 
+/// Photons that light walks.
+const PHOTONS: PhotonEffort = PhotonEffort { bounds: BOUNDS, cells: 4, paths: 256, flights: 10_000, enough: u32::MAX };
+
+/// Cells of light, and what the photons of a job leave in them: these are few.
+const CELLS: usize = 64;
+const DEPOSITS: usize = 2048;
+
 /// Where light is asked for.
 pub const ASKED: Asked = Asked::View { ray: eye_ray, pixel: 0.05 };
 
 /// Room for the caches of all kinds.
-const CHUNKS: usize = 4 * VolumeCache::chunks(RECORDS, STRIDE) + 2 * SurfaceCache::chunks(RECORDS, 1);
+const CHUNKS: usize = 3 * VolumeCache::chunks(RECORDS, STRIDE) + 2 * SurfaceCache::chunks(RECORDS, 1);
 
 /// Fills caches in lent memory and calls `read` with them and with whether the memory was too small.
 fn filled(world: &Foggy<'_>, read: impl FnOnce(&RadianceCaches<'_>, bool)) {
@@ -131,6 +140,7 @@ fn filled(world: &Foggy<'_>, read: impl FnOnce(&RadianceCaches<'_>, bool)) {
     let mut open = [[0; PLACES]; 3];
     let (mut chosen, mut estimates) = ([(0, 0.0); ROUND], [Estimate::default(); RECORDS]);
     let (mut higher, mut of_job) = ([Coefficient::ZERO; STRIDE * RECORDS], [Coefficient::ZERO; STRIDE]);
+    let (mut photons, mut deposits) = ([PhotonCell::default(); CELLS], [PhotonDeposit::default(); DEPOSITS]);
     let mut guides = [[Guide::default(); RECORDS]; Kind::COUNT];
     let ([wanted, found], [open, still_open, looked_up]) = (&mut wanted, &mut open);
     let memory = FillingMemory::lent(Slots {
@@ -140,9 +150,10 @@ fn filled(world: &Foggy<'_>, read: impl FnOnce(&RadianceCaches<'_>, bool)) {
         estimates: &mut estimates,
         higher: &mut higher,
         guides: guides.each_mut().map(|guides| &mut guides[..]),
+        photons: &mut photons,
     });
     let mut filling = caches.fill_in(memory, ASKED);
-    work::finish(&mut filling, world, &mut cache::FilledRecords::lent(found, looked_up, &mut of_job));
+    work::finish(&mut filling, world, &mut cache::FilledRecords::lent(found, looked_up, &mut of_job, &mut deposits));
     let is_cut = filling.is_cut();
     read(&filling.finish(), is_cut);
 }
@@ -172,10 +183,11 @@ pub fn read_caches(out: &mut Digest, caches: &RadianceCaches<'_>, world: &Foggy<
     }
     let mut rng = Generator::new(18);
     for ray in eye_rays(&mut rng) {
-        cache::places(&ray, world, &caches.settings().eye, &mut rng, |Place { point, normal, is_seen }| {
+        cache::places(&ray, world, &caches.settings().eye, &mut rng, |Place { point, normal, is_seen, share }| {
             out.vec3(point);
             out.option(normal, Digest::vec3);
             out.int(u64::from(is_seen));
+            out.float(share);
         });
         let seen = caches.radiance(&ray, world, &mut rng);
         [seen.emitted, seen.surface_direct, seen.surface_indirect]
@@ -414,6 +426,7 @@ mod tests {
         assert_eq!((room.wanted, room.open, room.of_job_wanted, room.of_job_open), (PLACES, PLACES, PLACES, PLACES));
         assert_eq!((room.chosen, room.estimates, room.higher), (ROUND, RECORDS, STRIDE * RECORDS));
         assert_eq!((room.of_job_higher, room.guides), (STRIDE, [RECORDS; Kind::COUNT]));
+        assert!(room.photons <= CELLS && room.of_job_deposits >= DEPOSITS);
         assert_eq!(room.chunks, CHUNKS);
     }
 }

@@ -91,7 +91,7 @@ fn paths(mut each: impl FnMut(path::Radiance)) -> bool {
     let settings = Settings { max_scatterings: 12, ..Settings::default() };
     with_lights(|lights| {
         media::each(|medium| {
-            let world = World { medium, scene: &Balls, lights };
+            let world = World { medium, scene: &Balls, lights: lights.into() };
             for _ in 0..PATHS {
                 let eye = Vec3::new(0.0, 0.5, -5.0);
                 let ray = Ray::new(eye, (point(&mut rng) * 0.5 - eye).normalize());

@@ -1,0 +1,456 @@
+//! Light in cells of a grid, brought by photons: what random walks end at.
+//!
+//! Walks from a point to the lights are long where fog is dense, and rarely find light where it is dark. Photons bring the light of whole
+//! paths, wherever it goes, at the cost of one walk for all the cells it passes. A cell's light is a mean over its volume, too
+//! coarse for a picture, but what is gathered from many cells some scatterings away is neither blurred nor noisy.
+
+use super::lookup::TurningBasis;
+use crate::host::{Medium, Properties, Scene};
+use crate::light::Light;
+use crate::math::{Bounds, Ray, Vec3};
+use crate::phase::Phase;
+use crate::photon::{Event, trace};
+use crate::sampling::uniform::mix;
+use crate::sampling::{Generator, uniform};
+use crate::sh;
+use crate::single_scatter::Contribution;
+use crate::spectrum::{Gradient, Spectrum};
+use crate::storage::{Full, List};
+use crate::world::World;
+
+/// Degree of a cell's expansion of radiance by direction. More: memory and time, for detail that walks blur anyway; fewer: what
+/// is scattered forward is lost.
+const DEGREE: usize = 2;
+
+const COEFFICIENTS: usize = sh::coefficient_count(DEGREE);
+
+/// Photons that must have passed a cell before walks end there. Fewer: their noise is seen; more: walks go on where light is well known.
+const LEAST_PATHS: u32 = 8;
+
+/// Part of the lit cells that photons are to know well. More: all wait for the darkest corner; less: dark parts of a picture are noisy.
+const KNOWN: f64 = 0.9;
+
+/// How much of what cells do not resolve by direction may be left where walks end: each scattering blurs it. More: sharply forward
+/// scattering fog loses contrast; less: walks are longer in it.
+pub(super) const SHARPEST: f32 = 0.55;
+
+/// Photons of one job.
+pub(super) const PATHS_PER_JOB: u32 = 32;
+
+/// What the photons of a job are expected to leave at most, where memory is lent: some hundred cells each.
+pub(super) const DEPOSITS_OF_JOB: usize = 512 * PATHS_PER_JOB as usize;
+
+/// Cells that one job looks at for surfaces.
+pub(super) const CELLS_PER_JOB: u32 = 512;
+
+/// How far from a cell's corners towards its middle surfaces are looked for: those that lie in its faces leave it whole.
+const INSET: f32 = 1e-3;
+
+/// How photons light the cells at which random walks end.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PhotonEffort {
+    /// The box (m) that is divided into cells; it should hold all surfaces and media.
+    pub bounds: Bounds,
+    /// Cells along its longest side.
+    pub cells: u32,
+    /// Paths of photons at most.
+    pub paths: u32,
+    /// Flights of photons, at which no more paths begin.
+    pub flights: u64,
+    /// Photons that are to have passed nearly every lit cell: then no more paths begin.
+    pub enough: u32,
+}
+
+impl PhotonEffort {
+    /// The side of a cell (m) and how many there are along each axis; `None` if the bounds are no box.
+    fn division(&self) -> Option<(f32, [u32; 3])> {
+        let size = self.bounds.size();
+        let is_box = size.is_finite() && size.cmpge(Vec3::ZERO).all() && size.max_element() > 0.0;
+        if !is_box || self.cells == 0 {
+            return None;
+        }
+        let side = size.max_element() / self.cells as f32;
+        let counts = size / side;
+        Some((side, counts.to_array().map(|count| (libm::ceilf(count - INSET) as u32).clamp(1, self.cells))))
+    }
+
+    /// How many cells there are.
+    pub(super) fn room(&self) -> usize {
+        self.division().map_or(0, |(_, counts)| counts.iter().map(|&count| count as usize).product())
+    }
+}
+
+/// What one photon leaves in one cell.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct PhotonDeposit {
+    cell: u32,
+    path: u32,
+    /// Where (m), and the direction of travel.
+    at: Vec3,
+    direction: Vec3,
+    /// Power times the length of the way (W·m).
+    light: Spectrum,
+}
+
+/// The light of one cell.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct PhotonCell {
+    /// `Σ power · length · Y(direction of travel)` (W·m).
+    moments: [Spectrum; COEFFICIENTS],
+    /// How many photons came by, and the last of them.
+    paths: u32,
+    last: u32,
+    /// Where the first did (m).
+    met: Vec3,
+    /// Whether no surface cuts it.
+    is_whole: bool,
+}
+
+/// Cells of light: see [`PhotonEffort`].
+#[derive(Debug)]
+pub struct PhotonGrid<'s> {
+    first: Vec3,
+    side: f32,
+    counts: [u32; 3],
+    cells: List<'s, PhotonCell>,
+    paths: u32,
+    flights: u64,
+}
+
+#[cfg(feature = "alloc")]
+impl Default for PhotonGrid<'_> {
+    fn default() -> Self {
+        Self::new(List::default())
+    }
+}
+
+#[cfg(feature = "alloc")]
+impl PhotonGrid<'static> {
+    /// Cells lit by photons, all at once; a [`Filling`](super::Filling) does it in rounds. `walk` says how long photons fly.
+    ///
+    /// ```
+    /// # use fogbow::{cache::{PhotonEffort, PhotonGrid}, host::{Empty, Medium}, light::Light, math::{Bounds, Vec3}};
+    /// # use fogbow::{medium::{Homogeneous, Placed, Region}, path, phase::Phase, spectrum::Spectrum, world::World};
+    /// // A ball of white fog under an even sky of radiance 1: as much is scattered anywhere in any direction.
+    /// let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::ONE, Phase::ISOTROPIC)?;
+    /// let ball = Placed::new(fog, Region::sphere(Vec3::ZERO, 1.0)?);
+    /// let sky = [Light::Constant(Spectrum::ONE)];
+    /// let world = World { medium: &ball, scene: &Empty, lights: (&sky).into() };
+    /// let bounds = Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE };
+    /// let effort = PhotonEffort { bounds, cells: 4, paths: 200_000, flights: u64::MAX, enough: u32::MAX };
+    /// let cells = PhotonGrid::lit(&world, &effort, &path::Settings::default(), 1);
+    /// let properties = ball.properties(Vec3::ZERO);
+    /// let (light, _) = cells.scattered(Vec3::splat(0.2), Vec3::Z, &properties).unwrap();
+    /// assert!((light.radiance[0] - 1.0).abs() < 0.05, "{light:?}");
+    /// assert!(cells.scattered(Vec3::splat(9.0), Vec3::Z, &properties).is_none());
+    /// # Ok::<(), Box<dyn core::error::Error>>(())
+    /// ```
+    #[must_use]
+    pub fn lit<M: Medium + ?Sized, S: Scene + ?Sized>(
+        world: &World<'_, M, S>,
+        effort: &PhotonEffort,
+        walk: &crate::path::Settings,
+        seed: u64,
+    ) -> Self {
+        let (mut cells, mut deposits) = (Self::default(), List::default());
+        // Growing memory is never full.
+        let _ = cells.reset(effort);
+        while cells.paths < effort.paths && cells.flights < effort.flights {
+            deposits.clear();
+            let flights = cells.shoot(cells.paths, world, (effort, walk, seed), &mut deposits).unwrap_or(0);
+            cells.accept(deposits.as_slice(), 1, u64::from(flights));
+        }
+        for number in 0..cells.len() as u32 {
+            if cells.is_whole(number, world.scene) {
+                cells.mark(&[number]);
+            }
+        }
+        cells
+    }
+}
+
+impl<'s> PhotonGrid<'s> {
+    pub(super) fn new(cells: List<'s, PhotonCell>) -> Self {
+        Self { first: Vec3::ZERO, side: 0.0, counts: [0; 3], cells, paths: 0, flights: 0 }
+    }
+
+    /// Dark cells that fill the bounds.
+    pub(super) fn reset(&mut self, effort: &PhotonEffort) -> Result<(), Full> {
+        (self.paths, self.flights, self.counts) = (0, 0, [0; 3]);
+        self.cells.clear();
+        let Some((side, counts)) = effort.division() else { return Ok(()) };
+        self.side = side;
+        // Whole cells about the same middle.
+        self.first = effort.bounds.centre() - Vec3::from(counts.map(|count| count as f32)) * (0.5 * side);
+        self.cells.reset(effort.room(), PhotonCell::default())?;
+        self.counts = counts;
+        Ok(())
+    }
+
+    pub(super) fn paths(&self) -> u32 {
+        self.paths
+    }
+
+    pub(super) fn flights(&self) -> u64 {
+        self.flights
+    }
+
+    /// Whether enough photons have passed nearly every cell that any has passed.
+    pub(super) fn is_known(&self, enough: u32) -> bool {
+        let lit = self.cells.as_slice().iter().filter(|cell| cell.paths >= LEAST_PATHS);
+        let (all, known) =
+            lit.fold((0_u32, 0_u32), |(all, known), cell| (all + 1, known + u32::from(cell.paths >= enough)));
+        all > 0 && f64::from(known) >= KNOWN * f64::from(all)
+    }
+
+    pub(super) fn len(&self) -> usize {
+        self.cells.len()
+    }
+
+    fn bounds(&self) -> Bounds {
+        let size = Vec3::from(self.counts.map(|count| count as f32)) * self.side;
+        Bounds { min: self.first, max: self.first + size }
+    }
+
+    fn cell_of(&self, point: Vec3) -> Option<[u32; 3]> {
+        let at = (point - self.first) / self.side;
+        // Written so that NaN fails, too.
+        let inside = (0..3).all(|axis| at[axis] >= 0.0 && at[axis] < self.counts[axis] as f32);
+        inside.then(|| at.to_array().map(|a| a as u32))
+    }
+
+    fn number(&self, [x, y, z]: [u32; 3]) -> u32 {
+        (z * self.counts[1] + y) * self.counts[0] + x
+    }
+
+    /// Lets one photon fly; its flights are counted, what it leaves goes to `deposits`.
+    pub(super) fn shoot<M: Medium + ?Sized, S: Scene + ?Sized>(
+        &self,
+        path: u32,
+        world: &World<'_, M, S>,
+        (effort, settings, seed): (&PhotonEffort, &crate::path::Settings, u64),
+        deposits: &mut List<'_, PhotonDeposit>,
+    ) -> Result<u32, Full> {
+        let mut rng = Generator::new(mix(seed ^ 0x9407) ^ u64::from(path));
+        let mut along = Generator::child(&mut rng);
+        let (mut flights, mut kept, bounds) = (0, Ok(()), self.bounds());
+        // What walks connect to is no business of cells.
+        let mut is_straight = false;
+        trace(world, &effort.bounds, settings, &mut rng, &mut |event: &Event<'_>| match *event {
+            Event::Emitted { light, .. } => is_straight = !world.lights.get(light).is_some_and(Light::is_sky),
+            Event::Flew { reach, distance, power } => {
+                flights += 1;
+                let straight = core::mem::replace(&mut is_straight, false);
+                let Some((near, far)) = bounds.intersect(reach).filter(|_| !straight) else { return };
+                let (near, far) = (near.max(0.0), far.min(distance));
+                let length = far - near;
+                if !(length > 0.0) {
+                    return;
+                }
+                let count = (length / self.side) as u32 + 1;
+                let step = length / count as f32;
+                for i in 0..count {
+                    let at = reach.at(near + (i as f32 + uniform(&mut along)) * step);
+                    if let Some(cell) = self.cell_of(at) {
+                        let cell = self.number(cell);
+                        let deposit = PhotonDeposit { cell, path, at, direction: reach.direction, light: power * step };
+                        kept = kept.and(deposits.push(deposit));
+                    }
+                }
+            }
+            Event::Collided { .. } | Event::Met { .. } => {}
+        });
+        kept.map(|()| flights)
+    }
+
+    pub(super) fn accept(&mut self, deposits: &[PhotonDeposit], paths: u32, flights: u64) {
+        self.paths += paths;
+        self.flights += flights;
+        let cells = self.cells.as_mut_slice();
+        let mut basis = [0.0; COEFFICIENTS];
+        for deposit in deposits {
+            let Some(cell) = cells.get_mut(deposit.cell as usize) else { continue };
+            sh::evaluate(deposit.direction, DEGREE, &mut basis);
+            for (sum, y) in cell.moments.iter_mut().zip(basis) {
+                *sum += deposit.light * y;
+            }
+            if cell.paths == 0 {
+                cell.met = deposit.at;
+            }
+            if cell.paths == 0 || cell.last != deposit.path {
+                (cell.paths, cell.last) = (cell.paths + 1, deposit.path);
+            }
+        }
+    }
+
+    /// Whether no surface cuts a cell, seen from where a photon came by; of cells that none did, `false`.
+    pub(super) fn is_whole<S: Scene + ?Sized>(&self, number: u32, scene: &S) -> bool {
+        let Some(cell) = self.cells.as_slice().get(number as usize).filter(|cell| cell.paths >= LEAST_PATHS) else {
+            return false;
+        };
+        let [nx, ny, _] = self.counts;
+        let index = Vec3::new((number % nx) as f32, (number / nx % ny) as f32, (number / (nx * ny)) as f32);
+        let half = 0.5 * self.side;
+        let middle = self.first + index * self.side + Vec3::splat(half);
+        let is_free = |to: Vec3| {
+            let ray = Ray::between(cell.met, middle + to * (half * (1.0 - INSET)));
+            !scene.is_blocked(&ray)
+        };
+        let corners = (0..8).map(|i| Vec3::new(sign(i & 1), sign(i >> 1 & 1), sign(i >> 2)));
+        let faces = (0..6).map(|i| Vec3::AXES[i >> 1] * sign(i & 1));
+        corners.chain(faces).all(is_free)
+    }
+
+    pub(super) fn mark(&mut self, whole: &[u32]) {
+        let cells = self.cells.as_mut_slice();
+        for &number in whole {
+            if let Some(cell) = cells.get_mut(number as usize) {
+                cell.is_whole = true;
+            }
+        }
+    }
+
+    fn trusted(&self, [x, y, z]: [u32; 3]) -> Option<&PhotonCell> {
+        // Beyond the first cell numbers wrap around.
+        let [nx, ny, nz] = self.counts;
+        if x >= nx || y >= ny || z >= nz {
+            return None;
+        }
+        self.cells.as_slice().get(self.number([x, y, z]) as usize).filter(|cell| cell.is_whole)
+    }
+
+    /// All light but that straight from the lights walks connect to, scattered towards `to_eye` at `point`, with its gradients as the point
+    /// moves and as `to_eye` turns; `None` where cells do not know: outside, where few photons came, and where a surface cuts them.
+    ///
+    /// Radiance is an expansion of degree 2 in the direction of travel, a mean over the cell with the slope to its neighbours:
+    /// `Σ p_l L_lm Y_lm`, `L_lm = Σ power · length · Y_lm / (volume · paths)`.
+    ///
+    /// ```
+    /// # use fogbow::{cache::{PhotonEffort, PhotonGrid}, host::{Empty, Medium}, math::{Bounds, Vec3}, medium::Homogeneous};
+    /// # use fogbow::{path, phase::Phase, spectrum::Spectrum, world::World};
+    /// // Without lights nothing is known.
+    /// let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::ONE, Phase::ISOTROPIC)?;
+    /// let world = World { medium: &fog, scene: &Empty, lights: (&[]).into() };
+    /// let bounds = Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE };
+    /// let effort = PhotonEffort { bounds, cells: 2, paths: 10, flights: 100, enough: 1 };
+    /// let cells = PhotonGrid::lit(&world, &effort, &path::Settings::default(), 1);
+    /// assert!(cells.scattered(Vec3::ZERO, Vec3::Z, &fog.properties(Vec3::ZERO)).is_none());
+    /// # Ok::<(), Box<dyn core::error::Error>>(())
+    /// ```
+    #[must_use]
+    pub fn scattered(&self, point: Vec3, to_eye: Vec3, properties: &Properties) -> Option<(Contribution, Gradient)> {
+        let index = self.cell_of(point)?;
+        let cell = self.trusted(index)?;
+        let basis = TurningBasis::new(to_eye, DEGREE);
+        let moments: [Spectrum; DEGREE + 1] = core::array::from_fn(|l| properties.phase.moment(l));
+        const DEGREES: [usize; COEFFICIENTS] = [0, 1, 1, 1, 2, 2, 2, 2, 2];
+        let scale = 1.0 / (self.paths as f32 * self.side * self.side * self.side);
+        let light = |cell: &PhotonCell| -> Spectrum {
+            (0..COEFFICIENTS).map(|k| cell.moments[k] * moments[DEGREES[k]] * basis.value(k)).sum::<Spectrum>() * scale
+        };
+        let here = light(cell);
+        let mut gradient = Gradient::ZERO;
+        let mut radiance = here;
+        let middle = self.first + (Vec3::from(index.map(|i| i as f32)) + Vec3::splat(0.5)) * self.side;
+        for axis in 0..3 {
+            let beside = |step: u32| {
+                let mut index = index;
+                index[axis] = index[axis].wrapping_add(step);
+                self.trusted(index).map(light)
+            };
+            let slope = match (beside(u32::MAX), beside(1)) {
+                (Some(before), Some(after)) => (after - before) * (0.5 / self.side),
+                (Some(before), None) => (here - before) / self.side,
+                (None, Some(after)) => (after - here) / self.side,
+                (None, None) => Spectrum::ZERO,
+            };
+            gradient += Gradient::outer(slope, Vec3::AXES[axis]);
+            radiance += slope * (point[axis] - middle[axis]);
+        }
+        let turned = (1..COEFFICIENTS).fold(Gradient::ZERO, |sum, k| {
+            sum + Gradient::outer(cell.moments[k] * moments[DEGREES[k]] * scale, basis.slope(k))
+        });
+        Some((Contribution { radiance, gradient }, turned))
+    }
+}
+
+/// What a scattering leaves of the least degree that cells do not resolve, in [0, 1].
+pub(super) fn unresolved(phase: &Phase) -> f32 {
+    phase.moment(DEGREE + 1).map(f32::abs).max_element()
+}
+
+fn sign(bit: usize) -> f32 {
+    if bit == 0 { -1.0 } else { 1.0 }
+}
+
+#[cfg(all(test, feature = "alloc"))]
+mod tests {
+    use super::*;
+    use crate::host::Hit;
+    use crate::light::PointLight;
+    use crate::medium::Homogeneous;
+    use crate::path;
+    use crate::phase::Lobe;
+    use crate::surface::Surface;
+
+    const BOX: Bounds = Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE };
+
+    fn effort(paths: u32) -> PhotonEffort {
+        PhotonEffort { bounds: BOX, cells: 5, paths, flights: u64::MAX, enough: u32::MAX }
+    }
+
+    /// Black, at `z = 0.1`.
+    struct Wall;
+
+    impl Scene for Wall {
+        fn closest_hit(&self, ray: &Ray) -> Option<Hit> {
+            let distance = (0.1 - ray.origin.z) / ray.direction.z;
+            (distance > 1e-6 && distance < ray.length).then_some(Hit {
+                distance,
+                normal: Vec3::NEG_Z,
+                surface: Surface::BLACK,
+                light: None,
+            })
+        }
+    }
+
+    /// Cells of 0.4 from -1 on: the wall lies within the middle layer.
+    #[test]
+    fn cells_that_a_surface_cuts_or_that_lie_in_the_dark_do_not_know() {
+        let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::ONE, Phase::ISOTROPIC).unwrap();
+        let lamps = [Light::Point(PointLight::from_flux(Vec3::new(0.0, 0.0, -0.5), Spectrum::ONE).unwrap())];
+        let world = World { medium: &fog, scene: &Wall, lights: (&lamps).into() };
+        let cells = PhotonGrid::lit(&world, &effort(4000), &path::Settings::default(), 1);
+        let known = |z: f32| cells.scattered(Vec3::new(0.1, 0.1, z), Vec3::X, &fog.properties(Vec3::ZERO)).is_some();
+        assert_eq!([-0.8, -0.4, 0.0, 0.15, 0.4].map(known), [true, true, false, false, false]);
+    }
+
+    /// What flows one way is scattered on by the phase function, as far as the degree of cells goes; light straight from a
+    /// lamp is not in them.
+    #[test]
+    fn cells_hold_directions_and_gradients_but_no_light_straight_from_lamps() {
+        let phase = Lobe::HenyeyGreenstein { g: 0.4 };
+        let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::ONE, phase).unwrap();
+        let dark = Homogeneous::new(Spectrum::ONE, Spectrum::ZERO, phase).unwrap();
+        let lamps = [Light::Point(PointLight::from_flux(Vec3::splat(-0.9), Spectrum::ONE).unwrap())];
+        let black = World { medium: &dark, scene: &crate::host::Empty, lights: (&lamps).into() };
+        let cells = PhotonGrid::lit(&black, &effort(2000), &path::Settings::default(), 1);
+        assert!(cells.cells.as_slice().iter().all(|cell| cell.paths == 0), "nothing is scattered");
+
+        let world = World { medium: &fog, ..black };
+        let cells = PhotonGrid::lit(&world, &effort(100_000), &path::Settings::default(), 1);
+        let at = |x: f32, to_eye: Vec3| cells.scattered(Vec3::splat(x), to_eye, &fog.properties(Vec3::ZERO)).unwrap();
+        let (away, towards) = (Vec3::ONE.normalize(), -Vec3::ONE.normalize());
+        let ((ahead, _), (back, _)) = (at(0.0, away), at(0.0, towards));
+        assert!(ahead.radiance[0] > 1.3 * back.radiance[0], "{ahead:?} {back:?}");
+        // Light falls off away from the lamp, and linearly from cell to cell.
+        let slope = ahead.gradient.channel(0).dot(away);
+        let difference = (at(0.19, away).0.radiance[0] - at(-0.19, away).0.radiance[0]) / (0.38 * 3_f32.sqrt());
+        assert!(slope < 0.0 && (slope / difference - 1.0).abs() < 1e-3, "{slope} {difference}");
+        // Turning the direction does what the basis says.
+        let turned = Vec3::new(1.0, 1.0, 1.1).normalize();
+        let change = at(0.0, turned).0.radiance[0] - ahead.radiance[0];
+        let told = at(0.0, (away + turned).normalize()).1.channel(0).dot(turned - away);
+        assert!((change / told - 1.0).abs() < 0.01, "{change} {told}");
+    }
+}

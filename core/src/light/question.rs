@@ -1,0 +1,257 @@
+//! What is asked of lights: what one sends to a place, and about what those in a node of the tree send there.
+
+use glam::Vec3;
+
+use super::cut::{CHOICE, WALKS};
+use super::tree::{Kind, LightNode};
+use super::{Light, NearField};
+use crate::math::{Ray, float};
+
+/// What the lights of a node send, together.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Guess {
+    /// In the unit of [`Question::light`]; 0 only if it is 0 for all of them.
+    pub weight: f32,
+    /// How much of it is uncertain.
+    pub doubt: f32,
+}
+
+impl Guess {
+    /// `ratio2` is the squared radius of the node over its squared distance.
+    #[inline]
+    fn new(weight: f32, ratio2: f32) -> Self {
+        // Of 1/(1 − ρ)² − 1/(1 + ρ)², for the nearest and the farthest light there may be, as much as does not cancel.
+        let clear = (1.0 - ratio2).max(0.1);
+        Self { weight, doubt: weight * ratio2 * (4.0 / (clear * clear)) }
+    }
+}
+
+impl core::ops::Mul<f32> for Guess {
+    type Output = Self;
+    fn mul(self, factor: f32) -> Self {
+        Self { weight: self.weight * factor, doubt: self.doubt * factor }
+    }
+}
+
+/// A measure of lights.
+pub(crate) trait Question {
+    /// Whether lights of this kind may have a weight.
+    fn asks(&self, kind: Kind) -> bool;
+    /// What one light sends, at most 10³⁰, so that a sum over all lights stays a number; 0 for those that take no part.
+    fn light(&self, light: &Light<'_>) -> f32;
+    /// The same for a node of the tree, about.
+    fn node(&self, node: &LightNode) -> Guess;
+    /// The same for a leaf: what is told by it alone, where that is all there is to know.
+    fn leaf(&self, _: &LightNode, light: &Light<'_>) -> f32 {
+        self.light(light)
+    }
+    /// Nodes of a cut at most.
+    fn limit(&self) -> usize {
+        CHOICE
+    }
+}
+
+/// Smallest squared distance to the middle of a node over its squared radius: what is inside counts as if it were evenly spread. Larger:
+/// nodes that are not opened around a place are chosen too seldom; smaller: too often.
+const INSIDE: f32 = 1.0 / 6.0;
+
+/// Lights whose near fields are left out at a point inside them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Except {
+    /// None.
+    Nothing,
+    /// [`Light::near_field`].
+    Near,
+    /// [`Light::steep_field`].
+    Steep,
+}
+
+/// Irradiance at a point, about: [`Light::importance`].
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct FromPoint {
+    /// Where.
+    pub point: Vec3,
+    /// Near fields left out.
+    pub except: Except,
+    /// Whether a sky counts.
+    pub sky: bool,
+}
+
+impl FromPoint {
+    pub(crate) fn all(point: Vec3) -> Self {
+        Self { point, except: Except::Nothing, sky: true }
+    }
+}
+
+impl Question for FromPoint {
+    fn asks(&self, kind: Kind) -> bool {
+        match kind {
+            Kind::Lamp => self.except == Except::Nothing,
+            Kind::Body | Kind::Panel | Kind::Sun => true,
+            Kind::Sky => self.sky,
+        }
+    }
+
+    #[inline]
+    fn light(&self, light: &Light<'_>) -> f32 {
+        let within = |field: Option<NearField>| field.is_some_and(|field| field.contains(self.point));
+        let left_out = match self.except {
+            Except::Nothing => false,
+            Except::Near => within(light.near_field()),
+            Except::Steep => within(light.steep_field()),
+        };
+        if left_out || (!self.sky && light.is_sky()) { 0.0 } else { light.importance(self.point).min(1e30) }
+    }
+
+    #[inline]
+    fn leaf(&self, node: &LightNode, light: &Light<'_>) -> f32 {
+        if !node.is_even() || node.reach == 0.0 {
+            return self.light(light);
+        }
+        let distance2 = self.point.distance_squared(node.centre);
+        let left_out = self.except != Except::Nothing && !(distance2 >= node.reach * node.reach);
+        if left_out { 0.0 } else { (node.strength / distance2.max(1e-12)).min(1e30) }
+    }
+
+    #[inline]
+    fn node(&self, node: &LightNode) -> Guess {
+        // At infinity all are the same from everywhere.
+        if node.reach == 0.0 {
+            return Guess { weight: node.strength, doubt: 0.0 };
+        }
+        let offset = self.point - node.centre;
+        let (distance2, radius2) = (offset.length_squared(), node.radius2);
+        if !node.shines_to(offset, distance2) {
+            return Guess::default();
+        }
+        // Lamps on one another have no radius.
+        let inverse2 = 1.0 / distance2.max(INSIDE * radius2).max(1e-12);
+        Guess::new((node.strength * inverse2).min(1e30), radius2 * inverse2)
+    }
+}
+
+/// What is sent to a part of a ray: [`Light::sent_along`].
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct FromRay {
+    /// The ray.
+    pub ray: Ray,
+    /// From here (m), …
+    pub near: f32,
+    /// … to here; may be infinite.
+    pub far: f32,
+    /// Whether [`Light::steep_field`] counts, rather than [`Light::near_field`].
+    pub steep: bool,
+    /// Where an endless part ends for a light, over its distance from the ray's origin, but for lights nearer than the length given.
+    pub until: Option<(f32, f32)>,
+}
+
+impl FromRay {
+    /// The part of the ray (m) that lies in a light's near field, and that it reaches.
+    #[inline]
+    pub(crate) fn part(&self, light: &Light<'_>) -> Option<(f32, f32)> {
+        let field = if self.steep { light.steep_field()? } else { light.near_field()? };
+        let far = match self.until {
+            Some((distances, least)) => self.far.min(distances * self.ray.origin.distance(field.centre()).max(least)),
+            None => self.far,
+        };
+        light.near_interval(&self.ray, self.near, far)
+    }
+}
+
+impl Question for FromRay {
+    fn asks(&self, kind: Kind) -> bool {
+        match kind {
+            Kind::Lamp | Kind::Body => true,
+            Kind::Panel => !self.steep,
+            Kind::Sun | Kind::Sky => false,
+        }
+    }
+
+    #[inline]
+    fn light(&self, light: &Light<'_>) -> f32 {
+        self.part(light).map_or(0.0, |part| light.sent_along(&self.ray, part))
+    }
+
+    fn limit(&self) -> usize {
+        if self.until.is_some() { WALKS } else { CHOICE }
+    }
+
+    #[inline]
+    fn leaf(&self, node: &LightNode, light: &Light<'_>) -> f32 {
+        if !node.is_even() || self.far.is_infinite() {
+            return self.light(light);
+        }
+        let closest = self.ray.direction.dot(node.centre - self.ray.origin);
+        let height2 = self.ray.at(closest).distance_squared(node.centre);
+        let half2 = node.reach * node.reach - height2;
+        if !(half2 > 0.0) {
+            return 0.0;
+        }
+        let half = float::sqrt(half2);
+        let (near, far) = (self.near.max(closest - half), self.far.min(closest + half));
+        if far > near { self.sent(node.strength, height2.max(1e-12), closest, (near, far)) } else { 0.0 }
+    }
+
+    #[inline]
+    fn node(&self, node: &LightNode) -> Guess {
+        let (centre, radius2) = (node.centre, node.radius2);
+        let closest = self.ray.direction.dot(centre - self.ray.origin);
+        let distance2 = self.ray.at(closest.max(self.near).min(self.far)).distance_squared(centre);
+        let mut strength = node.strength;
+        if node.reach.is_finite() {
+            if float::sqrt(distance2) > float::sqrt(radius2) + node.reach {
+                return Guess::default();
+            }
+            // Near fields are balls: of the lights in the box those count that lie about the ray.
+            strength *= (node.reach * node.reach / radius2.max(1e-30)).min(1.0);
+        }
+        if node.spread < float::PI && !self.may_be_lit(node, centre, radius2) {
+            return Guess::default();
+        }
+        let height2 = self.ray.at(closest).distance_squared(centre).max(INSIDE * radius2).max(1e-12);
+        Guess::new(
+            self.sent(strength, height2, closest, (self.near, self.far)),
+            radius2 / distance2.max(INSIDE * radius2).max(1e-12),
+        )
+    }
+}
+
+impl FromRay {
+    /// `∫ I/r² dt` over a part, from a height (m, squared) above the ray's point at `closest` (m): about, and never 0.
+    #[inline]
+    fn sent(&self, strength: f32, height2: f32, closest: f32, (near, far): (f32, f32)) -> f32 {
+        let height = float::sqrt(height2);
+        let (before, after) = (near - closest, far - closest);
+        let angle = if after.is_finite() {
+            quick_angle(height * (after - before), height2 + before * after)
+        } else {
+            quick_angle(height, before)
+        };
+        // Written so that NaN counts as little.
+        (strength * (angle / height).max(1e-30)).clamp(f32::MIN_POSITIVE, 1e30)
+    }
+
+    /// Whether light of a node may come to any point of the part. Where it is dark behind lights is convex, so both ends tell.
+    fn may_be_lit(&self, node: &LightNode, centre: Vec3, radius2: f32) -> bool {
+        if node.spread > 0.5 * float::PI + 0.1 || !self.far.is_finite() {
+            return true;
+        }
+        // cos(π/2 + 0.1) is above −0.1, also for a light at the rim.
+        let slack = 1.1 * float::sqrt(radius2);
+        let ahead = |t: f32| {
+            let offset = self.ray.at(t) - centre;
+            node.axis.dot(offset) + 0.1 * offset.length() + slack >= 0.0
+        };
+        ahead(self.near) || ahead(self.far)
+    }
+}
+
+/// Angle (rad) of the vector `(x, y)`, `y ≥ 0`, to some thousandths.
+#[inline]
+fn quick_angle(y: f32, x: f32) -> f32 {
+    let (low, high) = if y < x.abs() { (y, x.abs()) } else { (x.abs(), y) };
+    let z = low / high.max(f32::MIN_POSITIVE);
+    let steep = z * (0.25 * float::PI + 0.273 * (1.0 - z));
+    let angle = if y < x.abs() { steep } else { 0.5 * float::PI - steep };
+    if x < 0.0 { float::PI - angle } else { angle }
+}
