@@ -195,7 +195,7 @@ impl<'s> PhotonGrid<'s> {
         self.flights
     }
 
-    /// Whether enough photons have passed nearly every cell that any has passed.
+    /// Whether enough photons have passed nearly every cell that walks may end in.
     pub(super) fn is_known(&self, enough: u32) -> bool {
         let lit = self.cells.as_slice().iter().filter(|cell| cell.paths >= LEAST_PATHS);
         let (all, known) =

@@ -140,7 +140,6 @@ impl Settings {
         let sharper_walks = (f64::from(walks) * sharper) as u32;
         let free_paths = |kind| match kind {
             Kind::Surface => FREE_PATHS[0] * coarser.min(1.0),
-            // What comes back with every scattering cannot be made up for.
             Kind::Multiple => FREE_PATHS[1] * coarser.min(1.0),
             _ => f32::INFINITY,
         };

@@ -27,8 +27,7 @@ pub struct Effort {
     /// that is more than [`Settings::finest`] and [`Effort::limits`] allow it; infinite for no such bound.
     pub clearance: f32,
     /// Greatest radius in free paths `1/σₜ` of the medium at the record, for light scattered more than once in `1/(σₜ √(1 − g))`;
-    /// infinite for no such bound. Larger: what walks end in misses light, and every scattering adds to what is missing. Smaller:
-    /// records, by the cube.
+    /// infinite for no such bound. Larger: light near the borders of fog and near walls blurs. Smaller: records, by the cube.
     pub free_paths: f32,
 }
 
@@ -46,7 +45,7 @@ impl Effort {
 /// let limits = Limits { min: 0.01, max: 1.0 };
 /// let effort = Effort { tolerance: 0.5, samples: 1024, degree: 2, limits, clearance: 2.0, free_paths: 1.0 };
 /// let settings = Settings { multiple: Some(effort), ..Settings::default() };
-/// // The records at which walks end follow from those of the picture.
+/// // Kinds that are not set are not cached.
 /// assert_eq!(settings.effort(Kind::Multiple).unwrap().samples, 1024);
 /// assert!(settings.effort(Kind::Single).is_none());
 ///
