@@ -463,7 +463,7 @@ impl<'s, F> Filling<'s, F> {
                 let is_settled = !self.caches.is_open();
                 if self.memory.wanted.is_empty() && is_settled {
                     self.complete();
-                } else if let Some(effort) = self.settings().photons {
+                } else if let Some(effort) = self.photons() {
                     self.is_cut |= self.memory.photons.reset(&effort).is_err();
                     self.shoot_more(&effort);
                 } else {
@@ -495,6 +495,12 @@ impl<'s, F> Filling<'s, F> {
             }
             Round::Done => {}
         }
+    }
+
+    /// The photons to shoot: none if nothing is made by walks.
+    fn photons(&self) -> Option<PhotonEffort> {
+        let Settings { photons, multiple, irradiance, .. } = self.settings();
+        photons.filter(|_| multiple.is_some() || irradiance.is_some())
     }
 
     /// The next round of photons, as large as all before it, or after the last what follows.
