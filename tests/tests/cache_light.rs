@@ -1,11 +1,11 @@
 //! What the radiance cache is filled with, where the light is known.
 
 use fogbow::cache::{
-    Cache, Caches, Estimator, Extrapolation, PhotonEffort, PhotonGrid, RaySettings, Reader, Reading, Record,
+    Cache, Caches, Estimator, Extrapolation, Looks, PhotonEffort, PhotonGrid, RaySettings, Reader, Reading, Record,
     VolumeCache, clearance, radiance,
 };
-use fogbow::host::{Empty, Medium, Scene};
-use fogbow::light::{EnvironmentMap, Light, PointLight, Sun};
+use fogbow::host::{Empty, Hit, Medium, Scene};
+use fogbow::light::{EnvironmentMap, Light, PointLight, QuadLight, SphereLight, Sun};
 use fogbow::math::{Bounds, Mat3, Ray, Vec2, Vec3, float::PI};
 use fogbow::medium::Homogeneous;
 use fogbow::multiple_scatter;
@@ -114,7 +114,7 @@ fn white_bodies_in_a_furnace_are_as_bright_as_the_sky() {
     seen.assert_is(SKY, 2e-4, "in the fog");
     // On it: irradiance from the sky, which counts as indirect.
     let (at, normal) = (Vec3::Y * 0.5, Vec3::Y);
-    let hit = fogbow::host::Hit { distance: 1.0, normal, surface: body.surface, light: None };
+    let hit = Hit { distance: 1.0, normal, surface: body.surface, light: None };
     let seen = estimate(3000, |rng| {
         let direct = make.direct(at, &hit, &mut Generator::child(rng));
         (direct + make.irradiance(at, normal, 4, rng).0.value) / PI
@@ -155,8 +155,8 @@ fn eye_rays_without_caches_count_the_sky_once() {
 struct Bowl;
 
 impl Scene for Bowl {
-    fn closest_hit(&self, ray: &Ray) -> Option<fogbow::host::Hit> {
-        (ray.direction.y < 0.0).then_some(fogbow::host::Hit {
+    fn closest_hit(&self, ray: &Ray) -> Option<Hit> {
+        (ray.direction.y < 0.0).then_some(Hit {
             distance: 2.0,
             normal: -ray.direction,
             surface: Surface::BLACK,
@@ -212,7 +212,7 @@ fn irradiance_in_a_hollow_ball_is_a_geometric_series() {
     let lights = [Light::Point(PointLight::new(Vec3::ZERO, intensity).unwrap())];
     let make = estimator(&vacuum, &wall, &lights);
     let (at, normal) = (Vec3::X * 2.0, Vec3::NEG_X);
-    let hit = fogbow::host::Hit { distance: 1.0, normal, surface: wall.surface, light: None };
+    let hit = Hit { distance: 1.0, normal, surface: wall.surface, light: None };
     let truth = [1.0, 2.0, 3.0];
     estimate(200, |rng| make.direct(at, &hit, &mut Generator::child(rng))).assert_is(truth, 1e-5, "direct");
     estimate(3000, |rng| make.irradiance(at, normal, 4, rng).0.value).assert_is(truth, 1e-4, "indirect, by paths");
@@ -281,7 +281,7 @@ fn multiple_scattering_in_an_endless_medium_is_that_of_the_transport_equation() 
         .assert_is(truth, 2e-3, "by walks");
     // Walks that end in cells lit by photons tell it, too; a cell's light is a mean over its volume.
     let bounds = Bounds { min: Vec3::splat(-7.0), max: Vec3::splat(7.0) };
-    let effort = PhotonEffort { bounds, cells: 48, paths: 1 << 16, flights: u64::MAX, enough: u32::MAX };
+    let effort = PhotonEffort { bounds, cells: 48, degree: 2, paths: 1 << 16, flights: u64::MAX, enough: u32::MAX };
     let photons = PhotonGrid::lit(&make.world, &effort, &make.paths, 3);
     let make = Estimator { photons: Some(&photons), ..make };
     estimate(1000, |rng| make.multiple(point, &Phase::ISOTROPIC, 16, &mut [], rng).value).assert_is(
@@ -389,5 +389,73 @@ fn turns_of_the_normal_agree_with_differences() {
             (difference - expected).abs() < 0.0008 * value,
             "{axis}: {difference} instead of {expected} of {value}"
         );
+    }
+}
+
+/// A black panel or ball in fog, which is a light.
+struct Lamp(Light<'static>);
+
+impl Scene for Lamp {
+    fn closest_hit(&self, ray: &Ray) -> Option<Hit> {
+        let (distance, normal) = match self.0 {
+            Light::Quad(_) => {
+                let distance = (LAMP.z - ray.origin.z) / ray.direction.z;
+                let at = ray.at(distance) - LAMP;
+                let is_met = at.x.abs() <= LAMP_SIZE && at.y.abs() <= LAMP_SIZE;
+                (is_met && distance > 1e-5).then_some((distance, Vec3::NEG_Z))?
+            }
+            _ => {
+                let hit = Ball { centre: LAMP, radius: LAMP_SIZE, surface: Surface::BLACK }.closest_hit(ray)?;
+                (hit.distance, hit.normal)
+            }
+        };
+        (distance < ray.length).then_some(Hit { distance, normal, surface: Surface::BLACK, light: Some(0) })
+    }
+}
+
+const LAMP: Vec3 = Vec3::new(0.0, 0.0, 2.0);
+const LAMP_SIZE: f32 = 0.5;
+
+fn panel_and_ball() -> [Light<'static>; 2] {
+    let side = 2.0 * LAMP_SIZE;
+    let corner = LAMP - Vec3::new(LAMP_SIZE, LAMP_SIZE, 0.0);
+    [
+        Light::Quad(QuadLight::new(corner, side * Vec3::Y, side * Vec3::X, Spectrum::ONE).unwrap()),
+        Light::Sphere(SphereLight::new(LAMP, LAMP_SIZE, Spectrum::ONE).unwrap()),
+    ]
+}
+
+/// Walks that are scattered sharply meet lamps as well as connect to them; paths that are traced say how bright it is. Records
+/// that are made for an eye say the same, and are less noisy.
+#[test]
+fn sharply_scattered_light_is_that_of_traced_paths_and_steadier_towards_an_eye() {
+    let phase = Phase::from(Lobe::HenyeyGreenstein { g: 0.85 });
+    let medium = fog(0.1, 0.9, phase);
+    let (point, to_eye) = (Vec3::new(0.3, 0.2, 0.0), Vec3::new(0.1, 0.3, -1.0).normalize());
+    let degree = 14;
+    for lamp in panel_and_ball() {
+        let (scene, lights) = (Lamp(lamp), [lamp]);
+        let make = estimator(&medium, &scene, &lights);
+        let traced = estimate(60_000, |rng| {
+            let sample = phase.sample(to_eye, uniform2(rng));
+            let seen = path::radiance(&Ray::new(point, sample.to_light), &make.world, &make.paths, rng);
+            (seen.medium_single + seen.medium_multiple) * sample.weight
+        });
+        let walked = estimate(60_000, |rng| make.multiple_towards(point, to_eye, &phase, rng));
+        let (mean, error) = (walked.mean[0] - traced.mean[0], walked.error[0].hypot(traced.error[0]));
+        assert!(mean.abs() < 4.0 * error && error < 0.03 * traced.mean[0], "{lamp:?}: {walked:?} {traced:?}");
+        let record = |eye: Option<Vec3>| {
+            estimate(300, |rng| {
+                let looks = Looks { to_eye: eye, ..Looks::from(64) };
+                expanded(degree, to_eye, |higher| make.multiple(point, &phase, looks, higher, rng)).1
+            })
+        };
+        let [aimed, even] = [Some(to_eye), None].map(record);
+        for made in [&aimed, &even] {
+            let (mean, error) = (made.mean[0] - walked.mean[0], made.error[0].hypot(walked.error[0]));
+            // What an expansion of this degree leaves out.
+            assert!(mean.abs() < 4.0 * error + 0.01 * walked.mean[0], "{lamp:?}: {made:?} {walked:?}");
+        }
+        assert!(aimed.error[0] < 0.8 * even.error[0], "{lamp:?}: {aimed:?} {even:?}");
     }
 }

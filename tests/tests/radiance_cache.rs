@@ -62,7 +62,7 @@ fn settings() -> Settings {
     };
     let bounds = Bounds { min: Vec3::splat(-2.0), max: Vec3::splat(2.0) };
     Settings {
-        photons: Some(PhotonEffort { bounds, cells: 8, paths: 2048, flights: u64::MAX, enough: u32::MAX }),
+        photons: Some(PhotonEffort { bounds, cells: 8, degree: 2, paths: 2048, flights: u64::MAX, enough: u32::MAX }),
         single: effort(0.5, 3),
         surface: effort(1.5, 2),
         multiple: effort(1.0, 2),
@@ -414,6 +414,7 @@ fn filled_in(room: &Lengths) -> (Vec<u8>, bool, [usize; 5]) {
     let mut guides = room.guides.map(|count| vec![Guide::default(); count]);
     let (mut photons, mut deposits) =
         (vec![PhotonCell::default(); room.photons], vec![PhotonDeposit::default(); room.of_job_deposits]);
+    let mut photon_moments = vec![Spectrum::ZERO; room.photon_moments];
     let memory = FillingMemory::lent(Slots {
         wanted: &mut wanted,
         open: [&mut open, &mut still_open],
@@ -422,6 +423,7 @@ fn filled_in(room: &Lengths) -> (Vec<u8>, bool, [usize; 5]) {
         higher: &mut of_estimates,
         guides: guides.each_mut().map(|guides| &mut guides[..]),
         photons: &mut photons,
+        photon_moments: &mut photon_moments,
     });
     let mut of_job = vec![Wanted::default(); room.of_job_wanted];
     let mut open_of_job = vec![0; room.of_job_open];
@@ -468,6 +470,7 @@ fn a_fill_in_lent_memory_has_the_bits_of_one_that_grows_or_says_that_it_was_cut(
         Lengths { of_job_open: 10, ..ample },
         Lengths { of_job_deposits: 10, ..ample },
         Lengths { photons: 7, ..ample },
+        Lengths { photon_moments: 7, ..ample },
     ] {
         let (_, is_cut, counts) = filled_in(&room);
         assert!(is_cut && counts.iter().any(|&count| count > 0), "{room:?}: {counts:?}");

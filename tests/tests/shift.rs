@@ -1,7 +1,7 @@
 //! How the vertices of walks move with their start: closed forms, and gradients of light in a closed room.
 
 use fogbow::cache::Estimator;
-use fogbow::host::{Hit, Medium};
+use fogbow::host::{Hit, Medium, Scene};
 use fogbow::light::{Light, PointLight, QuadLight};
 use fogbow::math::{Bounds, Ray, Vec2, Vec3};
 use fogbow::medium::Homogeneous;
@@ -195,10 +195,29 @@ fn a_shift_by_translation_is_an_advance() {
     assert_eq!((plain.value, plain.gradient, plain.moved), (moved.value, moved.gradient, moved.moved));
 }
 
-/// Walls of a room of 2 m, with fog between them.
-fn room(reflectance: f32) -> Room {
+/// Walls of a room of 2 m, with fog between them, and the surface of a [`panel`].
+struct Lit {
+    room: Room,
+    has_panel: bool,
+}
+
+impl Scene for Lit {
+    fn closest_hit(&self, ray: &Ray) -> Option<Hit> {
+        let wall = self.room.closest_hit(ray);
+        let distance = (0.99 - ray.origin.y) / ray.direction.y;
+        let at = ray.at(distance);
+        let is_met = self.has_panel && distance > 1e-5 && at.x.abs() <= 0.3 && at.z.abs() <= 0.3;
+        if !is_met || distance >= wall.map_or(ray.length, |wall| wall.distance) {
+            return wall;
+        }
+        Some(Hit { distance, normal: Vec3::NEG_Y, surface: Surface::BLACK, light: Some(0) })
+    }
+}
+
+fn room(reflectance: f32, light: &Light<'_>) -> Lit {
     let bounds = Bounds { min: Vec3::splat(-1.0), max: Vec3::ONE };
-    Room { bounds, surface: Surface::Lambert { reflectance: Spectrum::splat(reflectance) } }
+    let room = Room { bounds, surface: Surface::Lambert { reflectance: Spectrum::splat(reflectance) } };
+    Lit { room, has_panel: matches!(light, Light::Quad(_)) }
 }
 
 fn fog(phase: impl Into<Phase>) -> Homogeneous {
@@ -214,11 +233,7 @@ fn panel() -> Light<'static> {
     Light::Quad(QuadLight::new(corner, u, v, Spectrum::ONE).unwrap())
 }
 
-fn estimator<'a>(
-    medium: &'a Homogeneous,
-    scene: &'a Room,
-    lights: &'a [Light<'a>],
-) -> Estimator<'a, Homogeneous, Room> {
+fn estimator<'a>(medium: &'a Homogeneous, scene: &'a Lit, lights: &'a [Light<'a>]) -> Estimator<'a, Homogeneous, Lit> {
     Estimator {
         world: World { medium, scene, lights: lights.into() },
         surfaces: None,
@@ -264,10 +279,10 @@ const PLACES: [(Vec3, Vec3); 2] =
 
 /// `sample` towards one direction, by walks of up to so many vertices.
 fn check_samples(lobe: Lobe, max_vertices: u32, paths: u32) {
-    let (medium, scene, phase) = (fog(lobe), room(0.5), Phase::from(lobe));
+    let (medium, phase) = (fog(lobe), Phase::from(lobe));
     let towards = Towards { to_eye: Vec3::new(0.36, 0.48, 0.8), phase: &phase };
     for light in [bulb(), panel()] {
-        let lights = [light];
+        let (scene, lights) = (room(0.5, &light), [light]);
         let mut make = estimator(&medium, &scene, &lights);
         make.walk.max_vertices = max_vertices;
         let walk = Walk { world: make.world, settings: make.walk };
@@ -283,9 +298,9 @@ fn check_samples(lobe: Lobe, max_vertices: u32, paths: u32) {
 
 /// `Estimator::multiple`, as [`check_samples`].
 fn check_estimates(lobe: Lobe, max_vertices: u32, paths: u32) {
-    let (medium, scene, phase) = (fog(lobe), room(0.5), Phase::from(lobe));
+    let (medium, phase) = (fog(lobe), Phase::from(lobe));
     for light in [bulb(), panel()] {
-        let lights = [light];
+        let (scene, lights) = (room(0.5, &light), [light]);
         let mut make = estimator(&medium, &scene, &lights);
         make.walk.max_vertices = max_vertices;
         for (point, axis) in PLACES {
@@ -299,9 +314,9 @@ fn check_estimates(lobe: Lobe, max_vertices: u32, paths: u32) {
 /// `Estimator::irradiance` along a black wall towards its edge with another, and in its middle: light scattered in
 /// the fog alone.
 fn check_irradiance(lobe: Lobe, max_vertices: u32, paths: u32) {
-    let (medium, scene) = (fog(lobe), room(0.0));
+    let medium = fog(lobe);
     for light in [bulb(), panel()] {
-        let lights = [light];
+        let (scene, lights) = (room(0.0, &light), [light]);
         let mut make = estimator(&medium, &scene, &lights);
         make.walk.max_vertices = max_vertices;
         for point in [Vec3::new(1.0, 0.85, 0.1), Vec3::new(1.0, -0.1, 0.1)] {

@@ -1,7 +1,9 @@
 //! All caches of a world together.
 
+use super::audit::Findings;
 use super::eye::{CachedRadiance, Caches, Reader, radiance, radiance_beyond};
 use super::kind::Kind;
+use super::presets::finer_by;
 use super::record::Record;
 use super::room::{chunks_of, stride_of};
 use super::settings::Settings;
@@ -77,6 +79,8 @@ pub struct RadianceCaches<'s> {
     pub(super) views: List<'s, u64>,
     /// Records that no fill will estimate again.
     pub(super) settled: ByKind<usize>,
+    /// How often records were dropped: those that take their place must not meet the same chances.
+    pub(super) dropped: u32,
 }
 
 #[cfg(feature = "alloc")]
@@ -89,7 +93,13 @@ impl RadianceCaches<'static> {
             Some(stride) if kind.is_on_surfaces() => Slot::Surface(SurfaceCache::growing(stride)),
             Some(stride) => Slot::Volume(VolumeCache::growing(stride)),
         };
-        Self { settings, slots: ByKind(Kind::ALL.map(slot)), views: List::default(), settled: ByKind([0; Kind::COUNT]) }
+        Self {
+            settings,
+            slots: ByKind(Kind::ALL.map(slot)),
+            views: List::default(),
+            settled: ByKind([0; Kind::COUNT]),
+            dropped: 0,
+        }
     }
 }
 
@@ -134,7 +144,7 @@ impl<'s> RadianceCaches<'s> {
         });
         let mut views = views.into();
         views.clear();
-        Self { settings, slots: ByKind(slots), views, settled: ByKind([0; Kind::COUNT]) }
+        Self { settings, slots: ByKind(slots), views, settled: ByKind([0; Kind::COUNT]), dropped: 0 }
     }
 }
 
@@ -213,6 +223,62 @@ impl RadianceCaches<'_> {
         rng: &mut (impl Rng + ?Sized),
     ) -> CachedRadiance {
         radiance_beyond(ray, &self.estimator(world), &self.reader(), &self.settings.eye, rng)
+    }
+
+    /// Drops all records of the kinds that an audit has found off by certainly more than `error`, and of those that these were made
+    /// from, to be made anew by the next fill: finer by what they are off, with four times the samples. If all together are
+    /// off and no kind is to blame, all are dropped. Returns whether any were.
+    ///
+    /// What finer records do not mend (walks that are cut, lights without surfaces) stays as it is: audit again, and say so.
+    ///
+    /// ```
+    /// # #[cfg(feature = "alloc")] {
+    /// use fogbow::{cache::{Audit, RadianceCaches, Settings}, math::{Ray, Vec3}};
+    /// let mut caches = RadianceCaches::new(Settings::default());
+    /// // Nothing was compared: nothing is wrong.
+    /// let findings = Audit::new(&caches, |_| Ray::new(Vec3::ZERO, Vec3::Z), 64).findings();
+    /// assert!(!caches.drop_wrong(&findings, 0.02));
+    /// # }
+    /// ```
+    pub fn drop_wrong(&mut self, findings: &Findings, error: f32) -> bool {
+        let most = f64::from(error);
+        let is_cached = |kind: &Kind| self.settings.effort(*kind).is_some();
+        let to_blame = |kind: Kind| findings.of(kind).is_some_and(|found| found.exceeds(most));
+        let off_together = [findings.cached, findings.all].into_iter().find(|found| found.exceeds(most));
+        let none_alone = !Kind::FINAL.into_iter().any(to_blame);
+        let mut wrong = ByKind([None; Kind::COUNT]);
+        for kind in Kind::FINAL.into_iter().filter(is_cached) {
+            wrong[kind] = match findings.of(kind).filter(|_| to_blame(kind)) {
+                Some(found) => Some(found),
+                None => off_together.filter(|_| none_alone),
+            };
+        }
+        let mut any = false;
+        for kind in Kind::FINAL {
+            let Some(found) = wrong[kind] else { continue };
+            any = true;
+            let finer = finer_by(most, found.bias);
+            if let Some(effort) = self.settings.effort_mut(kind) {
+                *effort = effort.finer(finer);
+            }
+            if let Some(photons) = self.settings.photons.as_mut().filter(|_| kind == Kind::Multiple) {
+                *photons = photons.finer();
+            }
+            self.forget(kind);
+            if matches!(kind, Kind::Surface | Kind::Irradiance) {
+                self.forget(Kind::CoarseIrradiance);
+            }
+        }
+        if any {
+            self.views.clear();
+            self.dropped += 1;
+        }
+        any
+    }
+
+    fn forget(&mut self, kind: Kind) {
+        self.slots[kind].clear();
+        self.settled[kind] = 0;
     }
 
     /// Brings all records into the indices.

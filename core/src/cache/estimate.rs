@@ -6,7 +6,7 @@ use super::aim::Aims;
 use super::evidence::{Halves, Openings};
 use super::guide::{Guided, Looks};
 use super::lookup::Reading;
-use super::photons::{self, PhotonGrid};
+use super::photons::{PhotonGrid, SHARPEST};
 use super::record::Facing;
 use super::store::SurfaceCache;
 use crate::host::{Hit, Medium, Properties, Rng, Scene};
@@ -14,7 +14,7 @@ use crate::light::{FromPoint, Light};
 use crate::math::{Frame, Ray, float};
 use crate::multiple_scatter::{self, Cones, Incoming, Start, Walk};
 use crate::path;
-use crate::phase::Phase;
+use crate::phase::{Phase, deflection};
 use crate::sampling::{Generator, uniform, uniform2, warp};
 use crate::sh::{Coefficient, MAX_DEGREE};
 use crate::single_scatter::{self, Arrival, Contribution, Directional, Sums, Towards};
@@ -27,6 +27,14 @@ use crate::world::{World, leave, nearest_surface, shadow_ray};
 /// variance without bound.
 const MIN_COSINE: f32 = 0.05;
 
+/// How much light that is not scattered to the eye counts for what is learnt of directions: mirrors and other views look
+/// from elsewhere.
+const ELSEWHERE: f32 = 0.25;
+
+/// Records for any direction reach less far in proportion to one less the absolute mean cosine of the phase function, and to this at least.
+/// Less: more records than they mend.
+const LEAST_BREADTH: f32 = 0.1;
+
 /// The third coordinate beside a golden-ratio lattice, in [0, 1): multiples of a number that stay even when wrapped. It
 /// draws lengths, and in thin media its smallest values decide: after some hundred multiples f32 has none between 0 and
 /// 3·10⁻⁵.
@@ -36,9 +44,10 @@ fn third(j: u32, shift: f32) -> f32 {
 }
 
 /// A mixture of densities of directions, each with an equal part of the samples: a given one, one towards
-/// lights, and one that was learnt.
+/// lights, one by the phase function from where scattering leads to the eye, and one that was learnt.
 struct Mixture<'a> {
     aims: Aims,
+    eye: Option<(Vec3, &'a Phase)>,
     guide: Option<&'a Guided>,
     count: u32,
     shift: Vec2,
@@ -47,26 +56,38 @@ struct Mixture<'a> {
 impl Mixture<'_> {
     /// Direction `j` with the density (sr⁻¹) of the mixture.
     fn direction(&self, j: u32, sample: impl Fn(Vec2) -> Vec3, pdf: impl Fn(Vec3) -> f32) -> (Vec3, f32) {
-        let has_aims = !self.aims.is_empty();
-        let kinds = 1 + u32::from(has_aims) + u32::from(self.guide.is_some());
-        let of_kind = |kind: u32| (self.count + kinds - 1 - kind) / kinds;
-        let at = single_scatter::lattice(j / kinds, of_kind(j % kinds), self.shift);
-        let direction = match (j % kinds, self.guide) {
-            (0, _) => sample(at),
-            (1, _) if has_aims => self.aims.sample(at),
-            (_, Some(guide)) => guide.sample(at),
-            _ => self.aims.sample(at),
+        let (has_aims, has_eye) = (!self.aims.is_empty(), self.eye.is_some());
+        let parts = 1 + u32::from(has_aims) + u32::from(has_eye) + u32::from(self.guide.is_some());
+        let of_part = |part: u32| (self.count + parts - 1 - part) / parts;
+        let at = single_scatter::lattice(j / parts, of_part(j % parts), self.shift);
+        let (to_aims, to_eye) = (1, 1 + u32::from(has_aims));
+        let direction = match (j % parts, self.eye, self.guide) {
+            (0, ..) => sample(at),
+            (part, ..) if has_aims && part == to_aims => self.aims.sample(at),
+            (part, Some((eye, phase)), _) if part == to_eye => phase.sample(eye, at).to_light,
+            (_, _, Some(guide)) => guide.sample(at),
+            _ => sample(at),
         };
-        let share = |kind: u32| of_kind(kind) as f32 / self.count as f32;
+        let share = |part: u32| of_part(part) as f32 / self.count as f32;
         let mut density = share(0) * pdf(direction);
         if has_aims {
-            density += share(1) * self.aims.pdf(direction);
+            density += share(to_aims) * self.aims.pdf(direction);
+        }
+        if let Some((eye, phase)) = self.eye {
+            density += share(to_eye) * phase.pdf(deflection(direction, eye));
         }
         if let Some(guide) = self.guide {
-            density += share(kinds - 1) * guide.pdf(direction);
+            density += share(parts - 1) * guide.pdf(direction);
         }
         (direction, density)
     }
+}
+
+/// How much light from a direction counts for a record that is looked at from `eye`.
+fn counts(eye: Option<(Vec3, &Phase)>, direction: Vec3) -> f32 {
+    eye.map_or(1.0, |(eye, phase)| {
+        ELSEWHERE + (1.0 - ELSEWHERE) * 4.0 * float::PI * phase.pdf(deflection(direction, eye))
+    })
 }
 
 /// Estimates the light that the caches hold.
@@ -168,11 +189,12 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
         rng: &mut impl Rng,
     ) -> Sums {
         let (mut child, shift) = (Generator::child(rng), uniform2(rng));
-        let Looks { count, guide, mut learnt } = directions.into();
+        let Looks { count, guide, mut learnt, to_eye } = directions.into();
         let World { scene, lights, .. } = self.world;
         // Rectangles light what lies before them, not what surrounds them.
         let aims = Aims::new(point, &lights, scene, |light| !matches!(light, Light::Quad(_)));
-        let mixture = Mixture { aims, guide, count, shift };
+        let eye = to_eye.filter(|_| !phase.is_isotropic()).map(|to_eye| (to_eye, phase));
+        let mixture = Mixture { aims, eye, guide, count, shift };
         self.expanded(phase, higher, |into| {
             let (mut sums, mut openings) = (Sums::default(), Openings::default());
             for j in 0..count {
@@ -183,7 +205,8 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
                 let through = || self.through(&ray, end.as_ref(), marching);
                 let arrival = self.arriving(&ray, end.as_ref(), pdf * count as f32, through, &mut child);
                 if let Some(learnt) = &mut learnt {
-                    let found = arrival.as_ref().map_or(0.0, |arrival| arrival.irradiance.mean());
+                    let found =
+                        arrival.as_ref().map_or(0.0, |arrival| arrival.irradiance.mean()) * counts(eye, direction);
                     learnt.add(direction, found * count as f32, pdf, count);
                 }
                 if let Some(arrival) = arrival {
@@ -210,12 +233,14 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
         rng: &mut impl Rng,
     ) -> Sums {
         let (walk, shift, offset) = (self.walker(), uniform2(rng), uniform(rng));
-        let Looks { count, guide, mut learnt } = paths.into();
+        let Looks { count, guide, mut learnt, to_eye } = paths.into();
         let share = 1.0 / count.max(1) as f32;
         let aims = Aims::new(point, &self.world.lights, self.world.scene, |_| true);
-        let mixture = Mixture { aims, guide, count, shift };
+        let eye = to_eye.filter(|_| !phase.is_isotropic()).map(|to_eye| (to_eye, phase));
+        let mixture = Mixture { aims, eye, guide, count, shift };
         self.expanded(phase, higher, |into| {
             let (mut cones, mut halves) = (Cones::default(), Halves::default());
+            let mut seen = Cones::default();
             for j in 0..count {
                 let (to_light, pdf) = mixture.direction(j, warp::uniform_sphere, |_| warp::uniform_sphere_pdf());
                 let ray = Ray::new(point, to_light);
@@ -223,13 +248,33 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
                 let collision = walk.first(&ray, end.as_ref(), third(j, offset), false, rng).collision;
                 let incoming = self.walked(&walk, &Start { ray, end, pdf, collision }, rng) * share;
                 if let Some(learnt) = &mut learnt {
-                    learnt.add(to_light, incoming.irradiance.mean() * count as f32, pdf, count);
+                    let found = incoming.irradiance.mean() * counts(eye, to_light);
+                    learnt.add(to_light, found * count as f32, pdf, count);
                 }
                 let mean = incoming.scatter_directional(into.moments, 1.0, into.coefficients);
                 cones.add(to_light, &mean);
-                halves.add(j, &mean.gradient);
+                match eye {
+                    None => halves.add(j, &mean.gradient),
+                    Some((to_eye, phase)) => {
+                        let light = incoming.scatter(to_eye, phase);
+                        seen.add(to_light, &light);
+                        halves.add(j, &light.gradient);
+                    }
+                }
             }
             let (mut sums, trust) = (cones.sums(), halves.trust());
+            if eye.is_none() {
+                // Expansions change faster than their mean over directions.
+                let faster = phase.mean_cosine().map(|g| 1.0 / (1.0 - g.abs()).max(LEAST_BREADTH));
+                sums.gradient_norms *= faster;
+                sums.unshadowed_gradient_norms *= faster;
+            } else {
+                // Radii by what is seen.
+                let seen = seen.sums();
+                let scale = seen.value.zip(sums.value, |seen, mean| if seen > 0.0 { mean / seen } else { 1.0 });
+                (sums.gradient_norms, sums.unshadowed_gradient_norms) =
+                    (seen.gradient_norms * scale, seen.unshadowed_gradient_norms * scale);
+            }
             sums.gradient = sums.gradient * trust;
             into.coefficients.iter_mut().for_each(|c| c.gradient = c.gradient * trust);
             sums
@@ -244,8 +289,8 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
         let mut sharp = 1.0;
         let known = |point: Vec3, to_eye: Vec3, properties: &Properties| {
             let photons = self.photons?;
-            sharp *= photons::unresolved(&properties.phase);
-            if sharp > photons::SHARPEST { None } else { photons.scattered(point, to_eye, properties) }
+            sharp *= photons.unresolved(&properties.phase);
+            if sharp > SHARPEST { None } else { photons.scattered(point, to_eye, properties) }
         };
         self.steadied(walk.along(start, outgoing, known, rng))
     }
@@ -276,7 +321,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
         paths: impl Into<Looks<'g>>,
         rng: &mut impl Rng,
     ) -> (Sums, Facing) {
-        let Looks { count, guide, mut learnt } = paths.into();
+        let Looks { count, guide, mut learnt, .. } = paths.into();
         let (mut sums, mut scattered, mut turn) = (Sums::default(), Cones::default(), Gradient::ZERO);
         let (mut halves, mut openings) = (Halves::default(), Openings::default());
         let mut child = Generator::child(rng);
@@ -284,7 +329,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
         let share = 1.0 / count.max(1) as f32;
         let outside = leave(point, normal, normal, 0.0);
         let aims = Aims::new(outside, &self.world.lights, self.world.scene, |_| true);
-        let mixture = Mixture { aims, guide, count, shift };
+        let mixture = Mixture { aims, eye: None, guide, count, shift };
         for j in 0..count {
             let upwards = |u| frame.to_world(warp::cosine_hemisphere(u));
             let cosine_pdf = |direction| warp::cosine_hemisphere_pdf(normal.dot(direction).max(0.0));
@@ -453,19 +498,23 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
     /// Light of surfaces and the sky, scattered once at `point` towards `to_eye`: one direction.
     pub fn surface_towards(&self, point: Vec3, to_eye: Vec3, phase: &Phase, rng: &mut Generator) -> Spectrum {
         let mut child = Generator::child(rng);
-        let ray = Ray::new(point, warp::uniform_sphere(uniform2(rng)));
+        let sample = phase.sample(to_eye, uniform2(rng));
+        let ray = Ray::new(point, sample.to_light);
         let marching = Marching { steps: self.walk.steps, offset: uniform(rng) };
         let end = nearest_surface(&ray, self.world.scene);
         let through = || self.through(&ray, end.as_ref(), marching);
-        let arrival = self.arriving(&ray, end.as_ref(), warp::uniform_sphere_pdf(), through, &mut child);
+        let arrival = self.arriving(&ray, end.as_ref(), sample.pdf, through, &mut child);
         arrival.map_or(Spectrum::ZERO, |arrival| arrival.scatter(to_eye, phase).radiance)
     }
 
     /// Light scattered more than once, the last time at `point` towards `to_eye`: one walk.
     pub fn multiple_towards(&self, point: Vec3, to_eye: Vec3, phase: &Phase, rng: &mut Generator) -> Spectrum {
-        let mut child = Generator::child(rng);
-        let outgoing = |ray: &Ray, hit: &Hit| self.outgoing(ray, hit, &mut child);
-        multiple_scatter::sample(point, &Towards { to_eye, phase }, &self.walker(), outgoing, 1, rng).value
+        let (walk, sample) = (self.walker(), phase.sample(to_eye, uniform2(rng)));
+        let ray = Ray::new(point, sample.to_light);
+        let end = nearest_surface(&ray, self.world.scene);
+        let collision = walk.first(&ray, end.as_ref(), uniform(rng), false, rng).collision;
+        let incoming = self.walked(&walk, &Start { ray, end, pdf: sample.pdf, collision }, rng);
+        incoming.scatter(to_eye, phase).radiance
     }
 
     /// Radiance at the origin of a ray but for emission seen directly, by one path.

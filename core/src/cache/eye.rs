@@ -211,6 +211,8 @@ pub struct Place {
     /// How much of the light that leaves a surface here reaches the eye, in [0, 1]: fog, mirrors and panes take the rest. 1 in the medium, and
     /// where the eye ray does not come.
     pub share: f32,
+    /// Where the eye is, seen from here (unit); `None` where light is asked for in any direction.
+    pub to_eye: Option<Vec3>,
 }
 
 /// Calls `visit` for every place where the light along `ray` would be looked up: where records are
@@ -250,7 +252,7 @@ pub(super) fn places_around<M: Medium + ?Sized, S: Scene + ?Sized>(
     if world.medium.properties(point).scattering.is_black() {
         return;
     }
-    visit(Place { point, normal: None, is_seen: true, share: 1.0 });
+    visit(Place { point, is_seen: true, share: 1.0, ..Place::default() });
     // One direction is given: no random numbers are drawn.
     Wanted { world, rng: Generator::new(0), visit }.beyond(&Ray::new(point, direction));
 }
@@ -273,14 +275,15 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized, F: FnMut(Place)> Wanted<'_, M, S, F>
             && !reflectance.is_black()
             && hit.normal.dot(ray.direction) < 0.0
         {
-            (self.visit)(Place { point: ray.at(hit.distance), normal: Some(hit.normal), is_seen, share });
+            let (point, normal, to_eye) = (ray.at(hit.distance), Some(hit.normal), Some(-ray.direction));
+            (self.visit)(Place { point, normal, is_seen, share, to_eye });
         }
     }
 }
 
 impl<M: Medium + ?Sized, S: Scene + ?Sized, F: FnMut(Place)> Sight for Wanted<'_, M, S, F> {
-    fn scatter(&mut self, point: Vec3, _: Vec3, _: &Properties, _: Spectrum) {
-        (self.visit)(Place { point, normal: None, is_seen: true, share: 1.0 });
+    fn scatter(&mut self, point: Vec3, to_eye: Vec3, _: &Properties, _: Spectrum) {
+        (self.visit)(Place { point, normal: None, is_seen: true, share: 1.0, to_eye: Some(to_eye) });
         let direction = warp::uniform_sphere(uniform2(&mut self.rng));
         self.beyond(&Ray::new(point, direction));
     }

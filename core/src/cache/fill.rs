@@ -56,7 +56,7 @@ pub(super) const PLACES_OF_JOB: usize = 256 * RAYS_PER_JOB as usize;
 const FIRST: (u64, u32) = (100, 8);
 
 /// Most samples of an estimate whose samples vary more than usual, as a multiple.
-const MOST_SAMPLES: f32 = 4.0;
+const MOST_SAMPLES: f32 = 8.0;
 
 /// Eye rays from whose points others are followed to what lights them. More find small things that are seen; light is
 /// sums over all that is met, small things included.
@@ -137,6 +137,8 @@ pub struct Filling<'s, F> {
     first: u64,
     /// The radius from which on a record gets all samples (m).
     usual: f32,
+    /// The usual value of a record.
+    bright: f32,
     /// From these records on nothing is final.
     before: ByKind<usize>,
     /// All records computed, by kind.
@@ -205,6 +207,7 @@ impl<'s> RadianceCaches<'s> {
             computed: 0,
             first: 0,
             usual: 0.0,
+            bright: 0.0,
             before,
             all_computed: ByKind([0; Kind::COUNT]),
             photons_before: 0,
@@ -222,6 +225,16 @@ fn usual_radius(records: &[Record]) -> f32 {
         |(sum, squares): (f32, f32), record: &Record| (sum + record.radius, squares + record.radius * record.radius);
     let (sum, squares) = records.iter().fold((0.0, 0.0), sums);
     squares / sum
+}
+
+/// The mean value that a picture is made of, about: `Σ R² L/Σ R²`.
+fn usual_value(records: &[Record]) -> f32 {
+    let add = |(sum, weight): (f32, f32), record: &Record| {
+        let area = record.radius * record.radius;
+        (sum + area * record.value.mean(), weight + area)
+    };
+    let (sum, weight) = records.iter().fold((0.0, 0.0), add);
+    sum / weight
 }
 
 /// Samples for a record that reaches `radius` (m): what reaches less far than `usual` lights fewer pixels. If one sample is
@@ -271,6 +284,11 @@ impl<'s, F> Filling<'s, F> {
 
     fn settings(&self) -> &Settings {
         &self.caches.settings
+    }
+
+    /// Records in place of dropped ones meet other chances.
+    fn seed(&self) -> u64 {
+        self.settings().seed ^ u64::from(self.caches.dropped) << 32
     }
 
     /// The step at hand and its effort.
@@ -371,10 +389,10 @@ impl<'s, F> Filling<'s, F> {
         let is_first = row.is_ground && self.first == 0 && number < FIRST.0;
         let seen = if step.kind == Kind::Irradiance { place.share.max(LEAST_SEEN) } else { 1.0 };
         let count = samples(&effort, limits.max, self.usual, seen) * if is_first { FIRST.1 } else { 1 };
-        let mut rng = Generator::new(mix(settings.seed ^ mix(row.stream + 1)) ^ number);
+        let mut rng = Generator::new(mix(self.seed() ^ mix(row.stream + 1)) ^ number);
         let mut estimate = Estimate { job, place, limits, effort: 1.0, ..Estimate::default() };
-        estimate.learnt.seen = seen;
-        let looks = Looks { count, guide: None, learnt: None };
+        (estimate.learnt.seen, estimate.learnt.to_eye) = (seen, place.to_eye);
+        let looks = Looks { count, guide: None, learnt: None, to_eye: place.to_eye };
         let is_made = self.estimate(step, world, looks, &mut estimate, &mut rng, output);
         output.estimate = is_made.then_some(estimate);
     }
@@ -393,12 +411,16 @@ impl<'s, F> Filling<'s, F> {
         let (Some(place), radius) = (slot.place(number), slot.records()[number].radius) else { return };
         let around = learnt_near(slot, self.memory.guides[step.kind].as_slice(), self.before[step.kind], place.point);
         let guide = Guided::new(&around);
-        let more = (around.relative_variance() / row.spread).clamp(1.0, MOST_SAMPLES);
-        let seen = self.memory.guides[step.kind].as_slice().get(job as usize).map_or(1.0, |guide| guide.seen);
+        // What varies as a whole decides how a picture looks where it is dark, what it varies by how far off the picture is.
+        let varies = around.relative_variance() / row.spread;
+        let brightness = slot.records()[number].value.mean() / self.bright;
+        let more = varies.max(brightness * float::sqrt(varies)).clamp(1.0, MOST_SAMPLES);
+        let made = self.memory.guides[step.kind].as_slice().get(job as usize);
+        let (seen, to_eye) = made.map_or((1.0, None), |guide| (guide.seen, guide.to_eye));
         let count = (samples(&effort, radius, self.usual, seen) as f32 * more) as u32;
-        let mut rng = Generator::new(mix(self.settings().seed ^ mix(stream + 16)) ^ number as u64);
+        let mut rng = Generator::new(mix(self.seed() ^ mix(stream + 16)) ^ number as u64);
         let mut estimate = Estimate { job, place, effort: more, ..Estimate::default() };
-        let looks = Looks { count, guide: guide.as_ref(), learnt: None };
+        let looks = Looks { count, guide: guide.as_ref(), learnt: None, to_eye };
         let is_made = self.estimate(step, world, looks, &mut estimate, &mut rng, output);
         output.estimate = is_made.then_some(estimate);
     }
@@ -503,16 +525,15 @@ impl<'s, F> Filling<'s, F> {
         photons.filter(|_| multiple.is_some() || irradiance.is_some())
     }
 
-    /// The next round of photons, as large as all before it, or after the last what follows.
+    /// The next round of photons, no larger than all before it, or after the last what follows.
     fn shoot_more(&mut self, effort: &PhotonEffort) {
         let (paths, flights) = (self.memory.photons.paths(), self.memory.photons.flights());
         let mut more = if paths == 0 { FIRST_PHOTONS.min(effort.paths) } else { paths.min(effort.paths - paths) };
         if paths > 0 {
             let left = effort.flights.saturating_sub(flights) as f64 * f64::from(paths) / flights.max(1) as f64;
-            more = more.min(left as u32);
-        }
-        if self.memory.photons.is_known(effort.enough) {
-            more = 0;
+            // Casts saturate.
+            more =
+                more.min(left as u32).min((f64::from(paths) * (self.memory.photons.times(effort.enough) - 1.0)) as u32);
         }
         let jobs = more / PATHS_PER_JOB;
         self.photons_before = paths;
@@ -533,7 +554,7 @@ impl<'s, F> Filling<'s, F> {
         let Some(effort) = &settings.photons else { return };
         for path in 0..PATHS_PER_JOB {
             let path = self.photons_before + job * PATHS_PER_JOB + path;
-            match photons.shoot(path, world, (effort, &settings.paths, settings.seed), &mut output.deposits) {
+            match photons.shoot(path, world, (effort, &settings.paths, self.seed()), &mut output.deposits) {
                 Ok(flights) => output.flights += u64::from(flights),
                 Err(_) => output.is_cut = true,
             }
@@ -592,6 +613,7 @@ impl<'s, F> Filling<'s, F> {
                     if count > 0 {
                         // Half as far again as usual reach those that most pixels see: they alone get all samples.
                         self.usual = 1.5 * usual_radius(slot.records());
+                        self.bright = usual_value(slot.records());
                         self.memory.estimates.clear();
                         self.memory.higher.clear();
                         self.enter(Round::Again { from: from as u32 }, count as u32);

@@ -27,11 +27,13 @@ pub struct Guide {
     weight: f32,
     /// [`Place::share`](super::Place::share) of the record.
     pub(super) seen: f32,
+    /// [`Place::to_eye`](super::Place::to_eye) of the record.
+    pub(super) to_eye: Option<Vec3>,
 }
 
 impl Default for Guide {
     fn default() -> Self {
-        Self { squares: [0.0; CELLS], sum: 0.0, sum_of_squares: 0.0, weight: 0.0, seen: 1.0 }
+        Self { squares: [0.0; CELLS], sum: 0.0, sum_of_squares: 0.0, weight: 0.0, seen: 1.0, to_eye: None }
     }
 }
 
@@ -175,11 +177,13 @@ pub struct Looks<'g> {
     pub guide: Option<&'g Guided>,
     /// Takes down what they find.
     pub learnt: Option<&'g mut Guide>,
+    /// Where most will look at the record from (unit): what is scattered there counts most.
+    pub to_eye: Option<Vec3>,
 }
 
 impl From<u32> for Looks<'_> {
     /// Nothing known, nothing learnt.
     fn from(count: u32) -> Self {
-        Self { count, guide: None, learnt: None }
+        Self { count, guide: None, learnt: None, to_eye: None }
     }
 }

@@ -88,7 +88,7 @@ impl Basis {
 }
 
 /// Highest degree of a [`TurningBasis`].
-pub const TURNING_DEGREE: usize = 3;
+pub const TURNING_DEGREE: usize = 8;
 
 const TURNING_COEFFICIENTS: usize = (TURNING_DEGREE + 1) * (TURNING_DEGREE + 1);
 

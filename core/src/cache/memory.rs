@@ -121,7 +121,7 @@ impl<'s> FillingMemory<'s> {
     /// let [mut open, mut still_open] = [(); 2].map(|()| vec![0; room.open]);
     /// let mut chosen = vec![(0, 0.0); room.chosen];
     /// let (mut estimates, mut higher) = (vec![Estimate::default(); room.estimates], vec![Coefficient::ZERO; room.higher]);
-    /// let mut photons = vec![PhotonCell::default(); room.photons];
+    /// let (mut photons, mut photon_moments) = (vec![PhotonCell::default(); room.photons], vec![Spectrum::ZERO; room.photon_moments]);
     /// let mut guides = room.guides.map(|count| vec![Guide::default(); count]);
     /// let memory = FillingMemory::lent(Slots {
     ///     wanted: &mut wanted,
@@ -130,6 +130,7 @@ impl<'s> FillingMemory<'s> {
     ///     estimates: &mut estimates,
     ///     higher: &mut higher,
     ///     photons: &mut photons,
+    ///     photon_moments: &mut photon_moments,
     ///     guides: guides.each_mut().map(|guides| &mut guides[..]),
     /// });
     /// let mut filling = RadianceCaches::new(settings).fill_in(memory, asked());
@@ -149,7 +150,7 @@ impl<'s> FillingMemory<'s> {
             estimates: slots.estimates.into(),
             higher: slots.higher.into(),
             guides: ByKind(slots.guides.map(List::from)),
-            photons: PhotonGrid::new(slots.photons.into()),
+            photons: PhotonGrid::new(slots.photons.into(), slots.photon_moments.into()),
         }
     }
 

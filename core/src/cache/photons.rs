@@ -4,7 +4,7 @@
 //! paths, wherever it goes, at the cost of one walk for all the cells it passes. A cell's light is a mean over its volume, too
 //! coarse for a picture, but what is gathered from many cells some scatterings away is neither blurred nor noisy.
 
-use super::lookup::TurningBasis;
+use super::lookup::{TURNING_DEGREE, TurningBasis};
 use crate::host::{Medium, Properties, Scene};
 use crate::light::Light;
 use crate::math::{Bounds, Ray, Vec3};
@@ -18,11 +18,10 @@ use crate::spectrum::{Gradient, Spectrum};
 use crate::storage::{Full, List};
 use crate::world::World;
 
-/// Degree of a cell's expansion of radiance by direction. More: memory and time, for detail that walks blur anyway; fewer: what
-/// is scattered forward is lost.
-const DEGREE: usize = 2;
+/// Highest degree of a cell's expansion of radiance by direction.
+pub(super) const MAX_DEGREE: usize = TURNING_DEGREE;
 
-const COEFFICIENTS: usize = sh::coefficient_count(DEGREE);
+const MAX_COEFFICIENTS: usize = sh::coefficient_count(MAX_DEGREE);
 
 /// Photons that must have passed a cell before walks end there. Fewer: their noise is seen; more: walks go on where light is well known.
 const LEAST_PATHS: u32 = 8;
@@ -30,9 +29,9 @@ const LEAST_PATHS: u32 = 8;
 /// Part of the lit cells that photons are to know well. More: all wait for the darkest corner; less: dark parts of a picture are noisy.
 const KNOWN: f64 = 0.9;
 
-/// How much of what cells do not resolve by direction may be left where walks end: each scattering blurs it. More: sharply forward
-/// scattering fog loses contrast; less: walks are longer in it.
-pub(super) const SHARPEST: f32 = 0.55;
+/// How much of what cells do not resolve by direction may be left where walks end: each scattering blurs it. More: what is scattered
+/// sharply forward lands in the wrong place, by some 5 % of a picture at 0.5; less: memory for cells, and longer walks.
+pub(super) const SHARPEST: f32 = 0.3;
 
 /// Photons of one job.
 pub(super) const PATHS_PER_JOB: u32 = 32;
@@ -53,6 +52,8 @@ pub struct PhotonEffort {
     pub bounds: Bounds,
     /// Cells along its longest side.
     pub cells: u32,
+    /// Degree of a cell's expansion of radiance by direction, at most [`TURNING_DEGREE`]: memory goes by the square.
+    pub degree: usize,
     /// Paths of photons at most.
     pub paths: u32,
     /// Flights of photons, at which no more paths begin.
@@ -74,9 +75,10 @@ impl PhotonEffort {
         Some((side, counts.to_array().map(|count| (libm::ceilf(count - INSET) as u32).clamp(1, self.cells))))
     }
 
-    /// How many cells there are.
-    pub(super) fn room(&self) -> usize {
-        self.division().map_or(0, |(_, counts)| counts.iter().map(|&count| count as usize).product())
+    /// How many cells there are, and coefficients of all together.
+    pub(super) fn room(&self) -> (usize, usize) {
+        let cells = self.division().map_or(0, |(_, counts)| counts.iter().map(|&count| count as usize).product());
+        (cells, cells * sh::coefficient_count(self.degree.min(MAX_DEGREE)))
     }
 }
 
@@ -92,11 +94,9 @@ pub struct PhotonDeposit {
     light: Spectrum,
 }
 
-/// The light of one cell.
+/// Who came by one cell.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct PhotonCell {
-    /// `Σ power · length · Y(direction of travel)` (W·m).
-    moments: [Spectrum; COEFFICIENTS],
     /// How many photons came by, and the last of them.
     paths: u32,
     last: u32,
@@ -113,6 +113,9 @@ pub struct PhotonGrid<'s> {
     side: f32,
     counts: [u32; 3],
     cells: List<'s, PhotonCell>,
+    degree: usize,
+    /// `Σ power · length · Y(direction of travel)` (W·m), cell after cell.
+    moments: List<'s, Spectrum>,
     paths: u32,
     flights: u64,
 }
@@ -120,7 +123,7 @@ pub struct PhotonGrid<'s> {
 #[cfg(feature = "alloc")]
 impl Default for PhotonGrid<'_> {
     fn default() -> Self {
-        Self::new(List::default())
+        Self::new(List::default(), List::default())
     }
 }
 
@@ -137,7 +140,7 @@ impl PhotonGrid<'static> {
     /// let sky = [Light::Constant(Spectrum::ONE)];
     /// let world = World { medium: &ball, scene: &Empty, lights: (&sky).into() };
     /// let bounds = Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE };
-    /// let effort = PhotonEffort { bounds, cells: 4, paths: 200_000, flights: u64::MAX, enough: u32::MAX };
+    /// let effort = PhotonEffort { bounds, cells: 4, degree: 2, paths: 200_000, flights: u64::MAX, enough: u32::MAX };
     /// let cells = PhotonGrid::lit(&world, &effort, &path::Settings::default(), 1);
     /// let properties = ball.properties(Vec3::ZERO);
     /// let (light, _) = cells.scattered(Vec3::splat(0.2), Vec3::Z, &properties).unwrap();
@@ -170,19 +173,23 @@ impl PhotonGrid<'static> {
 }
 
 impl<'s> PhotonGrid<'s> {
-    pub(super) fn new(cells: List<'s, PhotonCell>) -> Self {
-        Self { first: Vec3::ZERO, side: 0.0, counts: [0; 3], cells, paths: 0, flights: 0 }
+    pub(super) fn new(cells: List<'s, PhotonCell>, moments: List<'s, Spectrum>) -> Self {
+        Self { first: Vec3::ZERO, side: 0.0, counts: [0; 3], cells, degree: 0, moments, paths: 0, flights: 0 }
     }
 
     /// Dark cells that fill the bounds.
     pub(super) fn reset(&mut self, effort: &PhotonEffort) -> Result<(), Full> {
         (self.paths, self.flights, self.counts) = (0, 0, [0; 3]);
         self.cells.clear();
+        self.moments.clear();
         let Some((side, counts)) = effort.division() else { return Ok(()) };
         self.side = side;
         // Whole cells about the same middle.
         self.first = effort.bounds.centre() - Vec3::from(counts.map(|count| count as f32)) * (0.5 * side);
-        self.cells.reset(effort.room(), PhotonCell::default())?;
+        self.degree = effort.degree.min(MAX_DEGREE);
+        let (count, coefficients) = effort.room();
+        self.cells.reset(count, PhotonCell::default())?;
+        self.moments.reset(coefficients, Spectrum::ZERO)?;
         self.counts = counts;
         Ok(())
     }
@@ -195,12 +202,20 @@ impl<'s> PhotonGrid<'s> {
         self.flights
     }
 
-    /// Whether enough photons have passed nearly every cell that walks may end in.
-    pub(super) fn is_known(&self, enough: u32) -> bool {
-        let lit = self.cells.as_slice().iter().filter(|cell| cell.paths >= LEAST_PATHS);
-        let (all, known) =
-            lit.fold((0_u32, 0_u32), |(all, known), cell| (all + 1, known + u32::from(cell.paths >= enough)));
-        all > 0 && f64::from(known) >= KNOWN * f64::from(all)
+    /// How many times the paths so far it takes until `enough` photons have passed nearly every cell that walks may end in: 1 or less if
+    /// they have. Infinite if none has been passed by some.
+    pub(super) fn times(&self, enough: u32) -> f64 {
+        let lit = || self.cells.as_slice().iter().map(|cell| cell.paths).filter(|&paths| paths >= LEAST_PATHS);
+        let (all, most) = lit().fold((0_u32, 0), |(all, most), paths| (all + 1, most.max(paths)));
+        let most_dark = (1.0 - KNOWN) * f64::from(all);
+        // The most photons that nearly every cell has met.
+        let (mut low, mut high) = (0, most);
+        while low < high {
+            let middle = low + (high - low).div_ceil(2);
+            let darker = lit().filter(|&paths| paths < middle).count();
+            if f64::from(darker as u32) <= most_dark { low = middle } else { high = middle - 1 }
+        }
+        f64::from(enough) / f64::from(low)
     }
 
     pub(super) fn len(&self) -> usize {
@@ -266,12 +281,15 @@ impl<'s> PhotonGrid<'s> {
     pub(super) fn accept(&mut self, deposits: &[PhotonDeposit], paths: u32, flights: u64) {
         self.paths += paths;
         self.flights += flights;
-        let cells = self.cells.as_mut_slice();
-        let mut basis = [0.0; COEFFICIENTS];
+        let stride = self.stride();
+        let (cells, moments) = (self.cells.as_mut_slice(), self.moments.as_mut_slice());
+        let mut basis = [0.0; MAX_COEFFICIENTS];
         for deposit in deposits {
-            let Some(cell) = cells.get_mut(deposit.cell as usize) else { continue };
-            sh::evaluate(deposit.direction, DEGREE, &mut basis);
-            for (sum, y) in cell.moments.iter_mut().zip(basis) {
+            let cell = deposit.cell as usize;
+            let Some(sums) = moments.get_mut(cell * stride..(cell + 1) * stride) else { continue };
+            let Some(cell) = cells.get_mut(cell) else { continue };
+            sh::evaluate(deposit.direction, self.degree, &mut basis[..stride]);
+            for (sum, y) in sums.iter_mut().zip(basis) {
                 *sum += deposit.light * y;
             }
             if cell.paths == 0 {
@@ -310,19 +328,26 @@ impl<'s> PhotonGrid<'s> {
         }
     }
 
-    fn trusted(&self, [x, y, z]: [u32; 3]) -> Option<&PhotonCell> {
+    fn stride(&self) -> usize {
+        sh::coefficient_count(self.degree)
+    }
+
+    /// The coefficients of a cell where walks may end.
+    fn trusted(&self, [x, y, z]: [u32; 3]) -> Option<&[Spectrum]> {
         // Beyond the first cell numbers wrap around.
         let [nx, ny, nz] = self.counts;
         if x >= nx || y >= ny || z >= nz {
             return None;
         }
-        self.cells.as_slice().get(self.number([x, y, z]) as usize).filter(|cell| cell.is_whole)
+        let (number, stride) = (self.number([x, y, z]) as usize, self.stride());
+        let is_whole = self.cells.as_slice().get(number).is_some_and(|cell| cell.is_whole);
+        self.moments.as_slice().get(number * stride..(number + 1) * stride).filter(|_| is_whole)
     }
 
     /// All light but that straight from the lights walks connect to, scattered towards `to_eye` at `point`, with its gradients as the point
     /// moves and as `to_eye` turns; `None` where cells do not know: outside, where few photons came, and where a surface cuts them.
     ///
-    /// Radiance is an expansion of degree 2 in the direction of travel, a mean over the cell with the slope to its neighbours:
+    /// Radiance is an expansion in the direction of travel, a mean over the cell with the slope to its neighbours:
     /// `Σ p_l L_lm Y_lm`, `L_lm = Σ power · length · Y_lm / (volume · paths)`.
     ///
     /// ```
@@ -332,7 +357,7 @@ impl<'s> PhotonGrid<'s> {
     /// let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::ONE, Phase::ISOTROPIC)?;
     /// let world = World { medium: &fog, scene: &Empty, lights: (&[]).into() };
     /// let bounds = Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE };
-    /// let effort = PhotonEffort { bounds, cells: 2, paths: 10, flights: 100, enough: 1 };
+    /// let effort = PhotonEffort { bounds, cells: 2, degree: 0, paths: 10, flights: 100, enough: 1 };
     /// let cells = PhotonGrid::lit(&world, &effort, &path::Settings::default(), 1);
     /// assert!(cells.scattered(Vec3::ZERO, Vec3::Z, &fog.properties(Vec3::ZERO)).is_none());
     /// # Ok::<(), Box<dyn core::error::Error>>(())
@@ -341,12 +366,13 @@ impl<'s> PhotonGrid<'s> {
     pub fn scattered(&self, point: Vec3, to_eye: Vec3, properties: &Properties) -> Option<(Contribution, Gradient)> {
         let index = self.cell_of(point)?;
         let cell = self.trusted(index)?;
-        let basis = TurningBasis::new(to_eye, DEGREE);
-        let moments: [Spectrum; DEGREE + 1] = core::array::from_fn(|l| properties.phase.moment(l));
-        const DEGREES: [usize; COEFFICIENTS] = [0, 1, 1, 1, 2, 2, 2, 2, 2];
+        let basis = TurningBasis::new(to_eye, self.degree);
         let scale = 1.0 / (self.paths as f32 * self.side * self.side * self.side);
-        let light = |cell: &PhotonCell| -> Spectrum {
-            (0..COEFFICIENTS).map(|k| cell.moments[k] * moments[DEGREES[k]] * basis.value(k)).sum::<Spectrum>() * scale
+        let moments: [Spectrum; MAX_DEGREE + 1] = core::array::from_fn(|l| properties.phase.moment(l) * scale);
+        let of_degree = |l: usize| l * l..(l + 1) * (l + 1);
+        let light = |cell: &[Spectrum]| -> Spectrum {
+            let of = |l: usize| of_degree(l).map(|k| cell[k] * basis.value(k)).sum::<Spectrum>() * moments[l];
+            (0..=self.degree).map(of).sum()
         };
         let here = light(cell);
         let mut gradient = Gradient::ZERO;
@@ -367,16 +393,37 @@ impl<'s> PhotonGrid<'s> {
             gradient += Gradient::outer(slope, Vec3::AXES[axis]);
             radiance += slope * (point[axis] - middle[axis]);
         }
-        let turned = (1..COEFFICIENTS).fold(Gradient::ZERO, |sum, k| {
-            sum + Gradient::outer(cell.moments[k] * moments[DEGREES[k]] * scale, basis.slope(k))
+        let turned = (1..=self.degree).fold(Gradient::ZERO, |sum, l| {
+            of_degree(l).fold(sum, |sum, k| sum + Gradient::outer(cell[k] * moments[l], basis.slope(k)))
         });
         Some((Contribution { radiance, gradient }, turned))
     }
+
+    /// What a scattering leaves of the least degree that cells do not resolve, in [0, 1].
+    pub(super) fn unresolved(&self, phase: &Phase) -> f32 {
+        unresolved(phase, self.degree)
+    }
 }
 
-/// What a scattering leaves of the least degree that cells do not resolve, in [0, 1].
-pub(super) fn unresolved(phase: &Phase) -> f32 {
-    phase.moment(DEGREE + 1).map(f32::abs).max_element()
+/// What a scattering leaves of the least degree above `degree`, in [0, 1].
+fn unresolved(phase: &Phase, degree: usize) -> f32 {
+    phase.moment(degree + 1).map(f32::abs).max_element()
+}
+
+/// The least degree of cells at which light may be scattered unevenly at all.
+const LEAST_DEGREE: usize = 2;
+
+/// The least degree of cells where walks may end at their first vertex, and the highest there is if none is.
+pub(super) fn degree_for(phase: &Phase) -> usize {
+    if phase.is_isotropic() {
+        return 0;
+    }
+    (LEAST_DEGREE..MAX_DEGREE).find(|&degree| unresolved(phase, degree) <= SHARPEST).unwrap_or(MAX_DEGREE)
+}
+
+/// Variance of what such cells say, over that of their fluence: `Σ (2l + 1) p_l²` for light that comes from one direction.
+pub(super) fn spread(phase: &Phase, degree: usize) -> f32 {
+    (0..=degree).map(|l| (2 * l + 1) as f32 * phase.moment(l).map(|p| p * p).max_element()).sum()
 }
 
 fn sign(bit: usize) -> f32 {
@@ -396,7 +443,7 @@ mod tests {
     const BOX: Bounds = Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE };
 
     fn effort(paths: u32) -> PhotonEffort {
-        PhotonEffort { bounds: BOX, cells: 5, paths, flights: u64::MAX, enough: u32::MAX }
+        PhotonEffort { bounds: BOX, cells: 5, degree: 2, paths, flights: u64::MAX, enough: u32::MAX }
     }
 
     /// Black, at `z = 0.1`.

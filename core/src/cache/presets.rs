@@ -1,7 +1,7 @@
 //! Every tuned number of radiance caching, from an outline of the world.
 
 use super::kind::Kind;
-use super::photons::PhotonEffort;
+use super::photons::{self, PhotonEffort};
 use super::radius::Limits;
 use super::settings::{Effort, LEAST_RAYS, MOST_RAYS, Settings};
 use crate::math::float;
@@ -15,33 +15,18 @@ use crate::world::Outline;
 /// root of it, and time goes with it.
 pub(super) const WALKS: u32 = 512;
 
-/// One less the mean cosine from which on records of multiple scattering take more walks, in inverse proportion to it, and how many times
-/// as many at most: sharp phase functions make walks differ more. Fewer: wild records; more: time.
-const SHARP: f64 = 0.4;
-
-/// See [`SHARP`].
-const MOST_WALKS: u32 = 4;
-
 /// Directions of the other kinds, as a share of [`WALKS`]. Light of surfaces varies least from direction to direction; of single
 /// scattering only lights with extent need any.
 const SHARES: [(Kind, f64); 4] =
     [(Kind::Single, 1.0 / 64.0), (Kind::Surface, 0.25), (Kind::Multiple, 1.0), (Kind::Irradiance, 0.5)];
 
-/// `ε` of Eq. 34 for single scattering, light of surfaces, and irradiance. Larger: borders of shadows blur, corners turn too
-/// bright. Smaller: records, and time, by the square.
-const TOLERANCES: [f32; 3] = [0.2, 2.0, 0.35];
+/// `ε` of Eq. 34 for single scattering, light of surfaces, multiple scattering, and irradiance. Larger: borders of shadows blur, corners turn too
+/// bright, light that falls off like 1/r is carried too far. Smaller: records, and time, by the square.
+const TOLERANCES: [f32; 4] = [0.2, 2.0, 0.8, 0.35];
 
-/// Bounds of the tolerance of multiple scattering, which is one less the absolute mean cosine of the phase function: expansions change faster than the
-/// mean over directions, from which radii come. Above the upper bound light that falls off like 1/r is carried too
-/// far, and fog around a lamp turns out too dark; below the lower one records are more than they mend.
-const BREADTH: [f64; 2] = [0.1, 0.8];
-
-/// Greatest radius as a share of the size of the bounds, for single scattering and irradiance, and for light of surfaces. Larger: light is carried round
+/// Greatest radius as a share of the size of the bounds, for single scattering, multiple scattering and irradiance, and for light of surfaces. Larger: light is carried round
 /// corners that no gradient knows; smaller: more records where nothing changes.
 const REACHES: [f32; 2] = [0.1, 0.06];
-
-/// The same for multiple scattering: a share of its tolerance, and at least.
-const MULTIPLE_REACH: [f32; 2] = [0.125, 0.05];
 
 /// Least radius as a share of the size of the bounds. Smaller: borders of shadows swallow records.
 const LEAST_REACH: f32 = 1e-3;
@@ -70,6 +55,10 @@ const FLIGHTS: f64 = 3e7;
 
 /// Photons that know the light of a cell: 9 % of noise, of which a walk meets a mean over many cells.
 const ENOUGH: u32 = 128;
+
+/// Photons are as many times as many as what cells say of one direction varies more than their fluence does, over this. Less: time; more:
+/// clouds of noise where scattering is sharp, which all records of a place share.
+const EVEN: f32 = 2.0;
 
 /// Most vertices of a walk. More: nothing, as roulette ends walks long before; fewer: dense fog that hardly absorbs turns out too dark.
 const VERTICES: u32 = 4096;
@@ -100,6 +89,43 @@ pub const ERROR_BOUNDS: [f32; 2] = [1e-3, 0.5];
 /// that rough pictures do not repay.
 const COARSEST: f32 = 1.5;
 
+/// Samples of records, and photons, that take the place of wrong ones, as a multiple. More: time; fewer: noise that made them wrong stays.
+const REPAIR_SAMPLES: u32 = 4;
+
+/// Bounds of the factor of radii and tolerances of such records. Less than the lower: time by its cube; more than the upper: nothing changes.
+const REPAIR_BOUNDS: [f64; 2] = [0.3, 0.7];
+
+/// How much finer records must be that are off by `bias` where `most` is allowed: what extrapolation gets wrong goes with the square of radii.
+pub(super) fn finer_by(most: f64, bias: f64) -> f32 {
+    libm::sqrt(most / bias.abs()).clamp(REPAIR_BOUNDS[0], REPAIR_BOUNDS[1]) as f32
+}
+
+impl Effort {
+    /// For records that take the place of wrong ones.
+    pub(super) fn finer(self, factor: f32) -> Self {
+        Self {
+            tolerance: self.tolerance * factor,
+            samples: self.samples.saturating_mul(REPAIR_SAMPLES),
+            limits: Limits { max: (self.limits.max * factor).max(self.limits.min), ..self.limits },
+            clearance: self.clearance * factor,
+            free_paths: self.free_paths * factor,
+            ..self
+        }
+    }
+}
+
+impl PhotonEffort {
+    /// As [`Effort::finer`].
+    pub(super) fn finer(self) -> Self {
+        Self {
+            paths: self.paths.saturating_mul(REPAIR_SAMPLES),
+            flights: self.flights.saturating_mul(u64::from(REPAIR_SAMPLES)),
+            enough: self.enough.saturating_mul(REPAIR_SAMPLES),
+            ..self
+        }
+    }
+}
+
 /// The most samples per pixel for that. More: time at edges between black and a lamp, where noise falls no faster; fewer: jagged edges.
 pub const MOST_SAMPLES: u32 = 256;
 
@@ -118,9 +144,9 @@ impl Settings {
     /// let world = World { medium: &fog, scene: &Empty, lights: (&lamps).into() };
     /// let bounds = Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE };
     /// let settings = Settings::for_outline(&Outline::of(&world, bounds), 0.02);
-    /// // One lamp is connected to; the sharper fog scatters, the finer are records of light scattered often.
+    /// // One lamp is connected to; light scattered often is cached.
     /// assert!(settings.single.is_none());
-    /// assert!((settings.multiple.unwrap().tolerance - 0.4).abs() < 1e-6);
+    /// assert_eq!(settings.multiple.unwrap().tolerance, 0.8);
     /// // Half the error: four times the walks.
     /// let finer = Settings::for_outline(&Outline::of(&world, bounds), 0.01);
     /// assert_eq!(finer.multiple.unwrap().samples, 4 * settings.multiple.unwrap().samples);
@@ -134,10 +160,6 @@ impl Settings {
         let walks = (f64::from(WALKS) / f64::from(scale * scale)) as u32;
         let size = outline.bounds.size().max_element();
         let phase = &outline.phase;
-        let sharpness = f64::from(phase.mean_cosine().map(f32::abs).max_element());
-        let breadth = (1.0 - sharpness).clamp(BREADTH[0], BREADTH[1]) as f32;
-        let sharper = (SHARP / (1.0 - sharpness)).clamp(1.0, f64::from(MOST_WALKS));
-        let sharper_walks = (f64::from(walks) * sharper) as u32;
         let free_paths = |kind| match kind {
             Kind::Surface => FREE_PATHS[0] * coarser.min(1.0),
             Kind::Multiple => FREE_PATHS[1] * coarser.min(1.0),
@@ -145,18 +167,17 @@ impl Settings {
         };
         let effort = |kind: Kind, tolerance: f32, degree: usize, most: f32, clearance: f32| Effort {
             tolerance: tolerance * coarser,
-            samples: samples(kind, if kind == Kind::Multiple { sharper_walks } else { walks }),
+            samples: samples(kind, walks),
             degree,
             limits: Limits { min: LEAST_REACH * size, max: most * size },
             clearance,
             free_paths: free_paths(kind),
         };
         let degree = |power: u32, fall_off: f32| degree_for(phase, power, fall_off, LEFT_OUT * scale * scale);
-        let multiple_reach = (breadth * MULTIPLE_REACH[0]).max(MULTIPLE_REACH[1]);
         Self {
             surface: Some(effort(Kind::Surface, TOLERANCES[1], degree(1, SURFACE_FALL_OFF), REACHES[1], CLEARANCES[1])),
-            multiple: Some(effort(Kind::Multiple, breadth, degree(2, 0.0), multiple_reach, f32::INFINITY)),
-            irradiance: Some(effort(Kind::Irradiance, TOLERANCES[2], 0, REACHES[0], CLEARANCES[0])),
+            multiple: Some(effort(Kind::Multiple, TOLERANCES[2], degree(2, 0.0), REACHES[0], f32::INFINITY)),
+            irradiance: Some(effort(Kind::Irradiance, TOLERANCES[3], 0, REACHES[0], CLEARANCES[0])),
             photons: Some(photons(outline, scale)),
             walk: multiple_scatter::Settings {
                 one_light: outline.lights.all > 1,
@@ -234,12 +255,15 @@ fn photons(outline: &Outline, scale: f32) -> PhotonEffort {
     // Casts saturate, and take NaN to 0.
     let cells = ((CELLS_PER_FREE_PATH * thickness) as u32).clamp(CELLS[0], CELLS[1]);
     let finer = f64::from(1.0 / (scale * scale));
+    let degree = photons::degree_for(&outline.phase);
+    let sharper = f64::from(photons::spread(&outline.phase, degree) / EVEN).max(1.0);
     PhotonEffort {
         bounds: outline.bounds,
         cells,
+        degree,
         paths: (f64::from(PHOTONS) * finer) as u32,
         flights: (FLIGHTS * finer) as u64,
-        enough: (f64::from(ENOUGH) * finer) as u32,
+        enough: (f64::from(ENOUGH) * finer * sharper) as u32,
     }
 }
 

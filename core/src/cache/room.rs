@@ -8,6 +8,7 @@ use super::record::MAX_STRIDE;
 use super::settings::Settings;
 use super::{Estimate, SurfaceCache, VolumeCache, Wanted};
 use crate::sh::{Coefficient, coefficient_count};
+use crate::spectrum::Spectrum;
 
 /// Lengths of all lent memory that caches and their filling need.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -36,6 +37,8 @@ pub struct Room {
     pub of_job_deposits: usize,
     /// [`Slots::photons`].
     pub photons: usize,
+    /// [`Slots::photon_moments`].
+    pub photon_moments: usize,
 }
 
 /// Room for `records` of every kind that the settings use, made of `places` where light is asked for. Crowds of records within crowds may
@@ -72,7 +75,8 @@ pub fn room_for(settings: &Settings, places: usize, records: usize) -> Room {
     room.of_job_open = places.min(PLACES_PER_JOB as usize);
     room.of_job_higher = stride;
     if let Some(effort) = &settings.photons {
-        (room.photons, room.of_job_deposits) = (effort.room(), DEPOSITS_OF_JOB);
+        (room.photons, room.photon_moments) = effort.room();
+        room.of_job_deposits = DEPOSITS_OF_JOB;
     }
     room
 }
@@ -109,4 +113,6 @@ pub struct Slots<'s> {
     pub guides: [&'s mut [Guide]; Kind::COUNT],
     /// For the cells that photons light.
     pub photons: &'s mut [PhotonCell],
+    /// For the light in them.
+    pub photon_moments: &'s mut [Spectrum],
 }

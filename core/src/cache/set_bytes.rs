@@ -209,7 +209,8 @@ impl RadianceCaches<'_> {
     }
 
     /// Reads what [`RadianceCaches::write`] wrote with the same `tag` in place of what is there. [`RadianceCaches::settings`] must ask for
-    /// the same kinds, with the same tolerances, samples and degrees; the rest may differ.
+    /// the same kinds and degrees. Tolerances that are smaller and samples that are more than asked for are taken over, larger and fewer
+    /// are errors; the rest may differ.
     ///
     /// ```
     /// # #[cfg(feature = "alloc")] {
@@ -247,13 +248,19 @@ impl RadianceCaches<'_> {
                 (None, None) => continue,
                 (_, effort) => return Err(CachesError::Absent { part, is_asked_for: effort.is_some() }),
             };
-            let pairs = [
-                ("degree", found.degree as f32, due.degree as f32),
-                ("tolerance", found.tolerance, due.tolerance),
-                ("samples per record", found.samples as f32, due.samples as f32),
+            let (degrees, samples) = ([found.degree, due.degree], [found.samples, due.samples]);
+            let checks = [
+                ("degree", degrees.map(|degree| degree as f32), degrees[0] == degrees[1]),
+                ("tolerance", [found.tolerance, due.tolerance], found.tolerance <= due.tolerance),
+                ("samples per record", samples.map(|samples| samples as f32), samples[0] >= samples[1]),
             ];
-            if let Some(&(what, found, due)) = pairs.iter().find(|(_, found, due)| found != due) {
+            if let Some(&(what, [found, due], _)) = checks.iter().find(|(.., fits)| !fits) {
                 return Err(CachesError::Setting { part, what, found, due });
+            }
+        }
+        for (kind, row) in Kind::FINAL.into_iter().filter_map(|kind| Some((kind, rows[kind as usize].as_ref()?))) {
+            if let Some(effort) = self.settings.effort_mut(kind) {
+                (effort.tolerance, effort.samples) = (row.effort.tolerance, row.effort.samples);
             }
         }
         self.views.clear();

@@ -99,9 +99,9 @@ impl<'s> Slot<'s> {
         Some(match self {
             Self::Surface(cache) => {
                 let normal = cache.attached(number as u32).first().map(|facing| facing.normal);
-                Place { point, normal, is_seen: false, share: 1.0 }
+                Place { point, normal, share: 1.0, ..Place::default() }
             }
-            Self::Off | Self::Volume(_) => Place { point, normal: None, is_seen: true, share: 1.0 },
+            Self::Off | Self::Volume(_) => Place { point, is_seen: true, share: 1.0, ..Place::default() },
         })
     }
 
@@ -156,6 +156,15 @@ impl<'s> Slot<'s> {
                 let _ = cache.revise(number as u32, value, &gradient, &[facing]);
             }
             _ => {}
+        }
+    }
+
+    /// Forgets all records.
+    pub(super) fn clear(&mut self) {
+        match self {
+            Self::Off => {}
+            Self::Volume(cache) => cache.clear(),
+            Self::Surface(cache) => cache.clear(),
         }
     }
 

@@ -242,6 +242,14 @@ impl<'a> Lights<'a> {
         nearest
     }
 
+    /// Whether rays may meet any of them.
+    pub(crate) fn have_surfaces(&self) -> bool {
+        if self.has_tree() {
+            return [Kind::Body, Kind::Panel].iter().any(|kind| self.roots[*kind as usize] != NONE);
+        }
+        self.all.iter().any(|light| matches!(Kind::of(light), Kind::Body | Kind::Panel))
+    }
+
     /// The lights at infinity, with their indices.
     pub(crate) fn distant(&self) -> impl Iterator<Item = (usize, &'a Light<'a>)> + '_ {
         let linear = if self.has_tree() { 0..0 } else { 0..self.all.len() };

@@ -9,7 +9,7 @@ use crate::host::{Hit, Medium, Properties, Rng, Scene};
 use crate::light::{Except, Falloff, FromPoint, FromRay, Light, Question};
 use crate::math::{Ray, float};
 use crate::phase::{Phase, deflection};
-use crate::sampling::{Generator, uniform, uniform2, warp};
+use crate::sampling::{Generator, mis, uniform, uniform2, warp};
 use crate::single_scatter::{Arrival, Contribution};
 use crate::spectrum::{Gradient, Spectrum};
 use crate::transmittance::thickness::{
@@ -20,6 +20,10 @@ use crate::world::{NearLight, World, nearest_surface, shadow_ray};
 /// Beyond this many distances to the light an endless segment is not sampled equiangularly: 10⁻⁴ of
 /// the angle lies there, and `tan` loses its digits.
 const ENDLESS: f32 = 1e4;
+
+/// Absolute mean cosine from which on walks meet lights as well as connect to them. More: rare samples stand for much light; less: rays that
+/// find nothing.
+const SHARP: f32 = 0.5;
 
 /// Least probability of survival: below, the weights of the rare survivors show as fireflies.
 const MIN_SURVIVAL: f32 = 0.05;
@@ -197,6 +201,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Walk<'_, M, S> {
         };
         let mut carried = Carried { weight: Weight::ONE, bend: None, kappa: Spectrum::splat(1.0 / start.pdf) };
         let (mut ray, mut end, mut collision) = (start.ray, start.end, start.collision);
+        let has_surfaces = lights.have_surfaces();
         for vertex in 1..=self.settings.max_vertices {
             let leg = self.leg(ray, end);
             self.near_lights(&leg, &carried, &mut total, rng);
@@ -219,10 +224,14 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Walk<'_, M, S> {
                 weight = weight.scaled(1.0 / survival);
             }
             let to_eye = -leg.ray.direction;
-            self.lights_at(at, &weight, (to_eye, &properties.phase), &mut total, rng);
-            if let Some((light, turned)) = known(at, to_eye, &properties) {
-                add(&mut total, weight.turn, &weight.carry_turned(&light, &turned));
-                break;
+            let meets_lights = has_surfaces && is_sharp(&properties.phase);
+            self.lights_at(at, &weight, (to_eye, &properties.phase), meets_lights, &mut total, rng);
+            let known = known(at, to_eye, &properties);
+            if let Some((light, turned)) = &known {
+                add(&mut total, weight.turn, &weight.carry_turned(light, turned));
+                if !meets_lights {
+                    break;
+                }
             }
 
             let extinction = properties.extinction().mean();
@@ -232,14 +241,27 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Walk<'_, M, S> {
             ray = Ray { origin: at, direction: turn.to_light, length: f32::INFINITY };
             end = nearest_surface(&ray, scene);
             ray.length = end.map_or(f32::INFINITY, |hit| hit.distance);
-            let radiance = end.as_ref().map_or_else(|| lights.sky(ray.direction), |hit| outgoing(&ray, hit));
-            if end.is_none() && radiance.is_black() {
+            let mut radiance = match &end {
+                _ if known.is_some() => Spectrum::ZERO,
+                Some(hit) => outgoing(&ray, hit),
+                None => lights.sky(ray.direction),
+            };
+            if meets_lights && let Some(hit) = &end {
+                radiance += self.met(&ray, hit, properties.phase.pdf(deflection(ray.direction, to_eye)));
+            }
+            if radiance.is_black() && (known.is_some() || end.is_none()) {
+                if known.is_some() {
+                    break;
+                }
                 continue;
             }
             let marching = self.marching(rng);
             let through = || transmittance_with_gradients(&ray, medium, marching);
             if let Some(arrival) = Arrival::from_end(&ray, end.as_ref(), radiance, turn.pdf, through) {
                 add_scattered(&mut total, &weight, &arrival, (to_eye, &properties.phase));
+            }
+            if known.is_some() {
+                break;
             }
         }
         // A light or a hit within rounding of a vertex may leave the range of f32.
@@ -265,19 +287,52 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Walk<'_, M, S> {
         Flying { lengths: self.settings.lengths, marching: self.marching(rng), to_end }
     }
 
-    /// Single scattering at a vertex of the lights in whose near field it does not lie.
-    fn lights_at(&self, at: Vec3, weight: &Weight, towards: (Vec3, &Phase), total: &mut Incoming, rng: &mut Generator) {
+    /// Single scattering at a vertex of the lights in whose near field it does not lie. `is_shared` if the walk may meet them, too.
+    fn lights_at(
+        &self,
+        at: Vec3,
+        weight: &Weight,
+        towards: (Vec3, &Phase),
+        is_shared: bool,
+        total: &mut Incoming,
+        rng: &mut Generator,
+    ) {
         let World { medium, scene, .. } = self.world;
-        let question = FromPoint { point: at, except: Except::Steep, sky: false };
-        self.each(&question, rng, |light, share, rng| {
+        self.each(&at_vertex(at), rng, |light, share, rng| {
             let mut sample = light.sample(at, uniform2(rng))?;
             sample.source.weight = sample.source.weight / share;
+            if is_shared && sample.pdf > 0.0 {
+                let other = towards.1.pdf(deflection(sample.incident.to_light, towards.0));
+                sample.source.weight *= mis::power(share * sample.pdf, other);
+            }
             let arrival = Arrival::from_source(at, medium, &sample.source, self.marching(rng), 0.0)?;
             if !scene.is_blocked(&shadow_ray(at, &sample.source)) {
                 add_scattered(total, weight, &arrival, towards);
             }
             Some(())
         });
+    }
+
+    /// What a light that a ray from a vertex meets sends back along it, with its share of what [`Walk::lights_at`] connects to: directions
+    /// at the vertex have the density `pdf` (sr⁻¹). A phase function that is sharper than the light is large makes
+    /// connections vary without a useful bound.
+    fn met(&self, ray: &Ray, hit: &Hit, pdf: f32) -> Spectrum {
+        let lights = &self.world.lights;
+        let met = hit.light.and_then(|index| Some((index as usize, lights.get(index as usize)?)));
+        let Some((index, light)) = met else { return Spectrum::ZERO };
+        let radiance = light.radiance(hit.normal, -ray.direction);
+        if radiance.is_black() {
+            return Spectrum::ZERO;
+        }
+        let question = at_vertex(ray.origin);
+        let share = match self.settings.one_light {
+            true => lights.share(&question, index),
+            false => f32::from(question.light(light) > 0.0),
+        };
+        if share <= 0.0 {
+            return Spectrum::ZERO;
+        }
+        radiance * mis::power(pdf, share * light.pdf(ray.origin, ray.direction, hit.distance, hit.normal))
     }
 
     /// Light scattered somewhere along a segment within a light's near field, carried to the start.
@@ -329,6 +384,16 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Walk<'_, M, S> {
             connect(light, 1.0, rng);
         }
     }
+}
+
+/// What lights send to a vertex but those around which it lies.
+fn at_vertex(point: Vec3) -> FromPoint {
+    FromPoint { point, except: Except::Steep, sky: false }
+}
+
+/// Whether walks may meet lights as they are scattered by a phase function: elsewhere connections do better, and spare a ray.
+fn is_sharp(phase: &Phase) -> bool {
+    phase.mean_cosine().map(f32::abs).max_element() > SHARP
 }
 
 /// A segment of a walk.

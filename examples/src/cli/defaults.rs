@@ -45,7 +45,7 @@ mod tests {
             ("grid_paths", "[default: 100000, for kernels of photon beams 10000]"),
             ("step_length", "[default: 1/32 of the scene's diagonal, with covariances 1/8]"),
             ("image_share", "[from 0.05 to 1]"),
-            ("paths", "[default: 512, up to 2048 where the phase function is sharp]"),
+            ("paths", "[default: 512]"),
             ("noise", "[at least 8 samples, without --spp at most 65536]"),
         ];
         for (id, end) in due {
@@ -54,7 +54,7 @@ mod tests {
             assert_eq!(help.matches('[').count(), 1, "{id}: {help}");
         }
         let tolerance = help("tolerance").to_string();
-        for part in ["0.2 for single, 2 for surface,", "within 0.1 and 0.8, 0.35 for irradiance]"] {
+        for part in ["0.2 for single, 2 for surface,", "0.8 for multiple, 0.35 for irradiance]"] {
             assert!(tolerance.contains(part), "{tolerance}");
         }
     }

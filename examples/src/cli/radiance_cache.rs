@@ -5,14 +5,13 @@ use std::path::{Path, PathBuf};
 use clap::{Arg, Args, ValueEnum};
 use fogbow::bytes::Crc;
 use fogbow::cache::{
-    self, Asked, Audit, CachedRadiance, CachesError, Effort, Extrapolation, Findings, RadianceCaches, RaySettings,
+    self, Asked, Audit, CachedRadiance, CachesError, Extrapolation, Findings, RadianceCaches, RaySettings,
 };
 use fogbow::covariance::image_sampling::Plan;
 use fogbow::host::Medium;
 use fogbow::light::Lights;
 use fogbow::math::{Ray, Vec2};
 use fogbow::path;
-use fogbow::phase::Lobe;
 use fogbow::sampling::uniform2;
 use fogbow::sh;
 use fogbow::world::{Outline, World as LitWorld};
@@ -46,7 +45,7 @@ pub struct CacheArguments {
     #[arg(long, value_name = "CACHE=E", value_parser = named)]
     pub tolerance_of: Vec<(Kind, f64)>,
     /// Random walks of each of the two estimates of a record of multiple scattering, fewer where it reaches less far
-    /// than others, in the second up to four times as many where they differ much; the other caches in proportion.
+    /// than others, in the second up to eight times as many where they differ much or are bright; the other caches in proportion.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     pub paths: Option<u32>,
     /// Degree of expansions in anisotropic media [default: from the phase function].
@@ -108,27 +107,19 @@ impl CacheArguments {
 
 /// An option with the default of [`cache::Settings::for_outline`].
 fn told(option: Arg) -> Arg {
-    let usual = |phase: Lobe| {
-        let outline = Outline { phase: phase.into(), ..unit_outline() };
-        cache::Settings::for_outline(&outline, cache::USUAL_ERROR).with_single_cached(&outline)
-    };
-    let (even, sharp) = (usual(Lobe::Isotropic), usual(Lobe::HenyeyGreenstein { g: 0.999 }));
-    let tolerance = |effort: Option<Effort>| effort.map_or(0.0, |effort| effort.tolerance);
+    let outline = unit_outline();
+    let usual = cache::Settings::for_outline(&outline, cache::USUAL_ERROR).with_single_cached(&outline);
     match option.get_id().as_str() {
         "tolerance" => {
-            let [single, surface, irradiance] = [even.single, even.surface, even.irradiance].map(tolerance);
-            let [low, high] = [sharp.multiple, even.multiple].map(tolerance);
-            with_default(
-                option,
-                format!(
-                    "{single} for single, {surface} for surface, for multiple 1 less the absolute mean cosine of the phase function, within {low} and {high}, {irradiance} for irradiance"
-                ),
-            )
+            let [single, surface, multiple, irradiance] =
+                [usual.single, usual.surface, usual.multiple, usual.irradiance]
+                    .map(|effort| effort.map_or(0.0, |effort| effort.tolerance));
+            let text = format!(
+                "{single} for single, {surface} for surface, {multiple} for multiple, {irradiance} for irradiance"
+            );
+            with_default(option, text)
         }
-        "paths" => {
-            let [few, many] = [even.multiple, sharp.multiple].map(|effort| effort.map_or(0, |effort| effort.samples));
-            with_default(option, format!("{few}, up to {many} where the phase function is sharp"))
-        }
+        "paths" => with_default(option, usual.multiple.map_or(0, |effort| effort.samples).to_string()),
         _ => option,
     }
 }

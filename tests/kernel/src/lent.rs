@@ -119,10 +119,12 @@ pub fn cache_settings() -> cache::Settings {
 }
 
 /// Photons that light walks.
-const PHOTONS: PhotonEffort = PhotonEffort { bounds: BOUNDS, cells: 4, paths: 256, flights: 10_000, enough: u32::MAX };
+const PHOTONS: PhotonEffort =
+    PhotonEffort { bounds: BOUNDS, cells: 4, degree: 2, paths: 256, flights: 10_000, enough: u32::MAX };
 
 /// Cells of light, and what the photons of a job leave in them: these are few.
 const CELLS: usize = 64;
+const MOMENTS: usize = 9 * CELLS;
 const DEPOSITS: usize = 2048;
 
 /// Where light is asked for.
@@ -141,6 +143,7 @@ fn filled(world: &Foggy<'_>, read: impl FnOnce(&RadianceCaches<'_>, bool)) {
     let (mut chosen, mut estimates) = ([(0, 0.0); ROUND], [Estimate::default(); RECORDS]);
     let (mut higher, mut of_job) = ([Coefficient::ZERO; STRIDE * RECORDS], [Coefficient::ZERO; STRIDE]);
     let (mut photons, mut deposits) = ([PhotonCell::default(); CELLS], [PhotonDeposit::default(); DEPOSITS]);
+    let mut photon_moments = [Spectrum::ZERO; MOMENTS];
     let mut guides = [[Guide::default(); RECORDS]; Kind::COUNT];
     let ([wanted, found], [open, still_open, looked_up]) = (&mut wanted, &mut open);
     let memory = FillingMemory::lent(Slots {
@@ -151,6 +154,7 @@ fn filled(world: &Foggy<'_>, read: impl FnOnce(&RadianceCaches<'_>, bool)) {
         higher: &mut higher,
         guides: guides.each_mut().map(|guides| &mut guides[..]),
         photons: &mut photons,
+        photon_moments: &mut photon_moments,
     });
     let mut filling = caches.fill_in(memory, ASKED);
     work::finish(&mut filling, world, &mut cache::FilledRecords::lent(found, looked_up, &mut of_job, &mut deposits));
@@ -183,12 +187,19 @@ pub fn read_caches(out: &mut Digest, caches: &RadianceCaches<'_>, world: &Foggy<
     }
     let mut rng = Generator::new(18);
     for ray in eye_rays(&mut rng) {
-        cache::places(&ray, world, &caches.settings().eye, &mut rng, |Place { point, normal, is_seen, share }| {
-            out.vec3(point);
-            out.option(normal, Digest::vec3);
-            out.int(u64::from(is_seen));
-            out.float(share);
-        });
+        cache::places(
+            &ray,
+            world,
+            &caches.settings().eye,
+            &mut rng,
+            |Place { point, normal, is_seen, share, to_eye }| {
+                out.vec3(point);
+                out.option(normal, Digest::vec3);
+                out.int(u64::from(is_seen));
+                out.float(share);
+                out.option(to_eye, Digest::vec3);
+            },
+        );
         let seen = caches.radiance(&ray, world, &mut rng);
         [seen.emitted, seen.surface_direct, seen.surface_indirect]
             .into_iter()
@@ -426,7 +437,7 @@ mod tests {
         assert_eq!((room.wanted, room.open, room.of_job_wanted, room.of_job_open), (PLACES, PLACES, PLACES, PLACES));
         assert_eq!((room.chosen, room.estimates, room.higher), (ROUND, RECORDS, STRIDE * RECORDS));
         assert_eq!((room.of_job_higher, room.guides), (STRIDE, [RECORDS; Kind::COUNT]));
-        assert!(room.photons <= CELLS && room.of_job_deposits >= DEPOSITS);
+        assert!(room.photons <= CELLS && room.photon_moments <= MOMENTS && room.of_job_deposits >= DEPOSITS);
         assert_eq!(room.chunks, CHUNKS);
     }
 }
