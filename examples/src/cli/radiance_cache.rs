@@ -1,4 +1,4 @@
-//! `fogbow render --method radiance-cache`.
+//! `fogbow render` by radiance caching.
 
 use std::path::{Path, PathBuf};
 
@@ -15,15 +15,17 @@ use fogbow::path;
 use fogbow::phase::Lobe;
 use fogbow::sampling::uniform2;
 use fogbow::sh;
+use fogbow::work::Rounds;
 use fogbow::world::{Outline, World as LitWorld};
 use fogbow_std::files::Problem;
 use fogbow_std::film::Film;
 use fogbow_std::progress::Control;
 use fogbow_std::radiance_cache as files;
 use fogbow_std::stats::{CountingMedium, CountingScene, Seconds, Stopwatch};
-use fogbow_std::threads::{self, Threads};
+use fogbow_std::threads::{self, Ending, Ran, Threads};
 use fogbow_std::tiles::{self, Outcome, Reason};
 
+use super::covariance::Stopped;
 use super::defaults::{unit_outline, with_default};
 use super::image_sampling::is_computed;
 use super::{Failure, output};
@@ -81,9 +83,13 @@ impl CacheArguments {
         self.cache_out.as_deref().map_or(Ok(()), output::check_place)
     }
 
+    pub(super) fn has_files(&self) -> bool {
+        self.cache_in.is_some() || self.cache_out.is_some()
+    }
+
     /// What caches in files are for: all that changes the light of a scene, and not the camera.
     pub(super) fn tag(&self, scene: &Path, paths: &path::Settings) -> Result<u64, SceneError> {
-        if self.cache_in.is_none() && self.cache_out.is_none() {
+        if !self.has_files() {
             return Ok(0);
         }
         let mut crc = Crc::new();
@@ -225,6 +231,8 @@ pub(super) struct CacheJob<'a> {
     pub(super) film: &'a mut Film,
     pub(super) settings: &'a tiles::Settings,
     pub(super) control: &'a Control<'a>,
+    /// Is told of every stage of filling, again and again.
+    pub(super) tell: &'a dyn Fn(&'static str),
     pub(super) arguments: &'a CacheArguments,
     /// Which pixels are computed; `None` for all.
     pub(super) plan: Option<&'a Plan<'a>>,
@@ -300,7 +308,8 @@ impl WithMedium for CacheJob<'_> {
         let loaded = clock.elapsed();
         let mut filling = caches.fill(Asked::View { ray, pixel: apart });
         let pool = Threads::new(self.settings.threads)?;
-        let mut filled = threads::run(&mut filling, &world, &pool, self.control, None, |_| {}).stages;
+        let tell = |filling: &_| (self.tell)(Rounds::<LitWorld<'_, M, World<'_>>>::stage(filling));
+        let Ran { ending, stages: mut filled } = threads::run(&mut filling, &world, &pool, self.control, None, tell);
         let computed = cache::Kind::ALL.into_iter().map(|kind| filling.computed(kind)).sum();
         let audit_rays = self.arguments.audit.unwrap_or_else(|| filling.audit_rays());
         let caches = filling.finish();
@@ -309,6 +318,9 @@ impl WithMedium for CacheJob<'_> {
             files::save(file, &caches, self.tag)?;
         }
         let files = [loaded, clock.elapsed()];
+        if ending == Ending::Cancelled {
+            return Err(Stopped("caches").into());
+        }
         let has_layers = self.film.layers().len() > 1;
         let render = tiles::render(self.film, self.settings, self.control, |sample, rng, layers| {
             let world = LitWorld {

@@ -25,12 +25,13 @@ use fogbow_std::stats::{CountingMedium, CountingScene};
 use fogbow_std::threads::Threads;
 use fogbow_std::tiles::{self, Outcome, Reason, RenderError, Sample};
 
+use super::choice::Choice;
 use super::covariance::{CovarianceArguments, GridJob, MarchArguments, Step, Stopped};
 use super::defaults::{with_default, with_remark};
 use super::image_sampling::{self, SamplingArguments, Sight};
 use super::march::MarchJob;
 use super::photon_beams::{BeamArguments, BeamJob, Kernel};
-use super::radiance_cache::{CacheArguments, CacheJob, check_depth};
+use super::radiance_cache::{CacheArguments, CacheJob};
 use super::report::{Bar, Report};
 use super::vpl::{self, Audit, VplArguments, VplJob};
 use super::{Ending, Failure, ellipsoids, output};
@@ -45,9 +46,10 @@ use crate::world::{Storage, WithMedium, World, light_tree, view};
 pub struct RenderArguments {
     /// The scene file.
     pub scene: PathBuf,
-    /// How light is computed.
-    #[arg(long, value_enum, default_value_t = Method::Path)]
-    pub method: Method,
+    /// How light is computed [default: radiance-cache; path with --time, with a limit on depth, and where only mirrors and glass
+    /// scatter light].
+    #[arg(long, value_enum)]
+    pub method: Option<Method>,
     /// Samples per pixel, with --noise the most; for photon beams and virtual lights rounded up to whole passes.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub spp: Option<u32>,
@@ -173,6 +175,7 @@ static STOP: AtomicBool = AtomicBool::new(false);
 #[derive(Debug)]
 pub(crate) struct Rendered {
     pub(crate) film: Film,
+    pub(crate) choice: Choice,
     pub(crate) outcome: Outcome,
     pub(crate) statistics: Statistics,
     pub(crate) camera: Camera,
@@ -194,15 +197,23 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<Ending, Failure> {
         }
         rendered => rendered?,
     };
-    let Rendered { mut film, outcome, mut statistics, audit, findings, .. } = rendered;
+    let Rendered { mut film, choice, outcome, mut statistics, audit, findings, .. } = rendered;
     if !arguments.aov && film.layers().len() > 1 {
         film = film.first(1)?;
     }
     statistics.time("write", || outputs.iter().try_for_each(|file| write_film(file, &film, arguments.exposure)))?;
 
     let size = (film.width(), film.height());
-    let report =
-        Report { arguments, outputs: &outputs, outcome: &outcome, statistics: &statistics, size, audit, findings };
+    let report = Report {
+        arguments,
+        choice: &choice,
+        outputs: &outputs,
+        outcome: &outcome,
+        statistics: &statistics,
+        size,
+        audit,
+        findings,
+    };
     if let Some(file) = &arguments.stats {
         std::fs::write(file, report.json()).map_err(|e| format!("{}: cannot be written: {e}", file.display()))?;
     }
@@ -220,18 +231,20 @@ pub(crate) fn render(arguments: &RenderArguments) -> Result<Rendered, Failure> {
         scene = scene.seen_from(origin, target).map_err(|reason| format!("--camera: {reason}"))?;
     }
     let paths = path_settings(&scene, arguments.max_depth);
-    if arguments.method == Method::RadianceCache {
-        check_depth(&paths)?;
-    }
-    if arguments.noise.is_some() && matches!(arguments.method, Method::PhotonBeams | Method::Vpl) {
+    if arguments.noise.is_some() && matches!(arguments.method, Some(Method::PhotonBeams | Method::Vpl)) {
         return Err(
             "--noise: the noise of photon beams and virtual lights is that of whole passes; use --spp or --time".into(),
         );
     }
     let mut storage = Storage::new(&scene);
     let world = statistics.time("build", || World::new(&scene, &mut storage))?;
+    let choice = Choice::of(arguments, &paths, &world)?;
+    let method = choice.method;
+    if arguments.method.is_none() && !arguments.quiet {
+        eprintln!("{}", choice.line());
+    }
     let (width, height) = arguments.size.unwrap_or((scene.sensor.width, scene.sensor.height));
-    let layers: &[&str] = match (arguments.aov, arguments.method) {
+    let layers: &[&str] = match (arguments.aov, method) {
         (_, Method::Vpl) if arguments.is_audited() => &VPL_LAYERS,
         (false, _) if arguments.sampling.is_uniform() => &["total"],
         (_, Method::RadianceCache) => &CACHE_LAYERS,
@@ -253,7 +266,7 @@ pub(crate) fn render(arguments: &RenderArguments) -> Result<Rendered, Failure> {
     let bar = Bar::new(arguments.quiet);
     let progress = |progress: &Progress| bar.show(progress, u64::from(width) * u64::from(height));
     let control = Control { cancel: Some(&STOP), progress: Some(&progress) };
-    let (samples, noise) = arguments.samples(scene.sensor.samples);
+    let (samples, noise) = arguments.samples(method, scene.sensor.samples);
     let settings = tiles::Settings {
         samples,
         goal: noise.map(|noise| tiles::Goal { noise: noise as f32, least: picture::LEAST_SAMPLES }),
@@ -270,7 +283,7 @@ pub(crate) fn render(arguments: &RenderArguments) -> Result<Rendered, Failure> {
         Some(world.media().with(GridJob {
             arguments: &arguments.covariance,
             scene: &arguments.scene,
-            is_for_kernels: arguments.method == Method::PhotonBeams && arguments.sampling.is_uniform(),
+            is_for_kernels: method == Method::PhotonBeams && arguments.sampling.is_uniform(),
             world: &world,
             lights,
             paths,
@@ -302,7 +315,7 @@ pub(crate) fn render(arguments: &RenderArguments) -> Result<Rendered, Failure> {
         plan: plan.as_ref(),
     };
     let (mut cached, mut audit, mut findings) = (None, None, None);
-    let outcome = match arguments.method {
+    let outcome = match method {
         Method::Path => world.media().with(Job { shot, film: &mut film })?,
         Method::PhotonBeams => world.media().with(BeamJob { shot, film: &mut film, arguments: &arguments.beams })?,
         Method::Vpl => {
@@ -324,6 +337,7 @@ pub(crate) fn render(arguments: &RenderArguments) -> Result<Rendered, Failure> {
                 film: &mut film,
                 settings: &settings,
                 control: &control,
+                tell: &|stage| bar.tell(stage),
                 arguments: &arguments.cache,
                 plan: plan.as_ref(),
                 tag: arguments.cache.tag(&arguments.scene, &paths)?,
@@ -354,7 +368,7 @@ pub(crate) fn render(arguments: &RenderArguments) -> Result<Rendered, Failure> {
     }
     statistics.add("render", outcome.seconds);
     statistics.counters = outcome.counters;
-    Ok(Rendered { film, outcome, statistics, camera, caches: cached.map(|c| c.caches), audit, findings })
+    Ok(Rendered { film, choice, outcome, statistics, camera, caches: cached.map(|c| c.caches), audit, findings })
 }
 
 impl RenderArguments {
@@ -364,10 +378,10 @@ impl RenderArguments {
     }
 
     /// Samples of a pixel at most, given what the scene names, and the noise at which fewer are enough.
-    fn samples(&self, named: u32) -> (u32, Option<f64>) {
+    fn samples(&self, method: Method, named: u32) -> (u32, Option<f64>) {
         let is_free = self.spp.is_none() && self.time.is_none();
-        let usual = (is_free && self.method == Method::RadianceCache).then_some(f64::from(self.cache.error));
-        let samples = match (self.spp, self.time, self.method) {
+        let usual = (is_free && method == Method::RadianceCache).then_some(f64::from(self.cache.error));
+        let samples = match (self.spp, self.time, method) {
             (Some(spp), ..) => spp,
             (None, Some(_), _) => u32::MAX,
             (None, None, _) if self.noise.is_some() => picture::MOST_SAMPLES,
@@ -384,9 +398,9 @@ impl RenderArguments {
             return true;
         }
         match self.method {
-            Method::March => self.march.step != Step::Uniform,
-            Method::PhotonBeams => self.beams.kernel == Kernel::Covariance,
-            Method::Path | Method::RadianceCache | Method::Vpl => false,
+            Some(Method::March) => self.march.step != Step::Uniform,
+            Some(Method::PhotonBeams) => self.beams.kernel == Kernel::Covariance,
+            None | Some(Method::Path | Method::RadianceCache | Method::Vpl) => false,
         }
     }
 }
@@ -413,18 +427,18 @@ fn outputs(arguments: &RenderArguments) -> Result<Vec<PathBuf>, Failure> {
         output::check_place(file)?;
     }
     let caches = &arguments.cache;
-    if arguments.method != Method::RadianceCache && (caches.cache_in.is_some() || caches.cache_out.is_some()) {
+    if arguments.method.is_some_and(|method| method != Method::RadianceCache) && caches.has_files() {
         return Err("--cache-in and --cache-out need --method radiance-cache".into());
     }
     caches.check()?;
-    if arguments.march.step != Step::Uniform && arguments.method != Method::March {
+    if arguments.march.step != Step::Uniform && arguments.method != Some(Method::March) {
         return Err("--step covariance and frequency need --method march".into());
     }
-    if arguments.beams.kernel != Kernel::Progressive && arguments.method != Method::PhotonBeams {
+    if arguments.beams.kernel != Kernel::Progressive && arguments.method != Some(Method::PhotonBeams) {
         return Err("--kernel covariance needs --method photon-beams".into());
     }
     arguments.vpl.check()?;
-    if arguments.vpl.is_named() && arguments.method != Method::Vpl {
+    if arguments.vpl.is_named() && arguments.method != Some(Method::Vpl) {
         return Err("options of virtual lights need --method vpl".into());
     }
     arguments.covariance.check()?;

@@ -9,6 +9,7 @@ use fogbow_std::stats::Seconds;
 use fogbow_std::tiles::{Outcome, Reason};
 use indicatif::{ProgressBar, ProgressStyle};
 
+use super::choice::Choice;
 use super::vpl::Audit;
 use super::{Method, RenderArguments};
 use crate::statistics::Statistics;
@@ -39,6 +40,13 @@ impl Bar {
         bar.set_message(format!("{spp:.1} samples per pixel{left}"));
     }
 
+    /// Says what is done before there is anything to show.
+    pub(super) fn tell(&self, stage: &'static str) {
+        if let Some(bar) = &self.0 {
+            bar.set_message(stage);
+        }
+    }
+
     pub(super) fn finish(&self) {
         if let Some(bar) = &self.0 {
             bar.finish_and_clear();
@@ -62,6 +70,7 @@ fn clock(seconds: f64) -> String {
 /// What a render did.
 pub(super) struct Report<'a> {
     pub(super) arguments: &'a RenderArguments,
+    pub(super) choice: &'a Choice,
     pub(super) outputs: &'a [PathBuf],
     pub(super) outcome: &'a Outcome,
     pub(super) statistics: &'a Statistics,
@@ -161,14 +170,16 @@ impl Report<'_> {
             format!("\"audit\": {{\"rays\": {}, {}}},\n  ", findings.rays, all.join(", "))
         });
         let (bytes, records) = (listed(&self.statistics.bytes), listed(&self.statistics.records));
+        let instead = self.choice.instead.as_ref();
+        let instead = instead.map_or_else(String::new, |reason| format!("\"why_path\": {},\n  ", quoted(reason)));
         format!(
-            "{{\n  \"scene\": {},\n  \"method\": \"{}\",\n  \"width\": {},\n  \"height\": {},\n  \
+            "{{\n  \"scene\": {},\n  \"method\": \"{}\",\n  {instead}\"width\": {},\n  \"height\": {},\n  \
              \"samples_per_pixel\": {},\n  \"seed\": {},\n  \"ended\": \"{reason}\",\n  \
              \"seconds\": {{{phases}\n  }},\n  \"counts\": {{\"samples\": {}, \"rays\": {}, \"shadow_rays\": {}, \
              \"collisions\": {}, \"medium_lookups\": {}, \"medium_segments\": {}, \"cache_lookups\": {}, \"cache_misses\": {}, \"non_finite\": {}}},\n  \
              {energy}{findings}\"records\": {{{records}}},\n  \"bytes\": {{{bytes}}}\n}}\n",
             quoted(&self.arguments.scene.display().to_string()),
-            match self.arguments.method {
+            match self.choice.method {
                 Method::Path => "path",
                 Method::RadianceCache => "radiance-cache",
                 Method::PhotonBeams => "photon-beams",
