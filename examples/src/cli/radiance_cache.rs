@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 use clap::{Arg, Args, ValueEnum};
 use fogbow::bytes::Crc;
 use fogbow::cache::{
-    self, Asked, Audit, CachedRadiance, CachesError, Effort, Extrapolation, Findings, RadianceCaches, RaySettings,
+    self, Asked, Audit, BiasMap, CachedRadiance, CachesError, Effort, Extrapolation, Findings, RadianceCaches,
+    RaySettings,
 };
 use fogbow::covariance::image_sampling::Plan;
 use fogbow::host::Medium;
@@ -251,8 +252,15 @@ pub(super) struct Cached {
     /// Time to read and write them.
     pub(super) files: [Seconds; 2],
     pub(super) render: Outcome,
-    /// How far the picture is off; `None` if nobody asked, or if the render was stopped.
-    pub(super) findings: Option<Findings>,
+    /// How far the picture is off, and where; `None` if nobody asked, or if the render was stopped.
+    pub(super) audited: Option<Audited>,
+}
+
+/// What an audit has found.
+#[derive(Debug, Clone)]
+pub(crate) struct Audited {
+    pub(crate) findings: Findings,
+    pub(crate) map: Box<BiasMap>,
 }
 
 impl CacheJob<'_> {
@@ -358,11 +366,11 @@ impl WithMedium for CacheJob<'_> {
             }
         })?;
         let is_whole = render.reason == Reason::Done && self.paths.max_scatterings > 0;
-        let findings = (is_whole && audit_rays > 0).then(|| {
+        let audited = (is_whole && audit_rays > 0).then(|| {
             let mut audit = Audit::new(&caches, ray, audit_rays);
             filled.extend(threads::run(&mut audit, &world, &pool, self.control, None, |_| {}).stages);
-            audit.findings()
+            Audited { findings: audit.findings(), map: Box::new(audit.map()) }
         });
-        Ok(Cached { caches, filled, computed, files, render, findings })
+        Ok(Cached { caches, filled, computed, files, render, audited })
     }
 }

@@ -5,7 +5,7 @@ use core::time::Duration;
 use std::path::PathBuf;
 
 use clap::{Arg, Args, ValueEnum};
-use fogbow::cache::{self, Findings, Kind, RadianceCaches};
+use fogbow::cache::{self, Kind, RadianceCaches};
 use fogbow::covariance::image_sampling::Plan;
 use fogbow::covariance::{CovarianceGrid, GridView};
 use fogbow::host::Medium;
@@ -31,10 +31,10 @@ use super::defaults::{with_default, with_remark};
 use super::image_sampling::{self, SamplingArguments, Sight};
 use super::march::MarchJob;
 use super::photon_beams::{BeamArguments, BeamJob, Kernel};
-use super::radiance_cache::{CacheArguments, CacheJob};
+use super::radiance_cache::{Audited, CacheArguments, CacheJob};
 use super::report::{Bar, Report};
 use super::vpl::{self, Audit, VplArguments, VplJob};
-use super::{Ending, Failure, ellipsoids, output};
+use super::{Ending, Failure, bias_layers, ellipsoids, output};
 use crate::camera::Camera;
 use crate::scene_file::SceneFile;
 use crate::statistics::Statistics;
@@ -81,7 +81,8 @@ pub struct RenderArguments {
     /// Stops by which PNG images are brightened.
     #[arg(long, value_name = "STOPS", default_value_t = 0.0, allow_negative_numbers = true)]
     pub exposure: f32,
-    /// Also writes the components of light, as layers of .exr files; where a covariance grid is used, a layer draws its ellipsoids.
+    /// Also writes the components of light, as layers of .exr files; where a covariance grid is used, a layer draws its ellipsoids, and two of
+    /// radiance caching show the relative bias of what is cached and its standard error by region of the picture.
     #[arg(long)]
     pub aov: bool,
     /// Writes times and counts.
@@ -184,7 +185,7 @@ pub(crate) struct Rendered {
     /// Of virtual lights, where it was asked for.
     pub(crate) audit: Option<Audit>,
     /// How far a picture from caches is off.
-    pub(crate) findings: Option<Findings>,
+    pub(crate) audited: Option<Audited>,
 }
 
 pub(super) fn run(arguments: &RenderArguments) -> Result<Ending, Failure> {
@@ -197,7 +198,7 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<Ending, Failure> {
         }
         rendered => rendered?,
     };
-    let Rendered { mut film, choice, outcome, mut statistics, audit, findings, .. } = rendered;
+    let Rendered { mut film, choice, outcome, mut statistics, audit, audited, .. } = rendered;
     if !arguments.aov && film.layers().len() > 1 {
         film = film.first(1)?;
     }
@@ -212,7 +213,7 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<Ending, Failure> {
         statistics: &statistics,
         size,
         audit,
-        findings,
+        audited: audited.as_ref(),
     };
     if let Some(file) = &arguments.stats {
         std::fs::write(file, report.json()).map_err(|e| format!("{}: cannot be written: {e}", file.display()))?;
@@ -314,7 +315,7 @@ pub(crate) fn render(arguments: &RenderArguments) -> Result<Rendered, Failure> {
         grid: grid.as_ref(),
         plan: plan.as_ref(),
     };
-    let (mut cached, mut audit, mut findings) = (None, None, None);
+    let (mut cached, mut audit) = (None, None);
     let outcome = match method {
         Method::Path => world.media().with(Job { shot, film: &mut film })?,
         Method::PhotonBeams => world.media().with(BeamJob { shot, film: &mut film, arguments: &arguments.beams })?,
@@ -364,11 +365,14 @@ pub(crate) fn render(arguments: &RenderArguments) -> Result<Rendered, Failure> {
             statistics.records.push((kind.name().to_owned(), cached.caches.records(kind).len() as u64));
         }
         statistics.records.push(("computed".to_owned(), cached.computed));
-        findings = cached.findings;
+        if let Some(audited) = cached.audited.as_ref().filter(|_| arguments.aov) {
+            film = bias_layers::drawn(&film, &audited.map)?;
+        }
     }
     statistics.add("render", outcome.seconds);
     statistics.counters = outcome.counters;
-    Ok(Rendered { film, choice, outcome, statistics, camera, caches: cached.map(|c| c.caches), audit, findings })
+    let (caches, audited) = cached.map_or((None, None), |cached| (Some(cached.caches), cached.audited));
+    Ok(Rendered { film, choice, outcome, statistics, camera, caches, audit, audited })
 }
 
 impl RenderArguments {

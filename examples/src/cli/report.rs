@@ -3,13 +3,14 @@
 use core::fmt::Write;
 use std::path::PathBuf;
 
-use fogbow::cache::{Deviation, Findings, Kind};
+use fogbow::cache::{AuditedRegion, Deviation, Findings, Kind, MeanLight};
 use fogbow_std::progress::Progress;
 use fogbow_std::stats::Seconds;
 use fogbow_std::tiles::{Outcome, Reason};
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::choice::Choice;
+use super::radiance_cache::Audited;
 use super::vpl::Audit;
 use super::{Method, RenderArguments};
 use crate::statistics::Statistics;
@@ -76,7 +77,7 @@ pub(super) struct Report<'a> {
     pub(super) statistics: &'a Statistics,
     pub(super) size: (u32, u32),
     pub(super) audit: Option<Audit>,
-    pub(super) findings: Option<Findings>,
+    pub(super) audited: Option<&'a Audited>,
 }
 
 impl Report<'_> {
@@ -99,7 +100,7 @@ impl Report<'_> {
         eprintln!("{width} x {height} pixels, {} samples per pixel{ending}", self.samples_per_pixel());
         let cpu = cpu.map_or_else(String::new, |c| format!(", {} of processor time", clock(c)));
         eprintln!("{}{cpu}, {:.2} million rays per second", clock(wall), self.rays_per_second() * 1e-6);
-        if let Some(findings) = &self.findings {
+        if let Some(Audited { findings, map }) = self.audited {
             eprintln!(
                 "bias {} of what is cached{}; {} of all light, by path tracing along {} eye rays",
                 percent(&findings.cached),
@@ -110,6 +111,14 @@ impl Report<'_> {
             let most = self.arguments.cache.error;
             if findings.all.exceeds(f64::from(most)) || findings.cached.exceeds(f64::from(most)) {
                 eprintln!("warning: the picture is off by more than the {} % of --error", 100.0 * most);
+            }
+            if let Some(region) = map.worst(f64::from(most)) {
+                let [columns, rows] = pixels(region, self.size);
+                eprintln!(
+                    "warning: off by more than the {} % of --error in places, most in columns {columns} and rows {rows}: {}",
+                    100.0 * most,
+                    percent(&region.cached)
+                );
             }
         }
         if counters.non_finite > 0 {
@@ -159,7 +168,7 @@ impl Report<'_> {
                 recovered.join(", "),
             )
         });
-        let findings = self.findings.as_ref().map_or_else(String::new, |findings| {
+        let findings = self.audited.map_or_else(String::new, |Audited { findings, map }| {
             let number = |x: f64| if x.is_finite() { format!("{x:.6e}") } else { "null".to_owned() };
             let entry = |name: &str, found: &Deviation| {
                 format!("{}: {{\"bias\": {}, \"error\": {}}}", quoted(name), number(found.bias), number(found.error))
@@ -167,7 +176,21 @@ impl Report<'_> {
             let parts = Kind::FINAL.into_iter().filter_map(|kind| Some(entry(kind.name(), &findings.of(kind)?)));
             let all: Vec<String> =
                 [entry("all", &findings.all), entry("cached", &findings.cached)].into_iter().chain(parts).collect();
-            format!("\"audit\": {{\"rays\": {}, {}}},\n  ", findings.rays, all.join(", "))
+            let regions = map.regions().iter().map(|region| {
+                let light = |name: &str, light: &MeanLight| {
+                    format!("\"{name}\": {{\"mean\": {}, \"error\": {}}}", number(light.mean), number(light.error))
+                };
+                let parts = [
+                    light("told", &region.told),
+                    light("traced", &region.traced),
+                    entry("all", &region.all),
+                    entry("cached", &region.cached),
+                ];
+                format!("{{\"rays\": {}, {}}}", region.rays, parts.join(", "))
+            });
+            let regions: Vec<String> = regions.collect();
+            let map = format!("{{\"side\": {}, \"by_row\": [{}]}}", map.side(), regions.join(", "));
+            format!("\"audit\": {{\"rays\": {}, {}, \"regions\": {map}}},\n  ", findings.rays, all.join(", "))
         });
         let (bytes, records) = (listed(&self.statistics.bytes), listed(&self.statistics.records));
         let instead = self.choice.instead.as_ref();
@@ -209,6 +232,17 @@ fn percent(found: &Deviation) -> String {
         return "unknown".to_owned();
     }
     format!("{:+.1} ± {:.1} %", 100.0 * found.bias, 100.0 * found.error).replace('-', "−")
+}
+
+/// Columns and rows of a region, as `0-31`, from the upper left pixel on.
+fn pixels(region: &AuditedRegion, (width, height): (u32, u32)) -> [String; 2] {
+    let [low, high] = region.corners;
+    [0, 1].map(|axis| {
+        let size = [width, height][axis] as f32;
+        let first = (low[axis] * size) as u32;
+        let last = ((high[axis] * size).ceil() as u32).saturating_sub(1).max(first);
+        format!("{first}-{last}")
+    })
 }
 
 /// The caches that are certainly off, if the picture may be.

@@ -144,9 +144,9 @@ fn every_picture_from_caches_says_how_far_it_is_off() {
     let folder = Folder::new("cache-audit");
     std::fs::write(folder.0.join("scene.xml"), World::of(&[FOG, CONTAINER, WALLS, LAMP]).text()).unwrap();
     let render = |options: &[&str]| {
-        let common =
-            ["render", "scene.xml", "--method", "radiance-cache", "--paths", "128", "--spp", "1", "-o", "a.pfm"];
-        let output = folder.run(&[&common[..], &["--stats", "s.json"], options].concat());
+        let walks = ["--paths", if options.contains(&"--extrapolation") { "1" } else { "128" }];
+        let common = ["render", "scene.xml", "--method", "radiance-cache", "--spp", "1", "-o", "a.pfm"];
+        let output = folder.run(&[&common[..], &walks, &["--stats", "s.json"], options].concat());
         assert_eq!(output.status.code(), Some(0), "{options:?}: {}", said(&output));
         let statistics = std::fs::read_to_string(folder.0.join("s.json")).unwrap();
         let audit = statistics.lines().find(|line| line.contains("\"audit\": {\"rays\"")).map(str::to_owned);
@@ -158,8 +158,21 @@ fn every_picture_from_caches_says_how_far_it_is_off() {
     for name in ["all", "cached", "surface", "multiple", "irradiance"] {
         assert!(found.contains(&format!("\"{name}\": {{\"bias\": ")), "{found}");
     }
+    // 4096 rays are told apart in 4 by 4 regions.
+    assert!(
+        found.contains("\"regions\": {\"side\": 4, ") && found.matches("\"traced\": {\"mean\": ").count() == 16,
+        "{found}"
+    );
     let (_, again, same) = render(&["--threads", "3"]);
     assert!(again == audit && same == image);
+    // So coarse that walls are wrong, and somewhere more than elsewhere.
+    let coarse = ["--tolerance", "30", "--extrapolation", "constant", "--audit", "131072"];
+    let (told, ..) = render(&[&coarse[..], &["--aov", "-o", "a.exr"]].concat());
+    assert!(told.contains("% of --error in places, most in columns "), "{told}");
+    let layers = std::fs::read(folder.0.join("a.exr")).unwrap();
+    for name in [&b"bias.R"[..], b"bias_error.R"] {
+        assert!(layers.windows(name.len()).any(|bytes| bytes == name));
+    }
     let (told, none, same) = render(&["--audit", "0"]);
     assert!(none.is_none() && !told.contains("bias") && same == image, "{told}");
 }
