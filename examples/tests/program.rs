@@ -53,7 +53,7 @@ fn said(output: &Output) -> String {
 #[test]
 fn a_render_leaves_its_images_and_a_summary() {
     let folder = Folder::new("render");
-    let output = folder.run(&["render", SCENE, "--size", "16x8", "--spp", "2"]);
+    let output = folder.run(&["render", SCENE, "--method", "path", "--size", "16x8", "--spp", "2"]);
     assert_eq!(output.status.code(), Some(0), "{}", said(&output));
     assert_eq!(folder.names(), ["smoke-box-homogeneous-anisotropic.exr", "smoke-box-homogeneous-anisotropic.png"]);
     assert!(said(&output).contains("16 x 8 pixels, 2 samples per pixel"), "{}", said(&output));
@@ -71,8 +71,8 @@ fn every_scene_here_renders_with_layers_and_statistics() {
         }
         let scene = path.to_string_lossy();
         let arguments = [
-            "render", &scene, "--size", "32x32", "--spp", "1", "--aov", "-o", "a.exr", "-o", "a.pfm", "--stats",
-            "s.json", "-q",
+            "render", &scene, "--method", "path", "--size", "32x32", "--spp", "1", "--aov", "-o", "a.exr", "-o",
+            "a.pfm", "--stats", "s.json", "-q",
         ];
         let output = folder.run(&arguments);
         assert_eq!(output.status.code(), Some(0), "{scene}: {}", said(&output));
@@ -93,7 +93,7 @@ fn a_camera_replaces_that_of_the_scene() {
     // The first is where the camera of the scene stands already.
     for camera in [None, Some("0,0,4 0,0,0"), Some("0.5,0,4 0,0,0")] {
         let mut command = folder.fogbow();
-        command.args(["render", SCENE, "--size", "16x16", "--spp", "2", "-q", "-o", "a.pfm"]);
+        command.args(["render", SCENE, "--method", "path", "--size", "16x16", "--spp", "2", "-q", "-o", "a.pfm"]);
         command.args(camera.iter().flat_map(|c| ["--camera", c]));
         let output = command.output().unwrap();
         assert_eq!(output.status.code(), Some(0), "{}", said(&output));
@@ -116,8 +116,8 @@ fn the_walk_stays_in_the_atrium_and_takes_short_steps() {
         assert!(step > 0.1 && step < 1.0, "{pair:?}");
     }
     for camera in walk.lines() {
-        let output =
-            folder.run(&["render", &atrium, "--camera", camera, "--size", "8x8", "--spp", "1", "-q", "-o", "a.pfm"]);
+        let small = ["--method", "path", "--size", "8x8", "--spp", "1", "-q", "-o", "a.pfm"];
+        let output = folder.run(&[&["render", &atrium, "--camera", camera], &small[..]].concat());
         assert_eq!(output.status.code(), Some(0), "{camera}: {}", said(&output));
         assert!(output.stderr.is_empty(), "{}", said(&output));
     }
@@ -136,8 +136,8 @@ fn a_plume_is_a_folder_of_scenes_that_render() {
             let file = |name: &str| std::fs::read(folder.0.join(format!("{name}/{frame}.{extension}"))).unwrap();
             assert!(file("a") == file("b"), "{frame}.{extension}");
         }
-        let output =
-            folder.run(&["render", &format!("a/{frame}.xml"), "--size", "32x32", "--spp", "1", "-q", "-o", "a.pfm"]);
+        let small = ["--method", "path", "--size", "32x32", "--spp", "1", "-q", "-o", "a.pfm"];
+        let output = folder.run(&[&["render", &format!("a/{frame}.xml")], &small[..]].concat());
         assert_eq!(output.status.code(), Some(0), "{frame}: {}", said(&output));
     }
     assert_eq!(std::fs::read_dir(folder.0.join("a")).unwrap().count(), 6);
@@ -189,8 +189,8 @@ fn the_same_bits_come_from_any_number_of_threads() {
     let folder = Folder::new("threads");
     let mut images = Vec::new();
     for threads in ["1", "2", "7"] {
-        let output =
-            folder.run(&["render", SCENE, "--size", "24x24", "--spp", "4", "--threads", threads, "-q", "-o", "a.pfm"]);
+        let small = ["--method", "path", "--size", "24x24", "--spp", "4", "-q", "-o", "a.pfm"];
+        let output = folder.run(&[&["render", SCENE, "--threads", threads], &small[..]].concat());
         assert_eq!(output.status.code(), Some(0), "{}", said(&output));
         images.push(std::fs::read(folder.0.join("a.pfm")).unwrap());
     }
@@ -243,7 +243,8 @@ fn bad_input_is_exit_code_2_and_no_image() {
 #[test]
 fn an_image_equals_itself_and_time_limits_hold() {
     let folder = Folder::new("compare");
-    let output = folder.run(&["render", SCENE, "--size", "16x16", "--time", "0.5", "-q", "-o", "a.exr", "-o", "b.pfm"]);
+    let small = ["--method", "path", "--size", "16x16", "--time", "0.5", "-q", "-o", "a.exr", "-o", "b.pfm"];
+    let output = folder.run(&[&["render", SCENE], &small[..]].concat());
     assert_eq!(output.status.code(), Some(0), "{}", said(&output));
     let output = folder.run(&["compare", "a.exr", "b.pfm", "-o", "d.png"]);
     assert_eq!(output.status.code(), Some(0), "{}", said(&output));
@@ -258,7 +259,7 @@ fn ctrl_c_keeps_the_image_so_far() {
     let folder = Folder::new("stop");
     let child = folder
         .fogbow()
-        .args(["render", SCENE, "--size", "32x32", "--spp", "1000000", "-o", "a.pfm"])
+        .args(["render", SCENE, "--method", "path", "--size", "32x32", "--spp", "1000000", "-o", "a.pfm"])
         .stderr(std::process::Stdio::piped())
         .spawn()
         .unwrap();
@@ -269,6 +270,26 @@ fn ctrl_c_keeps_the_image_so_far() {
     assert_eq!(output.status.code(), Some(1), "{}", said(&output));
     assert!(said(&output).contains("stopped early"), "{}", said(&output));
     assert_eq!(folder.names(), ["a.pfm"]);
+}
+
+/// Before the first sample there is no picture to keep.
+#[cfg(unix)]
+#[test]
+fn ctrl_c_while_caches_are_filled_leaves_no_image() {
+    let folder = Folder::new("stop-filling");
+    let child = folder
+        .fogbow()
+        .args(["render", SCENE, "--size", "32x32", "--paths", "1000000", "-o", "a.pfm"])
+        .stderr(std::process::Stdio::piped())
+        .spawn()
+        .unwrap();
+    std::thread::sleep(core::time::Duration::from_secs(2));
+    let killed = Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+    assert!(killed.success());
+    let output = child.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(1), "{}", said(&output));
+    assert!(said(&output).contains("stopped before the caches had been filled"), "{}", said(&output));
+    assert!(folder.names().is_empty());
 }
 
 #[test]

@@ -67,8 +67,8 @@ MORE = {
         "image-sampling-noise": "--method path --image-sampling covariance --noise 0.2 --spp 32 --grid-paths 5000",
     },
     "thin-wall": {
-        "path-seed": "--spp 2 --seed 7",
-        "path-depth": "--spp 2 --max-depth 3",
+        "path-seed": "--method path --spp 2 --seed 7",
+        "path-depth": "--method path --spp 2 --max-depth 3",
         "radiance-cache-uncached": "--method radiance-cache --uncached multiple --uncached irradiance --paths 32 --spp 1 --size 14x11",
         "radiance-cache-image-sampling": "--method radiance-cache --image-sampling covariance --paths 16 --spp 1 --size 10x7 --grid-paths 3000",
         "photon-beams-radius": "--method photon-beams --spp 24 --radius 0.05 --alpha 0.8 --beams 300",
@@ -89,12 +89,12 @@ MORE = {
         "photon-beams-covariance-in": "--method photon-beams --kernel covariance --spp 8 --grid-in {grid} --camera '{camera}'",
     },
     "statue-backward": {
-        "path": "--spp 2",
+        "path": "--method path --spp 2",
         "radiance-cache": "--method radiance-cache --paths 16 --spp 1 --size 10x7",
         "vpl": "--method vpl --spp 4 --pass-samples 4 --lights 60",
     },
     "nave": {
-        "path": "--spp 2",
+        "path": "--method path --spp 2",
         "photon-beams": "--method photon-beams --spp 16",
         "march-covariance": "--method march --step covariance --spp 1 --grid-paths 3000 --grid-cells 40",
         "vpl": "--method vpl --spp 4 --pass-samples 4 --lights 60",

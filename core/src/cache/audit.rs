@@ -14,6 +14,7 @@
 use core::ops::Range;
 
 use super::Estimator;
+use super::bias_map::{BiasMap, RegionSums, Sample};
 use super::caches::RadianceCaches;
 use super::eye::{CachedRadiance, Caches, radiance};
 use super::kind::Kind;
@@ -45,7 +46,7 @@ pub(super) fn rays_for(walks: u64) -> u32 {
 }
 
 /// Standard errors beyond which a difference is no chance.
-const SURE: f64 = 3.0;
+pub(super) const SURE: f64 = 3.0;
 
 /// A relative deviation and how well it is known.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -134,6 +135,8 @@ pub struct Compared {
     truth: f64,
     all: f64,
     parts: [f64; 4],
+    /// The rays one by one, of which `rays` are set.
+    samples: [Sample; GROUP as usize],
 }
 
 /// Compares [`RadianceCaches`] with path tracing, as [`Rounds`] of jobs of 16 eye rays: any number of them can be run, and what was
@@ -174,6 +177,7 @@ pub struct Audit<'c, 's, F> {
     all: Moments,
     cached: Moments,
     parts: [Moments; 4],
+    regions: RegionSums,
 }
 
 impl<'c, 's, F: Fn([f32; 2]) -> Ray> Audit<'c, 's, F> {
@@ -192,7 +196,14 @@ impl<'c, 's, F: Fn([f32; 2]) -> Ray> Audit<'c, 's, F> {
             all: Moments::default(),
             cached: Moments::default(),
             parts: [Moments::default(); 4],
+            regions: RegionSums::new(jobs * GROUP),
         }
+    }
+
+    /// What was found so far, by region of the picture.
+    #[must_use]
+    pub fn map(&self) -> BiasMap {
+        self.regions.map()
     }
 
     /// What was found so far.
@@ -239,10 +250,11 @@ where
             let number = job * GROUP + i;
             // Shifted: the sequence begins in the very middle, where symmetric worlds have their lamps.
             let at = even2(number).map(f64::from);
-            let ray = (self.ray)([0, 1].map(|axis| {
+            let at = [0, 1].map(|axis| {
                 let moved = at[axis] + f64::from(shift[axis]);
                 ((moved - libm::floor(moved)) as f32).min(1.0 - f32::EPSILON)
-            }));
+            });
+            let ray = (self.ray)(at);
             // Both meet the same points, as they draw the same numbers.
             let rng = |stream| independent(seed, u64::from(number), stream);
             let told = radiance(&ray, &cached, &self.caches.reader(), &settings.eye, &mut rng(0));
@@ -252,17 +264,22 @@ where
             if !(told.total().is_finite() && known.total().is_finite() && truth.is_finite()) {
                 continue;
             }
-            output.rays += 1;
-            output.truth += f64::from(truth.mean());
-            output.all += f64::from(told.total().mean()) - f64::from(truth.mean());
+            let [all, truth] = [told.total(), truth].map(|light| f64::from(light.mean()));
+            output.truth += truth;
+            output.all += all - truth;
+            let mut off = 0.0;
             for ((kind, sum), (told, known)) in
                 Kind::FINAL.into_iter().zip(&mut output.parts).zip(by_kind(&told).into_iter().zip(by_kind(&known)))
             {
                 // Both estimate what is not cached, each with noise of its own.
                 if settings.effort(kind).is_some() {
-                    *sum += f64::from(told.mean()) - f64::from(known.mean());
+                    let difference = f64::from(told.mean()) - f64::from(known.mean());
+                    *sum += difference;
+                    off += difference;
                 }
             }
+            output.samples[output.rays as usize] = Sample { at, told: all, traced: truth, cached: off };
+            output.rays += 1;
         }
     }
 
@@ -279,103 +296,10 @@ where
         for (moments, part) in self.parts.iter_mut().zip(output.parts) {
             moments.add(part, output.truth);
         }
+        output.samples[..output.rays as usize].iter().for_each(|sample| self.regions.add(sample));
     }
 
     fn stage(&self) -> &'static str {
         "audit"
-    }
-}
-
-#[cfg(all(test, feature = "alloc"))]
-mod tests {
-    use super::*;
-    use crate::cache::slot::Slot;
-    use crate::cache::{Asked, Settings};
-    use crate::light::{Light, PointLight};
-    use crate::math::{Bounds, Vec3};
-    use crate::medium::{Homogeneous, Placed, Region};
-    use crate::phase::Phase;
-    use crate::work::finish;
-    use crate::world::Outline;
-
-    const COMPARED: u32 = 1 << 14;
-
-    /// Findings in a ball of fog under a sky, with a lamp inside, after `spoil`.
-    fn audited(change: impl Fn(Settings) -> Settings, spoil: impl Fn(&mut RadianceCaches<'_>)) -> Findings {
-        let fog = Homogeneous::new(Spectrum::splat(0.2), Spectrum::splat(1.8), Phase::ISOTROPIC).unwrap();
-        let ball = Placed::new(fog, Region::sphere(Vec3::ZERO, 1.0).unwrap());
-        let lamp = PointLight::new(Vec3::new(0.2, 0.1, -0.3), Spectrum::ONE).unwrap();
-        let lights = [Light::Point(lamp), Light::Constant(Spectrum::splat(0.3))];
-        let world = World { medium: &ball, scene: &crate::host::Empty, lights: (&lights).into() };
-        let bounds = Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE };
-        let camera = |at: [f32; 2]| Ray::new(3.0 * Vec3::Z, Vec3::new(at[0] - 0.5, at[1] - 0.5, -2.0).normalize());
-        let settings = Settings::for_outline(&Outline::of(&world, bounds), 0.02).with_walks(1024);
-        let settings = change(Settings { rays: 4096, ..settings });
-        let mut filling = RadianceCaches::new(settings).fill(Asked::View { ray: camera, pixel: 0.02 });
-        finish(&mut filling, &world, &mut Default::default());
-        let mut caches = filling.finish();
-        spoil(&mut caches);
-        let mut audit = Audit::new(&caches, camera, COMPARED);
-        finish(&mut audit, &world, &mut Compared::default());
-        audit.findings()
-    }
-
-    fn scaled(caches: &mut RadianceCaches<'_>, kind: Kind, factor: f32) {
-        let Slot::Volume(cache) = &mut caches.slots[kind] else { return };
-        for number in 0..cache.len() as u32 {
-            let record = cache.records()[number as usize];
-            cache.revise(number, record.value * factor, &(record.gradient * factor), &[]).unwrap();
-        }
-    }
-
-    #[test]
-    fn what_is_right_is_found_right() {
-        let found = audited(|settings| settings, |_| {});
-        assert_eq!(found.rays, COMPARED);
-        assert!(found.all.error < 0.04 && found.cached.error < 0.005, "{found:?}");
-        assert!(!found.all.exceeds(0.02) && !found.cached.exceeds(0.02), "{found:?}");
-        assert!(found.of(Kind::Irradiance).is_some() && found.of(Kind::CoarseIrradiance).is_none());
-    }
-
-    #[test]
-    fn the_cache_that_is_wrong_is_named() {
-        for (kind, other) in [(Kind::Multiple, Kind::Surface), (Kind::Surface, Kind::Multiple)] {
-            let found = audited(|settings| settings, |caches| scaled(caches, kind, 0.8));
-            let [wrong, right] = [kind, other].map(|kind| found.of(kind).unwrap());
-            assert!(wrong.exceeds(0.01) && wrong.bias < 0.0, "{kind:?} {found:?}");
-            assert!(!right.exceeds(0.015) && found.cached.exceeds(0.02), "{kind:?} {found:?}");
-        }
-    }
-
-    #[test]
-    fn walks_that_are_cut_are_found() {
-        let cut = |mut settings: Settings| {
-            settings.walk.max_vertices = 1;
-            settings.photons = None;
-            settings
-        };
-        let found = audited(cut, |_| {});
-        assert!(found.all.bias < -0.02 && found.all.exceeds(0.0), "{found:?}");
-    }
-
-    #[test]
-    fn one_wild_record_is_found() {
-        let found = audited(
-            |settings| settings,
-            |caches| {
-                let Slot::Volume(cache) = &mut caches.slots[Kind::Multiple] else { return };
-                let record = cache.records()[0];
-                cache.revise(0, record.value * 100.0, &record.gradient, &[]).unwrap();
-            },
-        );
-        assert!(found.of(Kind::Multiple).unwrap().exceeds(0.01), "{found:?}");
-    }
-
-    #[test]
-    fn nothing_compared_says_nothing() {
-        let caches = RadianceCaches::new(Settings::default());
-        let found = Audit::new(&caches, |_| Ray::new(Vec3::ZERO, Vec3::Z), 1).findings();
-        assert_eq!(found.all.error, f64::INFINITY);
-        assert!(!found.all.exceeds(0.0));
     }
 }

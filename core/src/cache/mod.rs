@@ -37,13 +37,16 @@
 //! | `estimate` | [`Estimator`]: what records are made of |
 //! | `evidence` | how far gradients can be believed; edges of the sky |
 //! | `eye` | [`places`] and [`radiance`] of eye rays |
-//! | `audit` | [`Audit`]: how far pictures from caches are off |
+//! | `audit`, `bias_map` | [`Audit`]: how far pictures from caches are off; [`BiasMap`]: where |
 //! | `room` | [`Slots`] and [`room_for`]: lent memory, and how much of it is needed |
 //! | [`bytes`] | caches as bytes, to be saved |
 
 mod aim;
 mod asked;
 mod audit;
+#[cfg(all(test, feature = "alloc"))]
+mod audited;
+mod bias_map;
 pub mod bytes;
 mod caches;
 mod estimate;
@@ -69,6 +72,7 @@ mod store;
 
 pub use asked::{Asked, Wanted};
 pub use audit::{Audit, Compared, Deviation, Findings};
+pub use bias_map::{AuditedRegion, BiasMap, MeanLight};
 pub use caches::RadianceCaches;
 pub use estimate::Estimator;
 pub use extrapolate::{Blend, Extrapolation, exponent_limit, weight};

@@ -129,6 +129,13 @@ impl PhotonEffort {
 /// The most samples per pixel for that. More: time at edges between black and a lamp, where noise falls no faster; fewer: jagged edges.
 pub const MOST_SAMPLES: u32 = 256;
 
+/// Regions along each side of a picture for which an audit tells bias apart, at most. More: memory, and each is known less well; fewer: what
+/// is wrong in a corner is lost in the light of its neighbours.
+pub(super) const SIDE: u32 = 8;
+
+/// Eye rays of an audit for every region at least. Fewer: standard errors are chance themselves; more: regions are larger.
+pub(super) const REGION_RAYS: u32 = 256;
+
 impl Settings {
     /// What suits a world for pictures whose relative error is about `error` ([`USUAL_ERROR`]; within [`ERROR_BOUNDS`]), noise and bias together;
     /// seed 0. What each number does, and what happens when it is larger and smaller, stands in `cache/presets.rs`; change fields at will.

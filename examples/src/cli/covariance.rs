@@ -102,13 +102,13 @@ pub enum Step {
     Frequency,
 }
 
-/// The host stopped the fill of a grid.
+/// The host stopped a fill, of what is named.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Stopped;
+pub(crate) struct Stopped(pub(crate) &'static str);
 
 impl core::fmt::Display for Stopped {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        f.write_str("stopped while the covariance grid was filled")
+        write!(f, "stopped before the {} had been filled", self.0)
     }
 }
 
@@ -157,7 +157,7 @@ impl WithMedium for GridJob<'_> {
             let ran = threads::run(&mut fill, &world, &Threads::new(self.threads)?, self.control, None, |_| {});
             ran.stages.iter().for_each(|(stage, seconds)| statistics.add(stage, *seconds));
             if ran.ending != Ending::Done {
-                return Err(Stopped.into());
+                return Err(Stopped("covariance grid").into());
             }
             fill.finish()
         };

@@ -2,6 +2,8 @@
 //!
 //! Exit codes: 0 done, 1 stopped early, 2 bad input.
 
+mod bias_layers;
+mod choice;
 mod compare;
 pub(crate) mod covariance;
 mod defaults;

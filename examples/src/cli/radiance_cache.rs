@@ -1,11 +1,11 @@
-//! `fogbow render --method radiance-cache`.
+//! `fogbow render` by radiance caching.
 
 use std::path::{Path, PathBuf};
 
 use clap::{Arg, Args, ValueEnum};
 use fogbow::bytes::Crc;
 use fogbow::cache::{
-    self, Asked, Audit, CachedRadiance, CachesError, Extrapolation, Findings, RadianceCaches, RaySettings,
+    self, Asked, Audit, BiasMap, CachedRadiance, CachesError, Extrapolation, Findings, RadianceCaches, RaySettings,
 };
 use fogbow::covariance::image_sampling::Plan;
 use fogbow::host::Medium;
@@ -14,15 +14,17 @@ use fogbow::math::{Ray, Vec2};
 use fogbow::path;
 use fogbow::sampling::uniform2;
 use fogbow::sh;
+use fogbow::work::Rounds;
 use fogbow::world::{Outline, World as LitWorld};
 use fogbow_std::files::Problem;
 use fogbow_std::film::Film;
 use fogbow_std::progress::Control;
 use fogbow_std::radiance_cache as files;
 use fogbow_std::stats::{CountingMedium, CountingScene, Seconds, Stopwatch};
-use fogbow_std::threads::{self, Threads};
+use fogbow_std::threads::{self, Ending, Ran, Threads};
 use fogbow_std::tiles::{self, Outcome, Reason};
 
+use super::covariance::Stopped;
 use super::defaults::{unit_outline, with_default};
 use super::image_sampling::is_computed;
 use super::{Failure, output};
@@ -80,9 +82,13 @@ impl CacheArguments {
         self.cache_out.as_deref().map_or(Ok(()), output::check_place)
     }
 
+    pub(super) fn has_files(&self) -> bool {
+        self.cache_in.is_some() || self.cache_out.is_some()
+    }
+
     /// What caches in files are for: all that changes the light of a scene, and not the camera.
     pub(super) fn tag(&self, scene: &Path, paths: &path::Settings) -> Result<u64, SceneError> {
-        if self.cache_in.is_none() && self.cache_out.is_none() {
+        if !self.has_files() {
             return Ok(0);
         }
         let mut crc = Crc::new();
@@ -216,6 +222,8 @@ pub(super) struct CacheJob<'a> {
     pub(super) film: &'a mut Film,
     pub(super) settings: &'a tiles::Settings,
     pub(super) control: &'a Control<'a>,
+    /// Is told of every stage of filling, again and again.
+    pub(super) tell: &'a dyn Fn(&'static str),
     pub(super) arguments: &'a CacheArguments,
     /// Which pixels are computed; `None` for all.
     pub(super) plan: Option<&'a Plan<'a>>,
@@ -234,8 +242,15 @@ pub(super) struct Cached {
     /// Time to read and write them.
     pub(super) files: [Seconds; 2],
     pub(super) render: Outcome,
-    /// How far the picture is off; `None` if nobody asked, or if the render was stopped.
-    pub(super) findings: Option<Findings>,
+    /// How far the picture is off, and where; `None` if nobody asked, or if the render was stopped.
+    pub(super) audited: Option<Audited>,
+}
+
+/// What an audit has found.
+#[derive(Debug, Clone)]
+pub(crate) struct Audited {
+    pub(crate) findings: Findings,
+    pub(crate) map: Box<BiasMap>,
 }
 
 impl CacheJob<'_> {
@@ -291,7 +306,8 @@ impl WithMedium for CacheJob<'_> {
         let loaded = clock.elapsed();
         let mut filling = caches.fill(Asked::View { ray, pixel: apart });
         let pool = Threads::new(self.settings.threads)?;
-        let mut filled = threads::run(&mut filling, &world, &pool, self.control, None, |_| {}).stages;
+        let tell = |filling: &_| (self.tell)(Rounds::<LitWorld<'_, M, World<'_>>>::stage(filling));
+        let Ran { ending, stages: mut filled } = threads::run(&mut filling, &world, &pool, self.control, None, tell);
         let computed = cache::Kind::ALL.into_iter().map(|kind| filling.computed(kind)).sum();
         let audit_rays = self.arguments.audit.unwrap_or_else(|| filling.audit_rays());
         let caches = filling.finish();
@@ -300,6 +316,9 @@ impl WithMedium for CacheJob<'_> {
             files::save(file, &caches, self.tag)?;
         }
         let files = [loaded, clock.elapsed()];
+        if ending == Ending::Cancelled {
+            return Err(Stopped("caches").into());
+        }
         let has_layers = self.film.layers().len() > 1;
         let render = tiles::render(self.film, self.settings, self.control, |sample, rng, layers| {
             let world = LitWorld {
@@ -337,11 +356,11 @@ impl WithMedium for CacheJob<'_> {
             }
         })?;
         let is_whole = render.reason == Reason::Done && self.paths.max_scatterings > 0;
-        let findings = (is_whole && audit_rays > 0).then(|| {
+        let audited = (is_whole && audit_rays > 0).then(|| {
             let mut audit = Audit::new(&caches, ray, audit_rays);
             filled.extend(threads::run(&mut audit, &world, &pool, self.control, None, |_| {}).stages);
-            audit.findings()
+            Audited { findings: audit.findings(), map: Box::new(audit.map()) }
         });
-        Ok(Cached { caches, filled, computed, files, render, findings })
+        Ok(Cached { caches, filled, computed, files, render, audited })
     }
 }

@@ -113,6 +113,7 @@ pub(super) fn run(arguments: &RecordsArguments) -> Result<Ending, Failure> {
         film: &mut film,
         settings: &settings,
         control: &control,
+        tell: &|stage| bar.tell(stage),
         arguments: &arguments.cache,
         plan: None,
         tag: arguments.cache.tag(&arguments.scene, &paths)?,

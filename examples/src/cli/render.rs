@@ -5,7 +5,7 @@ use core::time::Duration;
 use std::path::PathBuf;
 
 use clap::{Arg, Args, ValueEnum};
-use fogbow::cache::{self, Findings, Kind, RadianceCaches};
+use fogbow::cache::{self, Kind, RadianceCaches};
 use fogbow::covariance::image_sampling::Plan;
 use fogbow::covariance::{CovarianceGrid, GridView};
 use fogbow::host::Medium;
@@ -25,15 +25,16 @@ use fogbow_std::stats::{CountingMedium, CountingScene};
 use fogbow_std::threads::Threads;
 use fogbow_std::tiles::{self, Outcome, Reason, RenderError, Sample};
 
+use super::choice::Choice;
 use super::covariance::{CovarianceArguments, GridJob, MarchArguments, Step, Stopped};
 use super::defaults::{with_default, with_remark};
 use super::image_sampling::{self, SamplingArguments, Sight};
 use super::march::MarchJob;
 use super::photon_beams::{BeamArguments, BeamJob, Kernel};
-use super::radiance_cache::{CacheArguments, CacheJob, check_depth};
+use super::radiance_cache::{Audited, CacheArguments, CacheJob};
 use super::report::{Bar, Report};
 use super::vpl::{self, Audit, VplArguments, VplJob};
-use super::{Ending, Failure, ellipsoids, output};
+use super::{Ending, Failure, bias_layers, ellipsoids, output};
 use crate::camera::Camera;
 use crate::scene_file::SceneFile;
 use crate::statistics::Statistics;
@@ -45,9 +46,10 @@ use crate::world::{Storage, WithMedium, World, light_tree, view};
 pub struct RenderArguments {
     /// The scene file.
     pub scene: PathBuf,
-    /// How light is computed.
-    #[arg(long, value_enum, default_value_t = Method::Path)]
-    pub method: Method,
+    /// How light is computed [default: radiance-cache; path with --time, with a limit on depth, and where only mirrors and glass
+    /// scatter light].
+    #[arg(long, value_enum)]
+    pub method: Option<Method>,
     /// Samples per pixel, with --noise the most; for photon beams and virtual lights rounded up to whole passes.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub spp: Option<u32>,
@@ -79,7 +81,8 @@ pub struct RenderArguments {
     /// Stops by which PNG images are brightened.
     #[arg(long, value_name = "STOPS", default_value_t = 0.0, allow_negative_numbers = true)]
     pub exposure: f32,
-    /// Also writes the components of light, as layers of .exr files; where a covariance grid is used, a layer draws its ellipsoids.
+    /// Also writes the components of light, as layers of .exr files; where a covariance grid is used, a layer draws its ellipsoids, and two of
+    /// radiance caching show the relative bias of what is cached and its standard error by region of the picture.
     #[arg(long)]
     pub aov: bool,
     /// Writes times and counts.
@@ -173,6 +176,7 @@ static STOP: AtomicBool = AtomicBool::new(false);
 #[derive(Debug)]
 pub(crate) struct Rendered {
     pub(crate) film: Film,
+    pub(crate) choice: Choice,
     pub(crate) outcome: Outcome,
     pub(crate) statistics: Statistics,
     pub(crate) camera: Camera,
@@ -181,7 +185,7 @@ pub(crate) struct Rendered {
     /// Of virtual lights, where it was asked for.
     pub(crate) audit: Option<Audit>,
     /// How far a picture from caches is off.
-    pub(crate) findings: Option<Findings>,
+    pub(crate) audited: Option<Audited>,
 }
 
 pub(super) fn run(arguments: &RenderArguments) -> Result<Ending, Failure> {
@@ -194,15 +198,23 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<Ending, Failure> {
         }
         rendered => rendered?,
     };
-    let Rendered { mut film, outcome, mut statistics, audit, findings, .. } = rendered;
+    let Rendered { mut film, choice, outcome, mut statistics, audit, audited, .. } = rendered;
     if !arguments.aov && film.layers().len() > 1 {
         film = film.first(1)?;
     }
     statistics.time("write", || outputs.iter().try_for_each(|file| write_film(file, &film, arguments.exposure)))?;
 
     let size = (film.width(), film.height());
-    let report =
-        Report { arguments, outputs: &outputs, outcome: &outcome, statistics: &statistics, size, audit, findings };
+    let report = Report {
+        arguments,
+        choice: &choice,
+        outputs: &outputs,
+        outcome: &outcome,
+        statistics: &statistics,
+        size,
+        audit,
+        audited: audited.as_ref(),
+    };
     if let Some(file) = &arguments.stats {
         std::fs::write(file, report.json()).map_err(|e| format!("{}: cannot be written: {e}", file.display()))?;
     }
@@ -220,18 +232,20 @@ pub(crate) fn render(arguments: &RenderArguments) -> Result<Rendered, Failure> {
         scene = scene.seen_from(origin, target).map_err(|reason| format!("--camera: {reason}"))?;
     }
     let paths = path_settings(&scene, arguments.max_depth);
-    if arguments.method == Method::RadianceCache {
-        check_depth(&paths)?;
-    }
-    if arguments.noise.is_some() && matches!(arguments.method, Method::PhotonBeams | Method::Vpl) {
+    if arguments.noise.is_some() && matches!(arguments.method, Some(Method::PhotonBeams | Method::Vpl)) {
         return Err(
             "--noise: the noise of photon beams and virtual lights is that of whole passes; use --spp or --time".into(),
         );
     }
     let mut storage = Storage::new(&scene);
     let world = statistics.time("build", || World::new(&scene, &mut storage))?;
+    let choice = Choice::of(arguments, &paths, &world)?;
+    let method = choice.method;
+    if arguments.method.is_none() && !arguments.quiet {
+        eprintln!("{}", choice.line());
+    }
     let (width, height) = arguments.size.unwrap_or((scene.sensor.width, scene.sensor.height));
-    let layers: &[&str] = match (arguments.aov, arguments.method) {
+    let layers: &[&str] = match (arguments.aov, method) {
         (_, Method::Vpl) if arguments.is_audited() => &VPL_LAYERS,
         (false, _) if arguments.sampling.is_uniform() => &["total"],
         (_, Method::RadianceCache) => &CACHE_LAYERS,
@@ -253,7 +267,7 @@ pub(crate) fn render(arguments: &RenderArguments) -> Result<Rendered, Failure> {
     let bar = Bar::new(arguments.quiet);
     let progress = |progress: &Progress| bar.show(progress, u64::from(width) * u64::from(height));
     let control = Control { cancel: Some(&STOP), progress: Some(&progress) };
-    let (samples, noise) = arguments.samples(scene.sensor.samples);
+    let (samples, noise) = arguments.samples(method, scene.sensor.samples);
     let settings = tiles::Settings {
         samples,
         goal: noise.map(|noise| tiles::Goal { noise: noise as f32, least: picture::LEAST_SAMPLES }),
@@ -270,7 +284,7 @@ pub(crate) fn render(arguments: &RenderArguments) -> Result<Rendered, Failure> {
         Some(world.media().with(GridJob {
             arguments: &arguments.covariance,
             scene: &arguments.scene,
-            is_for_kernels: arguments.method == Method::PhotonBeams && arguments.sampling.is_uniform(),
+            is_for_kernels: method == Method::PhotonBeams && arguments.sampling.is_uniform(),
             world: &world,
             lights,
             paths,
@@ -301,8 +315,8 @@ pub(crate) fn render(arguments: &RenderArguments) -> Result<Rendered, Failure> {
         grid: grid.as_ref(),
         plan: plan.as_ref(),
     };
-    let (mut cached, mut audit, mut findings) = (None, None, None);
-    let outcome = match arguments.method {
+    let (mut cached, mut audit) = (None, None);
+    let outcome = match method {
         Method::Path => world.media().with(Job { shot, film: &mut film })?,
         Method::PhotonBeams => world.media().with(BeamJob { shot, film: &mut film, arguments: &arguments.beams })?,
         Method::Vpl => {
@@ -324,6 +338,7 @@ pub(crate) fn render(arguments: &RenderArguments) -> Result<Rendered, Failure> {
                 film: &mut film,
                 settings: &settings,
                 control: &control,
+                tell: &|stage| bar.tell(stage),
                 arguments: &arguments.cache,
                 plan: plan.as_ref(),
                 tag: arguments.cache.tag(&arguments.scene, &paths)?,
@@ -350,11 +365,14 @@ pub(crate) fn render(arguments: &RenderArguments) -> Result<Rendered, Failure> {
             statistics.records.push((kind.name().to_owned(), cached.caches.records(kind).len() as u64));
         }
         statistics.records.push(("computed".to_owned(), cached.computed));
-        findings = cached.findings;
+        if let Some(audited) = cached.audited.as_ref().filter(|_| arguments.aov) {
+            film = bias_layers::drawn(&film, &audited.map)?;
+        }
     }
     statistics.add("render", outcome.seconds);
     statistics.counters = outcome.counters;
-    Ok(Rendered { film, outcome, statistics, camera, caches: cached.map(|c| c.caches), audit, findings })
+    let (caches, audited) = cached.map_or((None, None), |cached| (Some(cached.caches), cached.audited));
+    Ok(Rendered { film, choice, outcome, statistics, camera, caches, audit, audited })
 }
 
 impl RenderArguments {
@@ -364,10 +382,10 @@ impl RenderArguments {
     }
 
     /// Samples of a pixel at most, given what the scene names, and the noise at which fewer are enough.
-    fn samples(&self, named: u32) -> (u32, Option<f64>) {
+    fn samples(&self, method: Method, named: u32) -> (u32, Option<f64>) {
         let is_free = self.spp.is_none() && self.time.is_none();
-        let usual = (is_free && self.method == Method::RadianceCache).then_some(f64::from(self.cache.error));
-        let samples = match (self.spp, self.time, self.method) {
+        let usual = (is_free && method == Method::RadianceCache).then_some(f64::from(self.cache.error));
+        let samples = match (self.spp, self.time, method) {
             (Some(spp), ..) => spp,
             (None, Some(_), _) => u32::MAX,
             (None, None, _) if self.noise.is_some() => picture::MOST_SAMPLES,
@@ -384,9 +402,9 @@ impl RenderArguments {
             return true;
         }
         match self.method {
-            Method::March => self.march.step != Step::Uniform,
-            Method::PhotonBeams => self.beams.kernel == Kernel::Covariance,
-            Method::Path | Method::RadianceCache | Method::Vpl => false,
+            Some(Method::March) => self.march.step != Step::Uniform,
+            Some(Method::PhotonBeams) => self.beams.kernel == Kernel::Covariance,
+            None | Some(Method::Path | Method::RadianceCache | Method::Vpl) => false,
         }
     }
 }
@@ -413,18 +431,18 @@ fn outputs(arguments: &RenderArguments) -> Result<Vec<PathBuf>, Failure> {
         output::check_place(file)?;
     }
     let caches = &arguments.cache;
-    if arguments.method != Method::RadianceCache && (caches.cache_in.is_some() || caches.cache_out.is_some()) {
+    if arguments.method.is_some_and(|method| method != Method::RadianceCache) && caches.has_files() {
         return Err("--cache-in and --cache-out need --method radiance-cache".into());
     }
     caches.check()?;
-    if arguments.march.step != Step::Uniform && arguments.method != Method::March {
+    if arguments.march.step != Step::Uniform && arguments.method != Some(Method::March) {
         return Err("--step covariance and frequency need --method march".into());
     }
-    if arguments.beams.kernel != Kernel::Progressive && arguments.method != Method::PhotonBeams {
+    if arguments.beams.kernel != Kernel::Progressive && arguments.method != Some(Method::PhotonBeams) {
         return Err("--kernel covariance needs --method photon-beams".into());
     }
     arguments.vpl.check()?;
-    if arguments.vpl.is_named() && arguments.method != Method::Vpl {
+    if arguments.vpl.is_named() && arguments.method != Some(Method::Vpl) {
         return Err("options of virtual lights need --method vpl".into());
     }
     arguments.covariance.check()?;

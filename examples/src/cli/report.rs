@@ -3,12 +3,14 @@
 use core::fmt::Write;
 use std::path::PathBuf;
 
-use fogbow::cache::{Deviation, Findings, Kind};
+use fogbow::cache::{AuditedRegion, Deviation, Findings, Kind, MeanLight};
 use fogbow_std::progress::Progress;
 use fogbow_std::stats::Seconds;
 use fogbow_std::tiles::{Outcome, Reason};
 use indicatif::{ProgressBar, ProgressStyle};
 
+use super::choice::Choice;
+use super::radiance_cache::Audited;
 use super::vpl::Audit;
 use super::{Method, RenderArguments};
 use crate::statistics::Statistics;
@@ -39,6 +41,13 @@ impl Bar {
         bar.set_message(format!("{spp:.1} samples per pixel{left}"));
     }
 
+    /// Says what is done before there is anything to show.
+    pub(super) fn tell(&self, stage: &'static str) {
+        if let Some(bar) = &self.0 {
+            bar.set_message(stage);
+        }
+    }
+
     pub(super) fn finish(&self) {
         if let Some(bar) = &self.0 {
             bar.finish_and_clear();
@@ -62,12 +71,13 @@ fn clock(seconds: f64) -> String {
 /// What a render did.
 pub(super) struct Report<'a> {
     pub(super) arguments: &'a RenderArguments,
+    pub(super) choice: &'a Choice,
     pub(super) outputs: &'a [PathBuf],
     pub(super) outcome: &'a Outcome,
     pub(super) statistics: &'a Statistics,
     pub(super) size: (u32, u32),
     pub(super) audit: Option<Audit>,
-    pub(super) findings: Option<Findings>,
+    pub(super) audited: Option<&'a Audited>,
 }
 
 impl Report<'_> {
@@ -90,7 +100,7 @@ impl Report<'_> {
         eprintln!("{width} x {height} pixels, {} samples per pixel{ending}", self.samples_per_pixel());
         let cpu = cpu.map_or_else(String::new, |c| format!(", {} of processor time", clock(c)));
         eprintln!("{}{cpu}, {:.2} million rays per second", clock(wall), self.rays_per_second() * 1e-6);
-        if let Some(findings) = &self.findings {
+        if let Some(Audited { findings, map }) = self.audited {
             eprintln!(
                 "bias {} of what is cached{}; {} of all light, by path tracing along {} eye rays",
                 percent(&findings.cached),
@@ -101,6 +111,14 @@ impl Report<'_> {
             let most = self.arguments.cache.error;
             if findings.all.exceeds(f64::from(most)) || findings.cached.exceeds(f64::from(most)) {
                 eprintln!("warning: the picture is off by more than the {} % of --error", 100.0 * most);
+            }
+            if let Some(region) = map.worst(f64::from(most)) {
+                let [columns, rows] = pixels(region, self.size);
+                eprintln!(
+                    "warning: off by more than the {} % of --error in places, most in columns {columns} and rows {rows}: {}",
+                    100.0 * most,
+                    percent(&region.cached)
+                );
             }
         }
         if counters.non_finite > 0 {
@@ -150,7 +168,7 @@ impl Report<'_> {
                 recovered.join(", "),
             )
         });
-        let findings = self.findings.as_ref().map_or_else(String::new, |findings| {
+        let findings = self.audited.map_or_else(String::new, |Audited { findings, map }| {
             let number = |x: f64| if x.is_finite() { format!("{x:.6e}") } else { "null".to_owned() };
             let entry = |name: &str, found: &Deviation| {
                 format!("{}: {{\"bias\": {}, \"error\": {}}}", quoted(name), number(found.bias), number(found.error))
@@ -158,17 +176,33 @@ impl Report<'_> {
             let parts = Kind::FINAL.into_iter().filter_map(|kind| Some(entry(kind.name(), &findings.of(kind)?)));
             let all: Vec<String> =
                 [entry("all", &findings.all), entry("cached", &findings.cached)].into_iter().chain(parts).collect();
-            format!("\"audit\": {{\"rays\": {}, {}}},\n  ", findings.rays, all.join(", "))
+            let regions = map.regions().iter().map(|region| {
+                let light = |name: &str, light: &MeanLight| {
+                    format!("\"{name}\": {{\"mean\": {}, \"error\": {}}}", number(light.mean), number(light.error))
+                };
+                let parts = [
+                    light("told", &region.told),
+                    light("traced", &region.traced),
+                    entry("all", &region.all),
+                    entry("cached", &region.cached),
+                ];
+                format!("{{\"rays\": {}, {}}}", region.rays, parts.join(", "))
+            });
+            let regions: Vec<String> = regions.collect();
+            let map = format!("{{\"side\": {}, \"by_row\": [{}]}}", map.side(), regions.join(", "));
+            format!("\"audit\": {{\"rays\": {}, {}, \"regions\": {map}}},\n  ", findings.rays, all.join(", "))
         });
         let (bytes, records) = (listed(&self.statistics.bytes), listed(&self.statistics.records));
+        let instead = self.choice.instead.as_ref();
+        let instead = instead.map_or_else(String::new, |reason| format!("\"why_path\": {},\n  ", quoted(reason)));
         format!(
-            "{{\n  \"scene\": {},\n  \"method\": \"{}\",\n  \"width\": {},\n  \"height\": {},\n  \
+            "{{\n  \"scene\": {},\n  \"method\": \"{}\",\n  {instead}\"width\": {},\n  \"height\": {},\n  \
              \"samples_per_pixel\": {},\n  \"seed\": {},\n  \"ended\": \"{reason}\",\n  \
              \"seconds\": {{{phases}\n  }},\n  \"counts\": {{\"samples\": {}, \"rays\": {}, \"shadow_rays\": {}, \
              \"collisions\": {}, \"medium_lookups\": {}, \"medium_segments\": {}, \"cache_lookups\": {}, \"cache_misses\": {}, \"non_finite\": {}}},\n  \
              {energy}{findings}\"records\": {{{records}}},\n  \"bytes\": {{{bytes}}}\n}}\n",
             quoted(&self.arguments.scene.display().to_string()),
-            match self.arguments.method {
+            match self.choice.method {
                 Method::Path => "path",
                 Method::RadianceCache => "radiance-cache",
                 Method::PhotonBeams => "photon-beams",
@@ -198,6 +232,17 @@ fn percent(found: &Deviation) -> String {
         return "unknown".to_owned();
     }
     format!("{:+.1} ± {:.1} %", 100.0 * found.bias, 100.0 * found.error).replace('-', "−")
+}
+
+/// Columns and rows of a region, as `0-31`, from the upper left pixel on.
+fn pixels(region: &AuditedRegion, (width, height): (u32, u32)) -> [String; 2] {
+    let [low, high] = region.corners;
+    [0, 1].map(|axis| {
+        let size = [width, height][axis] as f32;
+        let first = (low[axis] * size) as u32;
+        let last = ((high[axis] * size).ceil() as u32).saturating_sub(1).max(first);
+        format!("{first}-{last}")
+    })
 }
 
 /// The caches that are certainly off, if the picture may be.

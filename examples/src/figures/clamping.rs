@@ -24,7 +24,7 @@ pub(super) fn smoke(plan: &Plan) -> Result<String, Failure> {
     let exact = shot(&format!("--clamp {BOUND} --compensation 1-to-1 --steps 1000"))?;
     let even = shot(&format!("--clamp {BOUND} --compensation abc --share 1"))?;
     let path = rendered::scene_of(plan, "smoke");
-    let traced = rendered::shot(plan, &path, [edge, edge], &["--spp", judging, "--aov"])?;
+    let traced = rendered::shot(plan, &path, [edge, edge], &["--method", "path", "--spp", judging, "--aov"])?;
 
     let gain = rendered::gain(&traced.image);
     let clamped = plus(&exact.image, &layers(&exact, &STEPS), -1.0);
@@ -176,7 +176,7 @@ pub(super) fn statues(plan: &Plan) -> Result<String, Failure> {
         let scene = format!("statue-{name}");
         let ours = seen(plan, &scene, size, &format!("--lights {lights}"))?;
         let path = rendered::scene_of(plan, &scene);
-        let traced = rendered::shot(plan, &path, size, &["--spp", judging])?;
+        let traced = rendered::shot(plan, &path, size, &["--method", "path", "--spp", judging])?;
         gain.get_or_insert_with(|| rendered::gain(&traced.image));
         let share = |steps: usize| {
             let left = plus(&ours.image, &layers(&ours, &STEPS[steps..]), -1.0);

@@ -94,9 +94,9 @@ fn pair(plan: &Plan, scene: &Path, size: [u32; 2], options: &[&str]) -> Result<P
     words.extend(options);
     let cached = shot(plan, scene, size, &words)?;
     // A first few samples tell how many fit into the time.
-    let probe = shot(plan, scene, size, &["--spp", "2", "--seed", "9"])?;
+    let probe = shot(plan, scene, size, &["--method", "path", "--spp", "2", "--seed", "9"])?;
     let spp = ((2.0 * cached.cpu / probe.cpu.max(1e-9)).round() as u32).max(1).to_string();
-    let trace = |seed: &str| shot(plan, scene, size, &["--spp", &spp, "--seed", seed]);
+    let trace = |seed: &str| shot(plan, scene, size, &["--method", "path", "--spp", &spp, "--seed", seed]);
     let traced = trace("1")?;
     let judges = [trace("2")?.image, trace("3")?.image];
     Ok(Pair { cached, traced, judges })

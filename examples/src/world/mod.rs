@@ -161,6 +161,13 @@ impl<'a> World<'a> {
         self.materials.iter().any(|material| sends_on(material.surface))
     }
 
+    /// Whether there is light that caches can hold: scattered by a medium, or by a surface that is no mirror and no glass.
+    #[must_use]
+    pub fn has_cacheable(&self) -> bool {
+        let scatters = |surface: Surface| !surface.is_discrete() && !surface.albedo().is_black();
+        !self.media().phases().is_empty() || self.materials.iter().any(|material| scatters(material.surface))
+    }
+
     /// What methods must know beforehand of this world with one of its media: seen, but for what the scene says outright.
     #[must_use]
     pub fn outline<M: Medium + ?Sized>(&self, world: &LitWorld<'_, M, Self>) -> Outline {

@@ -144,9 +144,9 @@ fn every_picture_from_caches_says_how_far_it_is_off() {
     let folder = Folder::new("cache-audit");
     std::fs::write(folder.0.join("scene.xml"), World::of(&[FOG, CONTAINER, WALLS, LAMP]).text()).unwrap();
     let render = |options: &[&str]| {
-        let common =
-            ["render", "scene.xml", "--method", "radiance-cache", "--paths", "128", "--spp", "1", "-o", "a.pfm"];
-        let output = folder.run(&[&common[..], &["--stats", "s.json"], options].concat());
+        let walks = ["--paths", if options.contains(&"--extrapolation") { "1" } else { "128" }];
+        let common = ["render", "scene.xml", "--method", "radiance-cache", "--spp", "1", "-o", "a.pfm"];
+        let output = folder.run(&[&common[..], &walks, &["--stats", "s.json"], options].concat());
         assert_eq!(output.status.code(), Some(0), "{options:?}: {}", said(&output));
         let statistics = std::fs::read_to_string(folder.0.join("s.json")).unwrap();
         let audit = statistics.lines().find(|line| line.contains("\"audit\": {\"rays\"")).map(str::to_owned);
@@ -158,10 +158,67 @@ fn every_picture_from_caches_says_how_far_it_is_off() {
     for name in ["all", "cached", "surface", "multiple", "irradiance"] {
         assert!(found.contains(&format!("\"{name}\": {{\"bias\": ")), "{found}");
     }
+    // 4096 rays are told apart in 4 by 4 regions.
+    assert!(
+        found.contains("\"regions\": {\"side\": 4, ") && found.matches("\"traced\": {\"mean\": ").count() == 16,
+        "{found}"
+    );
     let (_, again, same) = render(&["--threads", "3"]);
     assert!(again == audit && same == image);
+    // So coarse that walls are wrong, and somewhere more than elsewhere.
+    let coarse = ["--tolerance", "30", "--extrapolation", "constant", "--audit", "131072"];
+    let (told, ..) = render(&[&coarse[..], &["--aov", "-o", "a.exr"]].concat());
+    assert!(told.contains("% of --error in places, most in columns "), "{told}");
+    let layers = std::fs::read(folder.0.join("a.exr")).unwrap();
+    for name in [&b"bias.R"[..], b"bias_error.R"] {
+        assert!(layers.windows(name.len()).any(|bytes| bytes == name));
+    }
     let (told, none, same) = render(&["--audit", "0"]);
     assert!(none.is_none() && !told.contains("bias") && same == image, "{told}");
+}
+
+/// Without a method: by caching where it can, else by path tracing, and the reason. Which it is stands in the statistics, too.
+#[test]
+fn caching_is_what_is_taken_unless_something_speaks_against_it() {
+    let folder = Folder::new("cache-default");
+    let foggy = World::of(&[FOG, CONTAINER, WALLS, LAMP]);
+    let limited = World { depth: "8", ..World::of(&[FOG, CONTAINER, WALLS, LAMP]) };
+    let polished = World::of(&[MIRROR, GLASS, SKY]);
+    let cached = "by radiance caching; --method takes others";
+    let traced = "by path tracing and not by radiance caching: ";
+    let cases: &[(&World, &[&str], &[&str])] = &[
+        (&foggy, &[], &[cached]),
+        (&World::of(&[WALLS, LAMP]), &[], &[cached]),
+        (&World::of(&[FOG, CONTAINER, SUN]), &["--uncached", "surface"], &[cached]),
+        (&foggy, &["--noise", "0.5"], &[cached]),
+        (&limited, &[], &[traced, "not of at most 8"]),
+        (&foggy, &["--max-depth", "3"], &[traced, "not of at most 3"]),
+        (&foggy, &["--max-depth", "2"], &[traced, "nothing is left to cache of paths of depth 2"]),
+        (&foggy, &["--max-depth", "1"], &[traced, "nothing is left to cache of paths of depth 1"]),
+        (&foggy, &["--time", "0.1"], &[traced, "--time would only count"]),
+        (&polished, &[], &[traced, "but mirrors and glass"]),
+    ];
+    for (world, options, words) in cases {
+        std::fs::write(folder.0.join("scene.xml"), world.text()).unwrap();
+        let render = |more: &[&str]| {
+            let common = ["render", "scene.xml", "--paths", "16", "--spp", "1", "--stats", "s.json", "-o", "a.pfm"];
+            let output = folder.run(&[&common, *options, more].concat());
+            assert_eq!(output.status.code(), Some(0), "{options:?} {more:?}: {}", said(&output));
+            (said(&output), std::fs::read_to_string(folder.0.join("s.json")).unwrap())
+        };
+        let (told, statistics) = render(&[]);
+        let (method, other) = if words[0] == cached { ("radiance-cache", "path") } else { ("path", "photon-beams") };
+        assert!(words.iter().all(|word| told.contains(word)), "{options:?}: {told}");
+        assert!(statistics.contains(&format!("\"method\": \"{method}\"")), "{options:?}: {statistics}");
+        assert_eq!(statistics.contains("\"why_path\": "), method == "path", "{options:?}: {statistics}");
+        // Who names a method is not told why.
+        if !options.contains(&"--noise") {
+            let (told, statistics) = render(&["--method", other]);
+            assert!(!told.contains("by radiance caching") && !told.contains("by path tracing and"), "{told}");
+            assert!(statistics.contains(&format!("\"method\": \"{other}\"")), "{options:?}: {statistics}");
+        }
+        assert!(render(&["-q"]).0.is_empty());
+    }
 }
 
 #[test]

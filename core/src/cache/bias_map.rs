@@ -1,0 +1,314 @@
+//! Where in a picture caches are off: what an audit has found, by region.
+//!
+//! A region is a rectangle of the picture. Eye rays through it are a sample of their own, with means, deviations and standard errors
+//! like those of the whole picture. Two things make a region look wrong by chance. Who looks at `m` of them finds more chance than who looks at
+//! one, so a deviation counts only from
+//!
+//! ```text
+//! z = √(9 + 2 ln m)
+//! ```
+//!
+//! standard errors on: the normal distribution has `m` times less beyond that than beyond 3, as its tails go like `exp(−z²/2)/z`. And light by
+//! single walks is skewed, so that few rays miss what is rare and bright, and know neither the mean nor how far they are off. Hall's
+//! transformation takes skewness `γ` out of a deviation of `S` standard deviations by `n` rays (Hall 1992, *On the removal of skewness by
+//! transformation*):
+//!
+//! ```text
+//! t = √n (S + γ S²/3 + γ² S³/27 + γ/(6n))
+//! ```
+//!
+//! It needs a variance. Path tracing may have none, near a point light in a medium, so that what is certain of a region is taken from estimates
+//! at the same points alone.
+
+use super::audit::{Deviation, SURE};
+use super::presets::{REGION_RAYS, SIDE};
+
+/// A mean and how well it is known.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct MeanLight {
+    /// Radiance (W·m⁻²·sr⁻¹), the mean of all channels.
+    pub mean: f64,
+    /// Its standard error; infinite where there are less than two rays.
+    pub error: f64,
+}
+
+/// What an [`Audit`](super::Audit) has found in one region of a picture.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct AuditedRegion {
+    /// The corner next to that of the picture where `at` of its rays is 0, and the opposite one; within the unit square.
+    pub corners: [[f32; 2]; 2],
+    /// Eye rays compared.
+    pub rays: u32,
+    /// Light as caches tell it.
+    pub told: MeanLight,
+    /// Light by path tracing, with random numbers of its own.
+    pub traced: MeanLight,
+    /// All light told, against path tracing. Near a point light in a medium paths have no variance, and this error is too small.
+    pub all: Deviation,
+    /// Light that is cached against estimates without caches at the same points: much better known. Both are parts of the light by those estimates.
+    pub cached: Deviation,
+    /// Skewness of the rays' differences of what is cached.
+    skewness: f64,
+}
+
+impl AuditedRegion {
+    /// Whether the light that is cached is certainly off by more than `most` as a part of the light here, although this is one of so many regions:
+    /// see [`BiasMap`].
+    ///
+    /// ```
+    /// # #[cfg(feature = "alloc")] {
+    /// # use fogbow::{cache::{Audit, RadianceCaches, Settings}, math::{Ray, Vec3}};
+    /// # let caches = RadianceCaches::new(Settings::default());
+    /// let map = Audit::new(&caches, |_| Ray::new(Vec3::ZERO, Vec3::Z), 1 << 16).map();
+    /// assert!(!map.at([0.5, 0.5]).is_off(0.02, 64), "nothing was compared");
+    /// # }
+    /// ```
+    #[must_use]
+    pub fn is_off(&self, most: f64, looks: u32) -> bool {
+        let Deviation { bias, error } = self.cached;
+        let beyond = bias.abs() - most;
+        // Of what nothing is known nothing is certain. Without any spread everything is.
+        if beyond.is_nan() || beyond <= 0.0 || !error.is_finite() {
+            return false;
+        }
+        let n = f64::from(self.rays);
+        let (s, skewness) = (beyond / (error * libm::sqrt(n)), self.skewness * bias.signum());
+        let bend = skewness * s;
+        let straight = libm::sqrt(n) * s;
+        let t = straight * (1.0 + bend / 3.0 + bend * bend / 27.0) + skewness / (6.0 * libm::sqrt(n));
+        // The transformation is flat at −3, and made for small deviations: of large ones it may take half away.
+        error == 0.0 || t.max(0.5 * straight) > sure(looks)
+    }
+}
+
+/// Standard errors beyond which one of so many deviations is no chance.
+fn sure(looks: u32) -> f64 {
+    libm::sqrt(SURE * SURE + 2.0 * libm::log(f64::from(looks.max(1))))
+}
+
+/// Bias by region of a picture: a square grid of regions, as many as the rays of an audit can tell apart.
+///
+/// ```
+/// # #[cfg(feature = "alloc")] {
+/// # use fogbow::{cache::{Audit, RadianceCaches, Settings}, math::{Ray, Vec3}};
+/// # let caches = RadianceCaches::new(Settings::default());
+/// let audit = Audit::new(&caches, |_| Ray::new(Vec3::ZERO, Vec3::Z), 1 << 16);
+/// let map = audit.map();
+/// assert_eq!((map.side(), map.regions().len()), (8, 64));
+/// assert_eq!(map.at([0.99, 0.01]).corners, [[0.875, 0.0], [1.0, 0.125]]);
+/// // Nothing was run: nothing is known, and nothing is certain.
+/// assert!(map.regions()[0].cached.error.is_infinite() && map.worst(0.0).is_none());
+/// // Four times fewer rays cannot tell as many regions apart.
+/// assert_eq!(Audit::new(&caches, |_| Ray::new(Vec3::ZERO, Vec3::Z), 1 << 12).map().side(), 4);
+/// # }
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BiasMap {
+    side: u32,
+    regions: [AuditedRegion; MOST],
+}
+
+/// Regions at most.
+const MOST: usize = (SIDE * SIDE) as usize;
+
+impl BiasMap {
+    /// Regions along each side of the picture.
+    #[must_use]
+    pub fn side(&self) -> u32 {
+        self.side
+    }
+
+    /// All regions, row by row from where `at[1]` of a ray is 0.
+    #[must_use]
+    pub fn regions(&self) -> &[AuditedRegion] {
+        &self.regions[..(self.side * self.side) as usize]
+    }
+
+    /// The region of a point of the unit square; of others, the nearest.
+    #[must_use]
+    pub fn at(&self, at: [f32; 2]) -> &AuditedRegion {
+        &self.regions[index(self.side, at)]
+    }
+
+    /// Of the regions that are certainly off by more than `most` as a part of their light, the one that is off by most beyond its own standard errors.
+    #[must_use]
+    pub fn worst(&self, most: f64) -> Option<&AuditedRegion> {
+        let looks = self.regions().len() as u32;
+        let off = self.regions().iter().filter(|region| region.is_off(most, looks));
+        let certain = |region: &AuditedRegion| region.cached.bias.abs() - sure(looks) * region.cached.error;
+        off.max_by(|a, b| certain(a).total_cmp(&certain(b)))
+    }
+}
+
+/// The number of the region of a point.
+fn index(side: u32, at: [f32; 2]) -> usize {
+    // Casts saturate, and take NaN to 0.
+    let [x, y] = at.map(|at| ((at * side as f32) as u32).min(side - 1));
+    (x + side * y) as usize
+}
+
+/// What one eye ray has told.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(super) struct Sample {
+    pub(super) at: [f32; 2],
+    /// By caches, by path tracing, and by the difference of what is cached from estimates.
+    pub(super) told: f64,
+    pub(super) traced: f64,
+    pub(super) cached: f64,
+}
+
+/// Sums over the rays of a region.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+struct Sums {
+    rays: u32,
+    told: [f64; 2],
+    traced: [f64; 2],
+    /// Light by estimates, which deviations are parts of, and its squares and cubes.
+    base: [f64; 3],
+    /// Differences `d` and `d²`, and `d b` with the base.
+    all: [f64; 3],
+    cached: [f64; 3],
+    /// `d³`, `d² b` and `d b²` of what is cached.
+    cubes: [f64; 3],
+}
+
+/// Sums by region.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct RegionSums {
+    side: u32,
+    sums: [Sums; MOST],
+}
+
+impl RegionSums {
+    /// For so many rays.
+    pub(super) fn new(rays: u32) -> Self {
+        let side = (1..=SIDE).rev().find(|side| side * side * REGION_RAYS <= rays).unwrap_or(1);
+        Self { side, sums: [Sums::default(); MOST] }
+    }
+
+    pub(super) fn add(&mut self, sample: &Sample) {
+        let sums = &mut self.sums[index(self.side, sample.at)];
+        let base = sample.told - sample.cached;
+        sums.rays += 1;
+        for (sum, x) in [(&mut sums.told, sample.told), (&mut sums.traced, sample.traced)] {
+            add(sum, [x, x * x]);
+        }
+        add(&mut sums.base, [base, base * base, base * base * base]);
+        for (sum, d) in [(&mut sums.all, sample.told - sample.traced), (&mut sums.cached, sample.cached)] {
+            add(sum, [d, d * d, d * base]);
+        }
+        let d = sample.cached;
+        add(&mut sums.cubes, [d * d * d, d * d * base, d * base * base]);
+    }
+
+    pub(super) fn map(&self) -> BiasMap {
+        let part = 1.0 / self.side as f32;
+        let region = |number: usize| {
+            let at = [number as u32 % self.side, number as u32 / self.side];
+            let corner = |more: u32| at.map(|at| (at + more) as f32 * part);
+            self.sums[number].region([corner(0), corner(1)])
+        };
+        let mut regions = [Sums::default().region([[0.0; 2]; 2]); MOST];
+        let count = (self.side * self.side) as usize;
+        regions[..count].iter_mut().enumerate().for_each(|(number, slot)| *slot = region(number));
+        BiasMap { side: self.side, regions }
+    }
+}
+
+fn add<const N: usize>(sum: &mut [f64; N], numbers: [f64; N]) {
+    sum.iter_mut().zip(numbers).for_each(|(sum, x)| *sum += x);
+}
+
+impl Sums {
+    fn region(&self, corners: [[f32; 2]; 2]) -> AuditedRegion {
+        let n = f64::from(self.rays);
+        let mean = |[sum, squares]: [f64; 2]| {
+            if n < 2.0 {
+                return MeanLight { mean: 0.0, error: f64::INFINITY };
+            }
+            let mean = sum / n;
+            let variance = (squares / n - mean * mean).max(0.0) / (n - 1.0);
+            MeanLight { mean, error: libm::sqrt(variance) }
+        };
+        let [base, squares, cubes] = self.base;
+        let deviation = |[d, dd, db]: [f64; 3]| {
+            if !(base > 0.0 && n >= 2.0) {
+                return Deviation { bias: 0.0, error: f64::INFINITY };
+            }
+            let bias = d / base;
+            let rest = (dd - 2.0 * bias * db + bias * bias * squares).max(0.0);
+            Deviation { bias, error: libm::sqrt(rest * n / (n - 1.0)) / base }
+        };
+        let cached = deviation(self.cached);
+        let [ddd, ddb, dbb] = self.cubes;
+        let third = ddd - cached.bias * (3.0 * ddb - cached.bias * (3.0 * dbb - cached.bias * cubes));
+        // Of `d − bias b`, whose mean is 0, over a standard deviation that is its error by ray.
+        let spread = cached.error * base / libm::sqrt(n);
+        let skewness = third / (n * spread * spread * spread);
+        AuditedRegion {
+            corners,
+            rays: self.rays,
+            told: mean(self.told),
+            traced: mean(self.traced),
+            all: deviation(self.all),
+            cached,
+            skewness: if skewness.is_finite() { skewness } else { 0.0 },
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sampling::{Generator, uniform};
+
+    /// Random numbers as skewed as light by single walks: mean 1, and `spread` the standard deviation of the logarithm.
+    fn skewed(spread: f64, rng: &mut Generator) -> f64 {
+        let normal = (0..12).map(|_| f64::from(uniform(rng))).sum::<f64>() - 6.0;
+        libm::exp(spread * (normal - 0.5 * spread))
+    }
+
+    /// A map of caches that tell `told(x, y)` where estimates of 1 have noise that grows to the right.
+    fn map(seed: u64, told: impl Fn([f32; 2]) -> f64) -> BiasMap {
+        let rng = &mut Generator::new(seed);
+        let rays = SIDE * SIDE * REGION_RAYS;
+        let mut sums = RegionSums::new(rays);
+        for _ in 0..rays {
+            let at = [uniform(rng), uniform(rng)];
+            let (told, known) = (told(at), skewed(0.4 + f64::from(at[0]), rng));
+            sums.add(&Sample { at, told, traced: known, cached: told - known });
+        }
+        sums.map()
+    }
+
+    #[test]
+    fn chance_makes_no_region_look_wrong() {
+        let alarms = (0..200).filter(|seed| map(*seed, |_| 1.0).worst(0.0).is_some()).count();
+        // Three standard errors are 0.3 %; what Hall's transformation leaves of skewness makes it 1 %. Without, it is every sixth map.
+        assert!(alarms <= 6, "{alarms} of 200");
+    }
+
+    #[test]
+    fn a_region_that_is_wrong_is_found_by_its_means_and_errors() {
+        for (factor, seed) in [(1.5, 1), (0.6, 2)] {
+            let is_there = |at: [f32; 2]| at[0] < 0.125 && at[1] >= 0.875;
+            let map = map(seed, |at| if is_there(at) { factor } else { 1.0 });
+            let worst = map.worst(0.02).unwrap();
+            assert!(core::ptr::eq(worst, map.at([0.01, 0.99])), "{worst:?}");
+            assert_eq!(worst.corners, [[0.0, 0.875], [0.125, 1.0]]);
+            let Deviation { bias, error } = worst.cached;
+            assert!((bias - (factor - 1.0)).abs() < 4.0 * error && error < 0.06, "{worst:?}");
+            assert!((worst.told.mean - factor).abs() < 1e-9 && worst.told.error < 1e-7);
+            assert!((worst.traced.mean - 1.0).abs() < 4.0 * worst.traced.error && worst.traced.error < 0.06);
+            let off = map.regions().iter().filter(|region| region.is_off(0.02, 64)).count();
+            assert_eq!(off, 1);
+        }
+    }
+
+    #[test]
+    fn few_rays_make_few_regions() {
+        let sides =
+            [1, 255, 256, 1023, 1024, 4096, 16383, 16384, u32::MAX].map(|rays| RegionSums::new(rays).map().side());
+        assert_eq!(sides, [1, 1, 1, 1, 2, 4, 7, 8, 8]);
+    }
+}
