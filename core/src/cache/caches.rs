@@ -226,8 +226,8 @@ impl RadianceCaches<'_> {
     }
 
     /// Drops all records of the kinds that an audit has found off by certainly more than `error`, and of those that these were made
-    /// from, to be made anew by the next fill: finer by what they are off, with four times the samples. If all together are
-    /// off and no kind is to blame, all are dropped. Returns whether any were.
+    /// from, to be made anew by the next fill: finer by what they are off, with four times the samples. If what is cached is off as a whole
+    /// and no kind is to blame, all are dropped. Returns whether any were.
     ///
     /// What finer records do not mend (walks that are cut, lights without surfaces) stays as it is: audit again, and say so.
     ///
@@ -244,7 +244,7 @@ impl RadianceCaches<'_> {
         let most = f64::from(error);
         let is_cached = |kind: &Kind| self.settings.effort(*kind).is_some();
         let to_blame = |kind: Kind| findings.of(kind).is_some_and(|found| found.exceeds(most));
-        let off_together = [findings.cached, findings.all].into_iter().find(|found| found.exceeds(most));
+        let off_together = Some(findings.cached).filter(|found| found.exceeds(most));
         let none_alone = !Kind::FINAL.into_iter().any(to_blame);
         let mut wrong = ByKind([None; Kind::COUNT]);
         for kind in Kind::FINAL.into_iter().filter(is_cached) {

@@ -89,6 +89,9 @@ pub const ERROR_BOUNDS: [f32; 2] = [1e-3, 0.5];
 /// that rough pictures do not repay.
 const COARSEST: f32 = 1.5;
 
+/// How often records are made anew because an audit has found them wrong. More: time for what finer records do not mend; fewer: what one finer step leaves stays.
+pub const MOST_REPAIRS: u32 = 2;
+
 /// Samples of records, and photons, that take the place of wrong ones, as a multiple. More: time; fewer: noise that made them wrong stays.
 const REPAIR_SAMPLES: u32 = 4;
 

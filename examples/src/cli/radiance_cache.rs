@@ -21,8 +21,8 @@ use fogbow_std::film::Film;
 use fogbow_std::progress::Control;
 use fogbow_std::radiance_cache as files;
 use fogbow_std::stats::{CountingMedium, CountingScene, Seconds, Stopwatch};
-use fogbow_std::threads::{self, Ending, Ran, Threads};
-use fogbow_std::tiles::{self, Outcome, Reason};
+use fogbow_std::threads::{self, Ending, Threads};
+use fogbow_std::tiles::{self, Outcome};
 
 use super::covariance::Stopped;
 use super::defaults::{unit_outline, with_default};
@@ -246,11 +246,23 @@ pub(super) struct Cached {
     pub(super) audited: Option<Audited>,
 }
 
+/// Adds times to those of the same stages.
+fn add_times(all: &mut Vec<(&'static str, Seconds)>, more: Vec<(&'static str, Seconds)>) {
+    for (stage, time) in more {
+        match all.iter_mut().find(|(name, _)| *name == stage) {
+            Some((_, sum)) => *sum = *sum + time,
+            None => all.push((stage, time)),
+        }
+    }
+}
+
 /// What an audit has found.
 #[derive(Debug, Clone)]
 pub(crate) struct Audited {
     pub(crate) findings: Findings,
     pub(crate) map: Box<BiasMap>,
+    /// What earlier audits had found, because of which records were made anew.
+    pub(crate) repaired: Vec<Findings>,
 }
 
 impl CacheJob<'_> {
@@ -304,13 +316,34 @@ impl WithMedium for CacheJob<'_> {
         let clock = Stopwatch::start();
         let caches = self.arguments.load(settings, self.tag)?;
         let loaded = clock.elapsed();
-        let mut filling = caches.fill(Asked::View { ray, pixel: apart });
         let pool = Threads::new(self.settings.threads)?;
         let tell = |filling: &_| (self.tell)(Rounds::<LitWorld<'_, M, World<'_>>>::stage(filling));
-        let Ran { ending, stages: mut filled } = threads::run(&mut filling, &world, &pool, self.control, None, tell);
-        let computed = cache::Kind::ALL.into_iter().map(|kind| filling.computed(kind)).sum();
-        let audit_rays = self.arguments.audit.unwrap_or_else(|| filling.audit_rays());
-        let caches = filling.finish();
+        let (mut caches, mut filled, mut computed, mut repaired) = (caches, Vec::new(), 0, Vec::new());
+        let mut ending;
+        let audited = loop {
+            let mut filling = caches.fill(Asked::View { ray, pixel: apart });
+            let ran = threads::run(&mut filling, &world, &pool, self.control, None, tell);
+            add_times(&mut filled, ran.stages);
+            computed += cache::Kind::ALL.into_iter().map(|kind| filling.computed(kind)).sum::<u64>();
+            let audit_rays = self.arguments.audit.unwrap_or_else(|| filling.audit_rays());
+            caches = filling.finish();
+            ending = ran.ending;
+            if ending != Ending::Done || audit_rays == 0 || self.paths.max_scatterings == 0 {
+                break None;
+            }
+            let mut audit = Audit::new(&caches, ray, audit_rays);
+            let ran = threads::run(&mut audit, &world, &pool, self.control, None, |_| {});
+            add_times(&mut filled, ran.stages);
+            ending = ran.ending;
+            if ending != Ending::Done {
+                break None;
+            }
+            let (findings, map) = (audit.findings(), Box::new(audit.map()));
+            if repaired.len() as u32 >= cache::MOST_REPAIRS || !caches.drop_wrong(&findings, self.arguments.error) {
+                break Some(Audited { findings, map, repaired });
+            }
+            repaired.push(findings);
+        };
         let clock = Stopwatch::start();
         if let Some(file) = &self.arguments.cache_out {
             files::save(file, &caches, self.tag)?;
@@ -355,12 +388,6 @@ impl WithMedium for CacheJob<'_> {
                 *total = seen.total();
             }
         })?;
-        let is_whole = render.reason == Reason::Done && self.paths.max_scatterings > 0;
-        let audited = (is_whole && audit_rays > 0).then(|| {
-            let mut audit = Audit::new(&caches, ray, audit_rays);
-            filled.extend(threads::run(&mut audit, &world, &pool, self.control, None, |_| {}).stages);
-            Audited { findings: audit.findings(), map: Box::new(audit.map()) }
-        });
         Ok(Cached { caches, filled, computed, files, render, audited })
     }
 }

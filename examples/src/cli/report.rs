@@ -100,7 +100,10 @@ impl Report<'_> {
         eprintln!("{width} x {height} pixels, {} samples per pixel{ending}", self.samples_per_pixel());
         let cpu = cpu.map_or_else(String::new, |c| format!(", {} of processor time", clock(c)));
         eprintln!("{}{cpu}, {:.2} million rays per second", clock(wall), self.rays_per_second() * 1e-6);
-        if let Some(Audited { findings, map }) = self.audited {
+        if let Some(Audited { findings, map, repaired }) = self.audited {
+            for found in repaired {
+                eprintln!("repaired: bias was {} of what is cached{}", percent(&found.cached), blamed(found));
+            }
             eprintln!(
                 "bias {} of what is cached{}; {} of all light, by path tracing along {} eye rays",
                 percent(&findings.cached),
@@ -168,14 +171,17 @@ impl Report<'_> {
                 recovered.join(", "),
             )
         });
-        let findings = self.audited.map_or_else(String::new, |Audited { findings, map }| {
+        let findings = self.audited.map_or_else(String::new, |Audited { findings, map, repaired }| {
             let number = |x: f64| if x.is_finite() { format!("{x:.6e}") } else { "null".to_owned() };
             let entry = |name: &str, found: &Deviation| {
                 format!("{}: {{\"bias\": {}, \"error\": {}}}", quoted(name), number(found.bias), number(found.error))
             };
-            let parts = Kind::FINAL.into_iter().filter_map(|kind| Some(entry(kind.name(), &findings.of(kind)?)));
-            let all: Vec<String> =
-                [entry("all", &findings.all), entry("cached", &findings.cached)].into_iter().chain(parts).collect();
+            let entries = |findings: &Findings| {
+                let parts = Kind::FINAL.into_iter().filter_map(|kind| Some(entry(kind.name(), &findings.of(kind)?)));
+                let all = [entry("all", &findings.all), entry("cached", &findings.cached)];
+                all.into_iter().chain(parts).collect::<Vec<_>>().join(", ")
+            };
+            let repaired: Vec<String> = repaired.iter().map(|found| format!("{{{}}}", entries(found))).collect();
             let regions = map.regions().iter().map(|region| {
                 let light = |name: &str, light: &MeanLight| {
                     format!("\"{name}\": {{\"mean\": {}, \"error\": {}}}", number(light.mean), number(light.error))
@@ -190,7 +196,8 @@ impl Report<'_> {
             });
             let regions: Vec<String> = regions.collect();
             let map = format!("{{\"side\": {}, \"by_row\": [{}]}}", map.side(), regions.join(", "));
-            format!("\"audit\": {{\"rays\": {}, {}, \"regions\": {map}}},\n  ", findings.rays, all.join(", "))
+            let (rays, all, repaired) = (findings.rays, entries(findings), repaired.join(", "));
+            format!("\"audit\": {{\"rays\": {rays}, {all}, \"repaired\": [{repaired}], \"regions\": {map}}},\n  ")
         });
         let (bytes, records) = (listed(&self.statistics.bytes), listed(&self.statistics.records));
         let instead = self.choice.instead.as_ref();
