@@ -1,6 +1,7 @@
 //! All caches of a world together.
 
 use super::audit::Findings;
+use super::bias_map::BiasMap;
 use super::eye::{CachedRadiance, Caches, Reader, radiance, radiance_beyond};
 use super::kind::Kind;
 use super::presets::finer_by;
@@ -225,9 +226,9 @@ impl RadianceCaches<'_> {
         radiance_beyond(ray, &self.estimator(world), &self.reader(), &self.settings.eye, rng)
     }
 
-    /// Drops all records of the kinds that an audit has found off by certainly more than `error`, and of those that these were made
-    /// from, to be made anew by the next fill: finer by what they are off, with four times the samples. If what is cached is off as a whole
-    /// and no kind is to blame, all are dropped. Returns whether any were.
+    /// Drops all records of the kinds that an [`Audit`](super::Audit) has found off by certainly more than `error`, and of those that these were
+    /// made from, to be made anew by the next fill: finer by what they are off, with four times the samples. If what is cached is off as a whole or
+    /// in places, and no kind is to blame, all are dropped. Returns whether any were.
     ///
     /// What finer records do not mend (walks that are cut, lights without surfaces) stays as it is: audit again, and say so.
     ///
@@ -236,15 +237,17 @@ impl RadianceCaches<'_> {
     /// use fogbow::{cache::{Audit, RadianceCaches, Settings}, math::{Ray, Vec3}};
     /// let mut caches = RadianceCaches::new(Settings::default());
     /// // Nothing was compared: nothing is wrong.
-    /// let findings = Audit::new(&caches, |_| Ray::new(Vec3::ZERO, Vec3::Z), 64).findings();
-    /// assert!(!caches.drop_wrong(&findings, 0.02));
+    /// let audit = Audit::new(&caches, |_| Ray::new(Vec3::ZERO, Vec3::Z), 64);
+    /// let (findings, map) = (audit.findings(), audit.map());
+    /// assert!(!caches.drop_wrong(&findings, &map, 0.02));
     /// # }
     /// ```
-    pub fn drop_wrong(&mut self, findings: &Findings, error: f32) -> bool {
+    pub fn drop_wrong(&mut self, findings: &Findings, map: &BiasMap, error: f32) -> bool {
         let most = f64::from(error);
         let is_cached = |kind: &Kind| self.settings.effort(*kind).is_some();
         let to_blame = |kind: Kind| findings.of(kind).is_some_and(|found| found.exceeds(most));
-        let off_together = Some(findings.cached).filter(|found| found.exceeds(most));
+        let in_places = || map.worst(most).map(|region| region.cached);
+        let off_together = Some(findings.cached).filter(|found| found.exceeds(most)).or_else(in_places);
         let none_alone = !Kind::FINAL.into_iter().any(to_blame);
         let mut wrong = ByKind([None; Kind::COUNT]);
         for kind in Kind::FINAL.into_iter().filter(is_cached) {

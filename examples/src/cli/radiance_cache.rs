@@ -339,7 +339,8 @@ impl WithMedium for CacheJob<'_> {
                 break None;
             }
             let (findings, map) = (audit.findings(), Box::new(audit.map()));
-            if repaired.len() as u32 >= cache::MOST_REPAIRS || !caches.drop_wrong(&findings, self.arguments.error) {
+            if repaired.len() as u32 >= cache::MOST_REPAIRS || !caches.drop_wrong(&findings, &map, self.arguments.error)
+            {
                 break Some(Audited { findings, map, repaired });
             }
             repaired.push(findings);
