@@ -14,18 +14,19 @@ use super::audit::rays_for;
 use super::caches::RadianceCaches;
 use super::eye::Place;
 use super::guide::{Guide, Guided, Looks};
-use super::kind::{Kind, Pass, Places, STEPS, Step};
-use super::lookup::Reading;
+use super::kind::{Kind, Pass, STEPS, Step};
+use super::lookup::{Basis, Reading};
 use super::memory::{Estimate, FilledRecords, FillingMemory};
 use super::photons::{CELLS_PER_JOB, PATHS_PER_JOB, PhotonEffort};
+use super::pilots::{self, Pilots};
 use super::radius::clearance;
 use super::settings::{Effort, Settings};
 use super::slot::{Attached, ByKind, Inserted, learnt_near};
 use super::{Estimator, Record};
 use crate::host::{Medium, Scene};
 use crate::math::{Ray, Vec3, float};
-use crate::sampling::Generator;
 use crate::sampling::uniform::mix;
+use crate::sampling::{Generator, uniform};
 use crate::sh::Coefficient;
 use crate::spectrum::Spectrum;
 use crate::storage::Full;
@@ -87,6 +88,8 @@ enum Round {
     Look,
     /// Estimates for new records.
     Make,
+    /// What records tell at some places, and estimates there.
+    Pilot,
     /// Estimates anew for records from a number on.
     Again {
         from: u32,
@@ -139,6 +142,9 @@ pub struct Filling<'s, F> {
     usual: f32,
     /// The usual value of a record.
     bright: f32,
+    /// What pilots have found, and how often radii have shrunk because of them.
+    pilots: Pilots,
+    shrunk: u32,
     /// From these records on nothing is final.
     before: ByKind<usize>,
     /// All records computed, by kind.
@@ -208,6 +214,8 @@ impl<'s> RadianceCaches<'s> {
             first: 0,
             usual: 0.0,
             bright: 0.0,
+            pilots: Pilots::default(),
+            shrunk: 0,
             before,
             all_computed: ByKind([0; Kind::COUNT]),
             photons_before: 0,
@@ -511,6 +519,7 @@ impl<'s, F> Filling<'s, F> {
                     _ => self.next_look(),
                 }
             }
+            Round::Pilot => self.shrink(),
             Round::Again { from } => {
                 self.blend(from as usize);
                 self.begin(self.step + 1);
@@ -602,7 +611,7 @@ impl<'s, F> Filling<'s, F> {
                 Pass::Make => {
                     // Records added later must not share the random numbers of the first.
                     (self.computed, self.first) = (0, if slot.len() == 0 { 0 } else { mix(slot.len() as u64) });
-                    self.batch = [0, 0];
+                    (self.batch, self.shrunk) = ([0, 0], 0);
                     if self.open_batch() {
                         return;
                     }
@@ -625,11 +634,74 @@ impl<'s, F> Filling<'s, F> {
         self.complete();
     }
 
-    /// The next batch of places, or after the last of them the next step.
+    /// The next batch of places; after the last of them pilots, and the next step.
     fn next_batch(&mut self) {
-        if !self.open_batch() {
+        if !self.open_batch() && !self.send_pilots() {
             self.begin(self.step + 1);
         }
+    }
+
+    /// Begins a round of pilots, if records were made and may still shrink.
+    fn send_pilots(&mut self) -> bool {
+        let Some((step, effort)) = self.at_hand() else { return false };
+        let may_shrink = self.settings().error > 0.0 && self.shrunk < pilots::MOST;
+        if !may_shrink || step.kind.row().is_ground || self.computed == 0 {
+            return false;
+        }
+        self.pilots = Pilots::default();
+        self.enter(Round::Pilot, pilots::jobs_for(self.computed * u64::from(effort.samples)));
+        true
+    }
+
+    /// Compares what records tell with estimates, at some of the places that eye rays ask for.
+    fn pilot<M: Medium + ?Sized, S: Scene + ?Sized>(
+        &self,
+        job: u32,
+        world: &World<'_, M, S>,
+        output: &mut FilledRecords<'_>,
+    ) {
+        let Some((step, reading)) =
+            self.at_hand().and_then(|(step, _)| Some((step, self.settings().reading(step.kind)?)))
+        else {
+            return;
+        };
+        let (row, slot, wanted) = (step.kind.row(), &self.caches.slots[step.kind], self.memory.wanted.as_slice());
+        for pilot in job * pilots::PLACES_PER_JOB..(job + 1) * pilots::PLACES_PER_JOB {
+            let mut rng = Generator::new(mix(self.seed() ^ mix(row.stream + 32)) ^ u64::from(pilot));
+            let from = (uniform(&mut rng) * wanted.len() as f32) as usize;
+            let all = wanted.iter().skip(from).chain(wanted).take(wanted.len());
+            let Some(place) = all.map(|wanted| wanted.place).find(|place| place.is_seen && row.places.hold(place))
+            else {
+                return;
+            };
+            let to_eye = place.to_eye.filter(|_| !step.kind.is_on_surfaces());
+            let basis = Basis::new(to_eye.unwrap_or(Vec3::Z), if to_eye.is_some() { slot.degree() } else { 0 });
+            let Some(told) = slot.lookup(&place, &basis, &reading) else { continue };
+            let guides = self.memory.guides[step.kind].as_slice();
+            let guide = Guided::new(&learnt_near(slot, guides, self.before[step.kind], place.point));
+            let looks = Looks { count: pilots::SAMPLES, guide: guide.as_ref(), learnt: None, to_eye: place.to_eye };
+            let mut estimate = Estimate { place, ..Estimate::default() };
+            if self.estimate(step, world, looks, &mut estimate, &mut rng, output) {
+                output.pilots.add(told, basis.expanded(estimate.sums.value, output.higher.as_slice()));
+            }
+            output.higher.clear();
+        }
+    }
+
+    /// Shrinks radii if pilots say so, and makes records where then none reach.
+    fn shrink(&mut self) {
+        let found = self.at_hand().zip(self.pilots.factor(self.settings().error));
+        let Some(((step, effort), factor)) = found else {
+            self.begin(self.step + 1);
+            return;
+        };
+        self.shrunk += 1;
+        if let Some(effort) = self.caches.settings.effort_mut(step.kind) {
+            *effort = effort.nearer(factor);
+        }
+        self.is_cut |= !self.caches.slots[step.kind].shrink(factor, effort.limits.min);
+        self.batch = [0, 0];
+        self.next_batch();
     }
 
     /// The next batch of the step at hand that has places; `false` after the last.
@@ -645,12 +717,7 @@ impl<'s, F> Filling<'s, F> {
             self.memory.open.clear();
             let (first, last) = (at(self.batch[0]), at(self.batch[1]));
             for (number, Wanted { place, .. }) in wanted.iter().enumerate().take(last).skip(first) {
-                let is_for = match step.kind.row().places {
-                    Places::InMedium => place.normal.is_none(),
-                    Places::OnSurfaces => place.normal.is_some(),
-                    Places::InSight => place.normal.is_some() && place.is_seen,
-                };
-                if is_for {
+                if step.kind.row().places.hold(place) {
                     self.is_cut |= self.memory.open.push(number as u32).is_err();
                 }
             }
@@ -784,7 +851,7 @@ where
         output.open.clear();
         output.higher.clear();
         output.deposits.clear();
-        (output.paths, output.flights) = (0, 0);
+        (output.paths, output.flights, output.pilots) = (0, 0, Pilots::default());
         (output.estimate, output.is_cut) = (None, false);
         match self.round {
             Round::Search => self.search(job, world, output),
@@ -792,6 +859,7 @@ where
             Round::Divide => self.divide(job, world, output),
             Round::Look => self.look(job, output),
             Round::Make => self.make(job, world, output),
+            Round::Pilot => self.pilot(job, world, output),
             Round::Again { from } => self.again(from, job, world, output),
             Round::Done => {}
         }
@@ -805,6 +873,7 @@ where
         if self.round == Round::Divide {
             memory.photons.mark(output.open.as_slice());
         }
+        self.pilots.merge(&output.pilots);
         memory.photons.accept(output.deposits.as_slice(), output.paths, output.flights);
         let mut kept = memory.wanted.extend_from_slice(output.wanted.as_slice());
         if self.round == Round::Look {
@@ -830,7 +899,7 @@ where
             Round::Search => "fill search",
             Round::Shoot | Round::Divide => "fill photons",
             Round::Done => "",
-            Round::Look | Round::Make | Round::Again { .. } => match STEPS[self.step].kind {
+            Round::Look | Round::Make | Round::Pilot | Round::Again { .. } => match STEPS[self.step].kind {
                 Kind::Single => "fill single",
                 Kind::Surface => "fill surface",
                 Kind::Multiple => "fill multiple",

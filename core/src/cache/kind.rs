@@ -1,5 +1,7 @@
 //! The kinds of caches: what each holds, where it has records, what lights it, and in which order they are made.
 
+use super::eye::Place;
+
 /// What a cache holds. A further kind is a variant, a row of the table of kinds and the steps that make it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[repr(usize)]
@@ -62,6 +64,17 @@ pub(super) enum Places {
     InSight,
     /// On surfaces that eye rays see or that light what they see.
     OnSurfaces,
+}
+
+impl Places {
+    /// Whether a place is one of them.
+    pub(super) fn hold(self, place: &Place) -> bool {
+        match self {
+            Self::InMedium => place.normal.is_none(),
+            Self::OnSurfaces => place.normal.is_some(),
+            Self::InSight => place.normal.is_some() && place.is_seen,
+        }
+    }
 }
 
 /// What is known of a kind beforehand.

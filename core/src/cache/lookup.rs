@@ -6,7 +6,7 @@ use super::extrapolate::{Blend, Extrapolation, exponent_limit, weight};
 use super::record::{Facing, Record};
 use super::store::{SurfaceCache, VolumeCache, WIDE};
 use crate::math::float;
-use crate::sh::{self, MAX_COEFFICIENTS};
+use crate::sh::{self, Coefficient, MAX_COEFFICIENTS};
 use crate::single_scatter::Contribution;
 use crate::spectrum::{Gradient, Spectrum};
 
@@ -77,6 +77,11 @@ impl Basis {
     #[inline]
     fn higher(&self) -> &[f32] {
         self.values.get(1..self.count).unwrap_or(&[])
+    }
+
+    /// An expansion in its direction: of this mean, and coefficients of degree 1 and more.
+    pub(super) fn expanded(&self, mean: Spectrum, higher: &[Coefficient]) -> Spectrum {
+        self.higher().iter().zip(higher).fold(mean, |sum, (&y, c)| sum + c.value * y)
     }
 
     /// Whether it reaches up to `degree`.

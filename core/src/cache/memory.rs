@@ -4,6 +4,7 @@ use super::asked::Wanted;
 use super::eye::Place;
 use super::guide::Guide;
 use super::photons::{PhotonDeposit, PhotonGrid};
+use super::pilots::Pilots;
 use super::radius::Limits;
 use super::record::Facing;
 use super::room::Slots;
@@ -37,6 +38,7 @@ pub struct FilledRecords<'o> {
     pub(super) deposits: List<'o, PhotonDeposit>,
     pub(super) paths: u32,
     pub(super) flights: u64,
+    pub(super) pilots: Pilots,
     pub(super) is_cut: bool,
 }
 
@@ -80,6 +82,7 @@ impl<'o> FilledRecords<'o> {
             deposits: deposits.into(),
             paths: 0,
             flights: 0,
+            pilots: Pilots::default(),
             is_cut: false,
         }
     }

@@ -22,6 +22,7 @@
 //! | `asked` | [`Asked`]: where light is asked for |
 //! | `fill` | [`Filling`]: which places get records, rounds of new ones, better estimates for old ones |
 //! | `memory` | [`FillingMemory`], [`FilledRecords`]: what a fill remembers, and what its jobs leave |
+//! | `pilots` | whether records reach too far, measured in this world |
 //! | `photons` | [`PhotonEffort`]: light in cells, brought by photons, at which walks end |
 //! | `slot` | a cache of either sort, as filling needs it |
 //! | `readers` | probes, fluence, irradiance, in-scattered light; many at a time |
@@ -60,6 +61,7 @@ mod kind;
 mod lookup;
 mod memory;
 mod photons;
+mod pilots;
 mod presets;
 mod radius;
 mod readers;

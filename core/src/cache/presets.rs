@@ -106,9 +106,13 @@ pub(super) fn finer_by(most: f64, bias: f64) -> f32 {
 impl Effort {
     /// For records that take the place of wrong ones.
     pub(super) fn finer(self, factor: f32) -> Self {
+        Self { samples: self.samples.saturating_mul(REPAIR_SAMPLES), ..self.nearer(factor) }
+    }
+
+    /// For records that reach less far.
+    pub(super) fn nearer(self, factor: f32) -> Self {
         Self {
             tolerance: self.tolerance * factor,
-            samples: self.samples.saturating_mul(REPAIR_SAMPLES),
             limits: Limits { max: (self.limits.max * factor).max(self.limits.min), ..self.limits },
             clearance: self.clearance * factor,
             free_paths: self.free_paths * factor,
@@ -165,7 +169,8 @@ impl Settings {
     #[must_use]
     pub fn for_outline(outline: &Outline, error: f32) -> Self {
         let error = if error.is_nan() { USUAL_ERROR } else { error };
-        let scale = error.clamp(ERROR_BOUNDS[0], ERROR_BOUNDS[1]) / USUAL_ERROR;
+        let error = error.clamp(ERROR_BOUNDS[0], ERROR_BOUNDS[1]);
+        let scale = error / USUAL_ERROR;
         let coarser = float::sqrt(scale).min(COARSEST);
         let walks = (f64::from(WALKS) / f64::from(scale * scale)) as u32;
         let size = outline.bounds.size().max_element();
@@ -185,6 +190,7 @@ impl Settings {
         };
         let degree = |power: u32, fall_off: f32| degree_for(phase, power, fall_off, LEFT_OUT * scale * scale);
         Self {
+            error,
             surface: Some(effort(Kind::Surface, TOLERANCES[1], degree(1, SURFACE_FALL_OFF), REACHES[1], CLEARANCES[1])),
             multiple: Some(effort(Kind::Multiple, TOLERANCES[2], degree(2, 0.0), REACHES[0], f32::INFINITY)),
             irradiance: Some(effort(Kind::Irradiance, TOLERANCES[3], 0, REACHES[0], CLEARANCES[0])),

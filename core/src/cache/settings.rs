@@ -57,6 +57,8 @@ impl Effort {
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Settings {
+    /// The relative error that pictures may have: pilots shrink radii until extrapolation leaves less than its part of it; 0 for no pilots.
+    pub error: f32,
     /// Light of the lights, scattered once; `None` to leave it to connections.
     pub single: Option<Effort>,
     /// Light of surfaces, scattered once.
@@ -95,6 +97,7 @@ impl Default for Settings {
     /// No caches; what else is good for pictures of a world some metres large.
     fn default() -> Self {
         Self {
+            error: 0.0,
             single: None,
             surface: None,
             multiple: None,

@@ -2,7 +2,7 @@
 
 use super::guide::Guide;
 use super::kind::Kind;
-use super::lookup::Reading;
+use super::lookup::{Basis, Reading};
 use super::radius::clamp_gradient;
 use super::store::{Cache, InsertError};
 use super::{Attachment, Facing, Place, Record, SurfaceCache, VolumeCache};
@@ -84,6 +84,20 @@ impl<'s> Slot<'s> {
         }
     }
 
+    /// Highest degree of expansions.
+    pub(super) fn degree(&self) -> usize {
+        self.volume().map_or(0, VolumeCache::degree)
+    }
+
+    /// What is told of a place, in the medium in the direction of `basis`.
+    pub(super) fn lookup(&self, place: &Place, basis: &Basis, reading: &Reading) -> Option<Spectrum> {
+        match (self, place.normal) {
+            (Self::Volume(cache), None) => cache.lookup(place.point, basis, reading),
+            (Self::Surface(cache), Some(normal)) => cache.lookup(place.point, normal, reading),
+            _ => None,
+        }
+    }
+
     /// About how large the radius of a record at a point would be.
     pub(super) fn radius_near(&self, point: Vec3) -> Option<f32> {
         match self {
@@ -156,6 +170,15 @@ impl<'s> Slot<'s> {
                 let _ = cache.revise(number as u32, value, &gradient, &[facing]);
             }
             _ => {}
+        }
+    }
+
+    /// Makes all radii smaller: see [`Cache::shrink`]. Whether the indices have room for them.
+    pub(super) fn shrink(&mut self, factor: f32, least: f32) -> bool {
+        match self {
+            Self::Off => true,
+            Self::Volume(cache) => cache.shrink(factor, least).is_ok(),
+            Self::Surface(cache) => cache.shrink(factor, least).is_ok(),
         }
     }
 

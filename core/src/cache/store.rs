@@ -414,6 +414,14 @@ impl<'s, E: Attachment> Cache<'s, E> {
         Ok(())
     }
 
+    /// Makes all radii `factor` times as large (at most 1), but none smaller than `least` (m) unless it is already.
+    pub(super) fn shrink(&mut self, factor: f32, least: f32) -> Result<(), Full> {
+        for record in self.records.as_mut_slice() {
+            record.radius = (record.radius * factor).max(least.min(record.radius));
+        }
+        self.finish()
+    }
+
     /// Forgets all records and keeps the memory.
     pub fn clear(&mut self) {
         self.records.clear();
