@@ -7,8 +7,8 @@ use fogbow_examples::picture::Picture;
 
 const SCENE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/smoke-box-homogeneous-anisotropic.xml");
 
-/// Few and rough records: these tests are of files and not of pictures.
-const ROUGH: [&str; 13] = [
+/// Few and rough records, few photons, and no audit: these tests are of files and not of pictures.
+const ROUGH: [&str; 17] = [
     "--method",
     "radiance-cache",
     "--single",
@@ -22,6 +22,10 @@ const ROUGH: [&str; 13] = [
     "--spp",
     "2",
     "-q",
+    "--audit",
+    "0",
+    "--error",
+    "0.2",
 ];
 
 /// A folder of its own, gone when dropped.

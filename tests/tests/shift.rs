@@ -268,6 +268,7 @@ fn check(point: Vec3, axis: Vec3, what: &str, light: impl Fn(Vec3, &mut Generato
     }
     let ((slope, _), (apart, error)) = (mean_and_error(&slopes), mean_and_error(&apart));
     let said = format!("{what} at {point} along {axis}: gradient {slope:.6}, differences {apart:+.6} ± {error:.6}");
+    println!("{said}");
     assert!(apart.abs() < tolerance::STANDARD_ERRORS * error, "{said}");
     // Errors of two fifths are found; translation misses by more, or has no end of noise.
     assert!(error < 0.1 * slope.abs(), "{said}: no evidence");
@@ -360,10 +361,19 @@ fn irradiance_of_forward_fog_beside_an_edge_changes_as_its_gradient_says() {
     check_irradiance(FORWARDS, 1, 4096);
 }
 
-/// Where a walk goes on, the phase function changes with the directions before and after it.
+// Where a walk goes on, the phase function changes with the directions before and after it.
+
 #[test]
 fn light_scattered_forwards_often_changes_as_its_gradient_says() {
     check_samples(FORWARDS, 3, 16384);
+}
+
+#[test]
+fn estimates_of_light_scattered_forwards_often_change_as_their_gradients_say() {
     check_estimates(FORWARDS, 64, 8192);
+}
+
+#[test]
+fn irradiance_of_light_scattered_forwards_often_changes_as_its_gradient_says() {
     check_irradiance(FORWARDS, 64, 8192);
 }
