@@ -13,25 +13,29 @@ use super::asked::{Asked, Wanted};
 use super::audit::rays_for;
 use super::caches::RadianceCaches;
 use super::eye::Place;
-use super::guide::{Guide, Guided, Looks};
+use super::guide::Guide;
 use super::kind::{Kind, Pass, STEPS, Step};
-use super::lookup::{Basis, Reading};
+use super::lookup::Reading;
 use super::memory::{Estimate, FilledRecords, FillingMemory};
-use super::photons::{CELLS_PER_JOB, PATHS_PER_JOB, PhotonEffort};
-use super::pilots::{self, Pilots};
+use super::pilots::Pilots;
 use super::radius::clearance;
 use super::settings::{Effort, Settings};
-use super::slot::{Attached, ByKind, Inserted, learnt_near};
+use super::slot::{Attached, ByKind, Inserted};
 use super::{Estimator, Record};
 use crate::host::{Medium, Scene};
-use crate::math::{Ray, Vec3, float};
+use crate::math::{Ray, float};
 use crate::sampling::uniform::mix;
-use crate::sampling::{Generator, uniform};
 use crate::sh::Coefficient;
 use crate::spectrum::Spectrum;
-use crate::storage::Full;
 use crate::work::Rounds;
 use crate::world::World;
+
+mod estimates;
+mod pilot;
+mod shoot;
+
+pub(super) use estimates::MOST_PARTS;
+use estimates::usual_radius;
 
 /// Eye rays of the first batch; each next one has twice as many, up to [`LAST_BATCH`]: what first rays ask for lies far apart,
 /// and what later ones find are the gaps.
@@ -43,37 +47,15 @@ const LAST_BATCH: u32 = 4096;
 /// Eye rays of one job. More: jobs take longer than some milliseconds in dense worlds.
 const RAYS_PER_JOB: u32 = 16;
 
-/// Photons of the first round of them.
-const FIRST_PHOTONS: u32 = 4096;
-
 /// Places that one job looks up.
 pub(super) const PLACES_PER_JOB: u32 = 1024;
 
 /// Places that one job is expected to find at most, where memory is lent: some hundreds for each of its rays. Rays with more lose them.
 pub(super) const PLACES_OF_JOB: usize = 256 * RAYS_PER_JOB as usize;
 
-/// The first records of kinds on which all others stand get so many times the samples: what they have wrong nothing
-/// averages out.
-const FIRST: (u64, u32) = (100, 8);
-
-/// Most samples of an estimate whose samples vary more than usual, as a multiple.
-const MOST_SAMPLES: f32 = 8.0;
-
 /// Eye rays from whose points others are followed to what lights them. More find small things that are seen; light is
 /// sums over all that is met, small things included.
 const LIGHTING: u32 = 16384;
-
-/// Records of which nothing usual can be said.
-const FEW: usize = 64;
-
-/// Samples of any estimate at least.
-const LEAST_SAMPLES: u32 = 16;
-
-/// Share of the samples of a surface record that is hardly seen at all. Less: it is too noisy to tell how far it reaches.
-const LEAST_SEEN: f32 = 0.0625;
-
-/// Records that reach less far than usual take a share of the samples down to this.
-const LEAST_SHARE: f32 = 0.25;
 
 /// What the jobs of a round do.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -142,6 +124,8 @@ pub struct Filling<'s, F> {
     usual: f32,
     /// The usual value of a record.
     bright: f32,
+    /// In how many jobs each new record is estimated.
+    parts: u32,
     /// What pilots have found, and how often radii have shrunk because of them.
     pilots: Pilots,
     shrunk: u32,
@@ -214,6 +198,7 @@ impl<'s> RadianceCaches<'s> {
             first: 0,
             usual: 0.0,
             bright: 0.0,
+            parts: 1,
             pilots: Pilots::default(),
             shrunk: 0,
             before,
@@ -222,36 +207,6 @@ impl<'s> RadianceCaches<'s> {
             is_cut,
         }
     }
-}
-
-/// The radius of the records that reach a point, in the mean over the points of a line: `Σ R²/Σ R` (m); 0 of few records.
-fn usual_radius(records: &[Record]) -> f32 {
-    if records.len() < FEW {
-        return 0.0;
-    }
-    let sums =
-        |(sum, squares): (f32, f32), record: &Record| (sum + record.radius, squares + record.radius * record.radius);
-    let (sum, squares) = records.iter().fold((0.0, 0.0), sums);
-    squares / sum
-}
-
-/// The mean value that a picture is made of, about: `Σ R² L/Σ R²`.
-fn usual_value(records: &[Record]) -> f32 {
-    let add = |(sum, weight): (f32, f32), record: &Record| {
-        let area = record.radius * record.radius;
-        (sum + area * record.value.mean(), weight + area)
-    };
-    let (sum, weight) = records.iter().fold((0.0, 0.0), add);
-    sum / weight
-}
-
-/// Samples for a record that reaches `radius` (m): what reaches less far than `usual` lights fewer pixels. If one sample is
-/// as noisy everywhere, the noise of a picture whose records light areas `R²` is least, for a given sum of samples, where
-/// these go as `R`. No fewer than a quarter, because dark corners are where that is not so.
-/// Of what is seen through fog or in mirrors a share is as good as all of it.
-fn samples(effort: &Effort, radius: f32, usual: f32, seen: f32) -> u32 {
-    let share = if radius < usual { (radius / usual).max(LEAST_SHARE) } else { 1.0 };
-    ((effort.samples as f32 * share * seen) as u32).max(LEAST_SAMPLES)
 }
 
 impl<'s, F> Filling<'s, F> {
@@ -372,98 +327,6 @@ impl<'s, F> Filling<'s, F> {
         }
     }
 
-    fn make<M: Medium + ?Sized, S: Scene + ?Sized>(
-        &self,
-        job: u32,
-        world: &World<'_, M, S>,
-        output: &mut FilledRecords<'_>,
-    ) {
-        let (Some((step, effort)), Some(&(wanted, _))) =
-            (self.at_hand(), self.memory.chosen.as_slice().get(job as usize))
-        else {
-            return;
-        };
-        let Wanted { place, distance, .. } = self.memory.wanted.as_slice()[wanted as usize];
-        let settings = self.settings();
-        let limits = match &self.asked {
-            Asked::View { pixel, .. } => {
-                effort.limits.on_screen(settings.pixels[0], settings.pixels[1], *pixel, distance)
-            }
-            Asked::Box(_) => effort.limits,
-        };
-        let limits = limits.within(self.reach((step.kind, &effort), &place, world));
-        let number = self.first.wrapping_add(self.computed + u64::from(job));
-        let row = step.kind.row();
-        let is_first = row.is_ground && self.first == 0 && number < FIRST.0;
-        let seen = if step.kind == Kind::Irradiance { place.share.max(LEAST_SEEN) } else { 1.0 };
-        let count = samples(&effort, limits.max, self.usual, seen) * if is_first { FIRST.1 } else { 1 };
-        let mut rng = Generator::new(mix(self.seed() ^ mix(row.stream + 1)) ^ number);
-        let mut estimate = Estimate { job, place, limits, effort: 1.0, ..Estimate::default() };
-        (estimate.learnt.seen, estimate.learnt.to_eye) = (seen, place.to_eye);
-        let looks = Looks { count, guide: None, learnt: None, to_eye: place.to_eye };
-        let is_made = self.estimate(step, world, looks, &mut estimate, &mut rng, output);
-        output.estimate = is_made.then_some(estimate);
-    }
-
-    fn again<M: Medium + ?Sized, S: Scene + ?Sized>(
-        &self,
-        from: u32,
-        job: u32,
-        world: &World<'_, M, S>,
-        output: &mut FilledRecords<'_>,
-    ) {
-        let Some((step, effort)) = self.at_hand() else { return };
-        let Pass::Again { stream, .. } = step.pass else { return };
-        let number = (from + job) as usize;
-        let (slot, row) = (&self.caches.slots[step.kind], step.kind.row());
-        let (Some(place), radius) = (slot.place(number), slot.records()[number].radius) else { return };
-        let around = learnt_near(slot, self.memory.guides[step.kind].as_slice(), self.before[step.kind], place.point);
-        let guide = Guided::new(&around);
-        // What varies as a whole decides how a picture looks where it is dark, what it varies by how far off the picture is.
-        let varies = around.relative_variance() / row.spread;
-        let brightness = slot.records()[number].value.mean() / self.bright;
-        let more = varies.max(brightness * float::sqrt(varies)).clamp(1.0, MOST_SAMPLES);
-        let made = self.memory.guides[step.kind].as_slice().get(job as usize);
-        let (seen, to_eye) = made.map_or((1.0, None), |guide| (guide.seen, guide.to_eye));
-        let count = (samples(&effort, radius, self.usual, seen) as f32 * more) as u32;
-        let mut rng = Generator::new(mix(self.seed() ^ mix(stream + 16)) ^ number as u64);
-        let mut estimate = Estimate { job, place, effort: more, ..Estimate::default() };
-        let looks = Looks { count, guide: guide.as_ref(), learnt: None, to_eye };
-        let is_made = self.estimate(step, world, looks, &mut estimate, &mut rng, output);
-        output.estimate = is_made.then_some(estimate);
-    }
-
-    /// The light that a step's kind holds, at one place; `false` if there is no memory for it.
-    fn estimate<M: Medium + ?Sized, S: Scene + ?Sized>(
-        &self,
-        step: Step,
-        world: &World<'_, M, S>,
-        looks: Looks<'_>,
-        estimate: &mut Estimate,
-        rng: &mut Generator,
-        output: &mut FilledRecords<'_>,
-    ) -> bool {
-        let estimator = self.estimator(world);
-        let looks = Looks { learnt: Some(&mut estimate.learnt), ..looks };
-        let point = estimate.place.point;
-        if step.kind.is_on_surfaces() {
-            let normal = estimate.place.normal.unwrap_or(Vec3::Z);
-            (estimate.sums, estimate.facing) = estimator.irradiance(point, normal, looks, rng);
-            return true;
-        }
-        if output.higher.reset(self.caches.slots[step.kind].stride(), Coefficient::ZERO).is_err() {
-            output.is_cut = true;
-            return false;
-        }
-        let (phase, higher) = (estimator.phase(point), output.higher.as_mut_slice());
-        estimate.sums = match step.kind {
-            Kind::Single => estimator.single(point, &phase, higher, rng),
-            Kind::Surface => estimator.surface(point, &phase, looks, higher, rng),
-            _ => estimator.multiple(point, &phase, looks, higher, rng),
-        };
-        true
-    }
-
     /// How far a record may reach because of surfaces near it, and of the medium it lies in.
     fn reach<M: Medium + ?Sized, S: Scene + ?Sized>(
         &self,
@@ -528,63 +391,6 @@ impl<'s, F> Filling<'s, F> {
         }
     }
 
-    /// The photons to shoot: none if nothing is made by walks.
-    fn photons(&self) -> Option<PhotonEffort> {
-        let Settings { photons, multiple, irradiance, .. } = self.settings();
-        photons.filter(|_| multiple.is_some() || irradiance.is_some())
-    }
-
-    /// The next round of photons, no larger than all before it, or after the last what follows.
-    fn shoot_more(&mut self, effort: &PhotonEffort) {
-        let (paths, flights) = (self.memory.photons.paths(), self.memory.photons.flights());
-        let mut more = if paths == 0 { FIRST_PHOTONS.min(effort.paths) } else { paths.min(effort.paths - paths) };
-        if paths > 0 {
-            let left = effort.flights.saturating_sub(flights) as f64 * f64::from(paths) / flights.max(1) as f64;
-            // Casts saturate.
-            more =
-                more.min(left as u32).min((f64::from(paths) * (self.memory.photons.times(effort.enough) - 1.0)) as u32);
-        }
-        let jobs = more / PATHS_PER_JOB;
-        self.photons_before = paths;
-        if jobs > 0 {
-            self.enter(Round::Shoot, jobs);
-        } else {
-            self.enter(Round::Divide, (self.memory.photons.len() as u32).div_ceil(CELLS_PER_JOB).max(1));
-        }
-    }
-
-    fn shoot<M: Medium + ?Sized, S: Scene + ?Sized>(
-        &self,
-        job: u32,
-        world: &World<'_, M, S>,
-        output: &mut FilledRecords<'_>,
-    ) {
-        let (photons, settings) = (&self.memory.photons, self.settings());
-        let Some(effort) = &settings.photons else { return };
-        for path in 0..PATHS_PER_JOB {
-            let path = self.photons_before + job * PATHS_PER_JOB + path;
-            match photons.shoot(path, world, (effort, &settings.paths, self.seed()), &mut output.deposits) {
-                Ok(flights) => output.flights += u64::from(flights),
-                Err(_) => output.is_cut = true,
-            }
-            output.paths += 1;
-        }
-    }
-
-    fn divide<M: Medium + ?Sized, S: Scene + ?Sized>(
-        &self,
-        job: u32,
-        world: &World<'_, M, S>,
-        output: &mut FilledRecords<'_>,
-    ) {
-        let cells = self.memory.photons.len() as u32;
-        for cell in job * CELLS_PER_JOB..((job + 1) * CELLS_PER_JOB).min(cells) {
-            if self.memory.photons.is_whole(cell, world.scene) {
-                output.is_cut |= output.open.push(cell).is_err();
-            }
-        }
-    }
-
     fn enter(&mut self, round: Round, jobs: u32) {
         (self.round, self.jobs, self.taken) = (round, jobs, 0);
     }
@@ -602,7 +408,7 @@ impl<'s, F> Filling<'s, F> {
     fn begin(&mut self, from: usize) {
         for number in from..STEPS.len() {
             self.step = number;
-            let Some((step, _)) = self.at_hand() else { continue };
+            let Some((step, effort)) = self.at_hand() else { continue };
             let slot = &self.caches.slots[step.kind];
             if slot.is_off() {
                 continue;
@@ -618,14 +424,8 @@ impl<'s, F> Filling<'s, F> {
                 }
                 Pass::Again { .. } => {
                     let from = self.before[step.kind].min(slot.len());
-                    let count = slot.len() - from;
-                    if count > 0 {
-                        // Half as far again as usual reach those that most pixels see: they alone get all samples.
-                        self.usual = 1.5 * usual_radius(slot.records());
-                        self.bright = usual_value(slot.records());
-                        self.memory.estimates.clear();
-                        self.memory.higher.clear();
-                        self.enter(Round::Again { from: from as u32 }, count as u32);
+                    if slot.len() > from {
+                        self.begin_again((step, effort), from);
                         return;
                     }
                 }
@@ -639,69 +439,6 @@ impl<'s, F> Filling<'s, F> {
         if !self.open_batch() && !self.send_pilots() {
             self.begin(self.step + 1);
         }
-    }
-
-    /// Begins a round of pilots, if records were made and may still shrink.
-    fn send_pilots(&mut self) -> bool {
-        let Some((step, effort)) = self.at_hand() else { return false };
-        let may_shrink = self.settings().error > 0.0 && self.shrunk < pilots::MOST;
-        if !may_shrink || step.kind.row().is_ground || self.computed == 0 {
-            return false;
-        }
-        self.pilots = Pilots::default();
-        self.enter(Round::Pilot, pilots::jobs_for(self.computed * u64::from(effort.samples)));
-        true
-    }
-
-    /// Compares what records tell with estimates, at some of the places that eye rays ask for.
-    fn pilot<M: Medium + ?Sized, S: Scene + ?Sized>(
-        &self,
-        job: u32,
-        world: &World<'_, M, S>,
-        output: &mut FilledRecords<'_>,
-    ) {
-        let Some((step, reading)) =
-            self.at_hand().and_then(|(step, _)| Some((step, self.settings().reading(step.kind)?)))
-        else {
-            return;
-        };
-        let (row, slot, wanted) = (step.kind.row(), &self.caches.slots[step.kind], self.memory.wanted.as_slice());
-        for pilot in job * pilots::PLACES_PER_JOB..(job + 1) * pilots::PLACES_PER_JOB {
-            let mut rng = Generator::new(mix(self.seed() ^ mix(row.stream + 32)) ^ u64::from(pilot));
-            let from = (uniform(&mut rng) * wanted.len() as f32) as usize;
-            let all = wanted.iter().skip(from).chain(wanted).take(wanted.len());
-            let Some(place) = all.map(|wanted| wanted.place).find(|place| place.is_seen && row.places.hold(place))
-            else {
-                return;
-            };
-            let to_eye = place.to_eye.filter(|_| !step.kind.is_on_surfaces());
-            let basis = Basis::new(to_eye.unwrap_or(Vec3::Z), if to_eye.is_some() { slot.degree() } else { 0 });
-            let Some(told) = slot.lookup(&place, &basis, &reading) else { continue };
-            let guides = self.memory.guides[step.kind].as_slice();
-            let guide = Guided::new(&learnt_near(slot, guides, self.before[step.kind], place.point));
-            let looks = Looks { count: pilots::SAMPLES, guide: guide.as_ref(), learnt: None, to_eye: place.to_eye };
-            let mut estimate = Estimate { place, ..Estimate::default() };
-            if self.estimate(step, world, looks, &mut estimate, &mut rng, output) {
-                output.pilots.add(told, basis.expanded(estimate.sums.value, output.higher.as_slice()));
-            }
-            output.higher.clear();
-        }
-    }
-
-    /// Shrinks radii if pilots say so, and makes records where then none reach.
-    fn shrink(&mut self) {
-        let found = self.at_hand().zip(self.pilots.factor(self.settings().error));
-        let Some(((step, effort), factor)) = found else {
-            self.begin(self.step + 1);
-            return;
-        };
-        self.shrunk += 1;
-        if let Some(effort) = self.caches.settings.effort_mut(step.kind) {
-            *effort = effort.nearer(factor);
-        }
-        self.is_cut |= !self.caches.slots[step.kind].shrink(factor, effort.limits.min);
-        self.batch = [0, 0];
-        self.next_batch();
     }
 
     /// The next batch of the step at hand that has places; `false` after the last.
@@ -772,8 +509,9 @@ impl<'s, F> Filling<'s, F> {
         higher.clear();
         // Of a new record only the bound of its radius is known: twice as strict with it as with radii.
         self.usual = 3.0 * usual_radius(slot.records());
-        let jobs = chosen.len() as u32;
-        self.enter(Round::Make, jobs);
+        let count = chosen.len() as u32;
+        self.parts = self.parts_of_new(step);
+        self.enter(Round::Make, count * self.parts);
         true
     }
 
@@ -817,9 +555,9 @@ impl<'s, F> Filling<'s, F> {
             let share = 1.0 - (1.0 - share) / estimate.effort;
             let attached = attached(step.kind, estimate, self.memory.higher.as_slice(), i, stride);
             // Where memory was too small some jobs have left none.
-            let job = estimate.job as usize;
-            slot.blend(from + job, effort.tolerance, &estimate.sums, attached, share);
-            if let Some(guide) = self.memory.guides[step.kind].as_mut_slice().get_mut(job) {
+            let offset = estimate.number as usize;
+            slot.blend(from + offset, effort.tolerance, &estimate.sums, attached, share);
+            if let Some(guide) = self.memory.guides[step.kind].as_mut_slice().get_mut(offset) {
                 guide.merge(&estimate.learnt, 1.0);
             }
         }
@@ -879,13 +617,8 @@ where
         if self.round == Round::Look {
             kept = kept.and(memory.still_open.extend_from_slice(output.open.as_slice()));
         }
-        if let Some(estimate) = output.estimate {
-            // Both or none, so that the coefficients of the others stay where they are looked for.
-            kept = kept.and(if memory.higher.room() < output.higher.len() {
-                Err(Full)
-            } else {
-                memory.estimates.push(estimate).and_then(|()| memory.higher.extend_from_slice(output.higher.as_slice()))
-            });
+        if let Some(estimate) = &output.estimate {
+            kept = kept.and(self.keep(estimate, output.higher.as_slice()));
         }
         self.is_cut |= kept.is_err() | output.is_cut;
         self.taken += 1;

@@ -11,13 +11,14 @@ use super::room::Slots;
 use super::slot::ByKind;
 use crate::sh::Coefficient;
 use crate::single_scatter::Sums;
+use crate::spectrum::Spectrum;
 use crate::storage::List;
 
 /// An estimate for one record.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Estimate {
-    /// The number of its job.
-    pub(super) job: u32,
+    /// Of which record: among those of a round, or those estimated anew.
+    pub(super) number: u32,
     pub(super) place: Place,
     pub(super) sums: Sums,
     pub(super) facing: Facing,
@@ -25,6 +26,27 @@ pub struct Estimate {
     pub(super) learnt: Guide,
     /// How many times the samples of a usual one it took.
     pub(super) effort: f32,
+    /// How many parts have been mixed into this one.
+    pub(super) mixed: u32,
+}
+
+impl Estimate {
+    /// Mixes in a further part with as many samples; what share of the mixture that is.
+    pub(super) fn merge(&mut self, part: &Self) -> f32 {
+        self.mixed += 1;
+        let share = 1.0 / (self.mixed + 1) as f32;
+        let kept = 1.0 - share;
+        let (sums, new) = (&mut self.sums, &part.sums);
+        let mix = |a: Spectrum, b: Spectrum| a * kept + b * share;
+        sums.value = mix(sums.value, new.value);
+        sums.gradient = sums.gradient * kept + new.gradient * share;
+        sums.gradient_norms = mix(sums.gradient_norms, new.gradient_norms);
+        sums.unshadowed = mix(sums.unshadowed, new.unshadowed);
+        sums.unshadowed_gradient_norms = mix(sums.unshadowed_gradient_norms, new.unshadowed_gradient_norms);
+        self.facing.turn = self.facing.turn * kept + part.facing.turn * share;
+        self.learnt.merge(&part.learnt, 1.0);
+        share
+    }
 }
 
 /// What a job of a [`Filling`](super::Filling) leaves.

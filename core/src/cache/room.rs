@@ -1,6 +1,6 @@
 //! Lent memory of caches and of their filling, and how much of it is needed.
 
-use super::fill::{PLACES_OF_JOB, PLACES_PER_JOB};
+use super::fill::{MOST_PARTS, PLACES_OF_JOB, PLACES_PER_JOB};
 use super::guide::Guide;
 use super::kind::Kind;
 use super::photons::{DEPOSITS_OF_JOB, PhotonCell};
@@ -67,7 +67,8 @@ pub fn room_for(settings: &Settings, places: usize, records: usize) -> Room {
     }
     room.chunks = Kind::ALL.into_iter().map(|kind| chunks_of(settings, kind, records)).sum();
     room.wanted = places;
-    room.open = places;
+    // Records that are estimated anew, once for each of their parts.
+    room.open = places.max(records * MOST_PARTS);
     room.chosen = settings.round as usize;
     room.estimates = room.chosen.max(records);
     room.higher = room.estimates * stride;

@@ -1,0 +1,229 @@
+//! Estimates for records, new ones and anew: how many samples each gets, and in how many jobs.
+
+use super::{Filling, Round};
+use crate::cache::asked::{Asked, Wanted};
+use crate::cache::guide::{Guide, Guided, Looks};
+use crate::cache::kind::{Kind, Pass, Step};
+use crate::cache::memory::{Estimate, FilledRecords, FillingMemory};
+use crate::cache::slot::learnt_near;
+use crate::cache::{Effort, Record};
+use crate::host::{Medium, Scene};
+use crate::math::{Vec3, float};
+use crate::sampling::Generator;
+use crate::sampling::uniform::mix;
+use crate::sh::Coefficient;
+use crate::storage::Full;
+use crate::world::World;
+
+/// The first rounds of records of kinds on which all others stand get so many times the samples: what they have wrong nothing
+/// averages out.
+const FIRST: (u64, u32) = (100, 8);
+
+/// Most samples of an estimate whose samples vary more than usual, as a multiple.
+const MOST_SAMPLES: f32 = 8.0;
+
+/// Jobs of an estimate at most.
+pub(in crate::cache) const MOST_PARTS: usize = MOST_SAMPLES as usize;
+
+/// Records of which nothing usual can be said.
+const FEW: usize = 64;
+
+/// Samples of any estimate at least.
+const LEAST_SAMPLES: u32 = 16;
+
+/// Share of the samples of a surface record that is hardly seen at all. Less: it is too noisy to tell how far it reaches.
+const LEAST_SEEN: f32 = 0.0625;
+
+/// Records that reach less far than usual take a share of the samples down to this.
+const LEAST_SHARE: f32 = 0.25;
+
+/// Random numbers of a part of the samples of an estimate.
+fn stream_of(part: u32) -> u64 {
+    u64::from(part) << 40
+}
+
+/// The radius of the records that reach a point, in the mean over the points of a line: `Σ R²/Σ R` (m); 0 of few records.
+pub(super) fn usual_radius(records: &[Record]) -> f32 {
+    if records.len() < FEW {
+        return 0.0;
+    }
+    let sums =
+        |(sum, squares): (f32, f32), record: &Record| (sum + record.radius, squares + record.radius * record.radius);
+    let (sum, squares) = records.iter().fold((0.0, 0.0), sums);
+    squares / sum
+}
+
+/// The mean value that a picture is made of, about: `Σ R² L/Σ R²`.
+fn usual_value(records: &[Record]) -> f32 {
+    let add = |(sum, weight): (f32, f32), record: &Record| {
+        let area = record.radius * record.radius;
+        (sum + area * record.value.mean(), weight + area)
+    };
+    let (sum, weight) = records.iter().fold((0.0, 0.0), add);
+    sum / weight
+}
+
+/// Samples for a record that reaches `radius` (m): what reaches less far than `usual` lights fewer pixels. If one sample is
+/// as noisy everywhere, the noise of a picture whose records light areas `R²` is least, for a given sum of samples, where
+/// these go as `R`. No fewer than a quarter, because dark corners are where that is not so.
+/// Of what is seen through fog or in mirrors a share is as good as all of it.
+fn samples(effort: &Effort, radius: f32, usual: f32, seen: f32) -> u32 {
+    let share = if radius < usual { (radius / usual).max(LEAST_SHARE) } else { 1.0 };
+    ((effort.samples as f32 * share * seen) as u32).max(LEAST_SAMPLES)
+}
+
+impl<F> Filling<'_, F> {
+    pub(super) fn make<M: Medium + ?Sized, S: Scene + ?Sized>(
+        &self,
+        job: u32,
+        world: &World<'_, M, S>,
+        output: &mut FilledRecords<'_>,
+    ) {
+        let (index, part) = (job / self.parts, job % self.parts);
+        let (Some((step, effort)), Some(&(wanted, _))) =
+            (self.at_hand(), self.memory.chosen.as_slice().get(index as usize))
+        else {
+            return;
+        };
+        let Wanted { place, distance, .. } = self.memory.wanted.as_slice()[wanted as usize];
+        let settings = self.settings();
+        let limits = match &self.asked {
+            Asked::View { pixel, .. } => {
+                effort.limits.on_screen(settings.pixels[0], settings.pixels[1], *pixel, distance)
+            }
+            Asked::Box(_) => effort.limits,
+        };
+        let limits = limits.within(self.reach((step.kind, &effort), &place, world));
+        let number = self.first.wrapping_add(self.computed + u64::from(index));
+        let seen = if step.kind == Kind::Irradiance { place.share.max(LEAST_SEEN) } else { 1.0 };
+        let count = samples(&effort, limits.max, self.usual, seen);
+        let mut rng = Generator::new(mix(self.seed() ^ mix(step.kind.row().stream + 1)) ^ number ^ stream_of(part));
+        let mut estimate = Estimate { number: index, place, limits, effort: 1.0, ..Estimate::default() };
+        (estimate.learnt.seen, estimate.learnt.to_eye) = (seen, place.to_eye);
+        let looks = Looks { count, guide: None, learnt: None, to_eye: place.to_eye };
+        let is_made = self.estimate(step, world, looks, &mut estimate, &mut rng, output);
+        output.estimate = is_made.then_some(estimate);
+    }
+
+    /// In how many jobs each record of the next round of new ones is estimated.
+    pub(super) fn parts_of_new(&self, step: Step) -> u32 {
+        let are_first = step.kind.row().is_ground && self.first == 0 && self.computed < FIRST.0;
+        if are_first { FIRST.1 } else { 1 }
+    }
+
+    /// What is known around a record that is estimated anew, how many times the usual samples it is to have, and their number.
+    fn anew(&self, (step, effort): (Step, Effort), number: usize, offset: usize) -> Option<(Guide, f32, u32)> {
+        let (slot, guides) = (&self.caches.slots[step.kind], self.memory.guides[step.kind].as_slice());
+        let record = slot.records().get(number)?;
+        let around = learnt_near(slot, guides, self.before[step.kind], record.position);
+        // What varies as a whole decides how a picture looks where it is dark, what it varies by how far off the picture is.
+        let varies = around.relative_variance() / step.kind.row().spread;
+        let brightness = record.value.mean() / self.bright;
+        let more = varies.max(brightness * float::sqrt(varies)).clamp(1.0, MOST_SAMPLES);
+        let seen = guides.get(offset).map_or(1.0, |guide| guide.seen);
+        let count = samples(&effort, record.radius, self.usual, seen) as f32 * more;
+        Some((around, more, count as u32))
+    }
+
+    /// Begins a round in which all records from a number on are estimated anew, those with many samples by several jobs.
+    pub(super) fn begin_again(&mut self, (step, effort): (Step, Effort), from: usize) {
+        let records = self.caches.slots[step.kind].records();
+        // Half as far again as usual reach those that most pixels see: they alone get all samples.
+        self.usual = 1.5 * usual_radius(records);
+        self.bright = usual_value(records);
+        let count = records.len() - from;
+        self.memory.estimates.clear();
+        self.memory.higher.clear();
+        self.memory.open.clear();
+        for offset in 0..count {
+            let samples = self.anew((step, effort), from + offset, offset).map_or(0, |(.., samples)| samples);
+            for _ in 0..samples.div_ceil(effort.samples.max(1)).max(1) {
+                self.is_cut |= self.memory.open.push(offset as u32).is_err();
+            }
+        }
+        let jobs = self.memory.open.len() as u32;
+        self.enter(Round::Again { from: from as u32 }, jobs);
+    }
+
+    pub(super) fn again<M: Medium + ?Sized, S: Scene + ?Sized>(
+        &self,
+        from: u32,
+        job: u32,
+        world: &World<'_, M, S>,
+        output: &mut FilledRecords<'_>,
+    ) {
+        let Some((step, effort)) = self.at_hand() else { return };
+        let Pass::Again { stream, .. } = step.pass else { return };
+        let open = self.memory.open.as_slice();
+        let Some(&offset) = open.get(job as usize) else { return };
+        let is_same = |other: &&u32| **other == offset;
+        let part = open[..job as usize].iter().rev().take_while(is_same).count() as u32;
+        let parts = part + open[job as usize..].iter().take_while(is_same).count() as u32;
+        let number = (from + offset) as usize;
+        let slot = &self.caches.slots[step.kind];
+        let (Some(place), Some((around, more, samples))) =
+            (slot.place(number), self.anew((step, effort), number, offset as usize))
+        else {
+            return;
+        };
+        let guide = Guided::new(&around);
+        let to_eye = self.memory.guides[step.kind].as_slice().get(offset as usize).and_then(|guide| guide.to_eye);
+        let count = samples / parts + u32::from(part < samples % parts);
+        let mut rng = Generator::new(mix(self.seed() ^ mix(stream + 16)) ^ number as u64 ^ stream_of(part));
+        let mut estimate = Estimate { number: offset, place, effort: more, ..Estimate::default() };
+        let looks = Looks { count, guide: guide.as_ref(), learnt: None, to_eye };
+        let is_made = self.estimate(step, world, looks, &mut estimate, &mut rng, output);
+        output.estimate = is_made.then_some(estimate);
+    }
+
+    /// Keeps an estimate, or mixes it with the parts of the same that are there; whether there was room.
+    pub(super) fn keep(&mut self, estimate: &Estimate, higher: &[Coefficient]) -> Result<(), Full> {
+        let FillingMemory { estimates, higher: all, .. } = &mut self.memory;
+        if let Some(last) = estimates.as_mut_slice().last_mut().filter(|last| last.number == estimate.number) {
+            let share = last.merge(estimate);
+            let of_last = all.len().saturating_sub(higher.len());
+            for (sum, new) in all.as_mut_slice()[of_last..].iter_mut().zip(higher) {
+                sum.value = sum.value * (1.0 - share) + new.value * share;
+                sum.gradient = sum.gradient * (1.0 - share) + new.gradient * share;
+            }
+            return Ok(());
+        }
+        // Both or none, so that the coefficients of the others stay where they are looked for.
+        if all.room() < higher.len() {
+            return Err(Full);
+        }
+        estimates.push(*estimate)?;
+        all.extend_from_slice(higher)
+    }
+
+    /// The light that a step's kind holds, at one place; `false` if there is no memory for it.
+    pub(super) fn estimate<M: Medium + ?Sized, S: Scene + ?Sized>(
+        &self,
+        step: Step,
+        world: &World<'_, M, S>,
+        looks: Looks<'_>,
+        estimate: &mut Estimate,
+        rng: &mut Generator,
+        output: &mut FilledRecords<'_>,
+    ) -> bool {
+        let estimator = self.estimator(world);
+        let looks = Looks { learnt: Some(&mut estimate.learnt), ..looks };
+        let point = estimate.place.point;
+        if step.kind.is_on_surfaces() {
+            let normal = estimate.place.normal.unwrap_or(Vec3::Z);
+            (estimate.sums, estimate.facing) = estimator.irradiance(point, normal, looks, rng);
+            return true;
+        }
+        if output.higher.reset(self.caches.slots[step.kind].stride(), Coefficient::ZERO).is_err() {
+            output.is_cut = true;
+            return false;
+        }
+        let (phase, higher) = (estimator.phase(point), output.higher.as_mut_slice());
+        estimate.sums = match step.kind {
+            Kind::Single => estimator.single(point, &phase, higher, rng),
+            Kind::Surface => estimator.surface(point, &phase, looks, higher, rng),
+            _ => estimator.multiple(point, &phase, looks, higher, rng),
+        };
+        true
+    }
+}

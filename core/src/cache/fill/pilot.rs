@@ -1,0 +1,78 @@
+//! Rounds of pilots: whether records reach too far.
+
+use super::{Filling, Round};
+use crate::cache::guide::{Guided, Looks};
+use crate::cache::lookup::Basis;
+use crate::cache::memory::{Estimate, FilledRecords};
+use crate::cache::pilots::{self, Pilots};
+use crate::cache::slot::learnt_near;
+use crate::host::{Medium, Scene};
+use crate::math::Vec3;
+use crate::sampling::uniform::mix;
+use crate::sampling::{Generator, uniform};
+use crate::world::World;
+
+impl<F> Filling<'_, F> {
+    /// Begins a round of pilots, if records were made and may still shrink.
+    pub(super) fn send_pilots(&mut self) -> bool {
+        let Some((step, effort)) = self.at_hand() else { return false };
+        let may_shrink = self.settings().error > 0.0 && self.shrunk < pilots::MOST;
+        if !may_shrink || step.kind.row().is_ground || self.computed == 0 {
+            return false;
+        }
+        self.pilots = Pilots::default();
+        self.enter(Round::Pilot, pilots::jobs_for(self.computed * u64::from(effort.samples)));
+        true
+    }
+
+    /// Compares what records tell with estimates, at some of the places that eye rays ask for.
+    pub(super) fn pilot<M: Medium + ?Sized, S: Scene + ?Sized>(
+        &self,
+        job: u32,
+        world: &World<'_, M, S>,
+        output: &mut FilledRecords<'_>,
+    ) {
+        let Some((step, reading)) =
+            self.at_hand().and_then(|(step, _)| Some((step, self.settings().reading(step.kind)?)))
+        else {
+            return;
+        };
+        let (row, slot, wanted) = (step.kind.row(), &self.caches.slots[step.kind], self.memory.wanted.as_slice());
+        for pilot in job * pilots::PLACES_PER_JOB..(job + 1) * pilots::PLACES_PER_JOB {
+            let mut rng = Generator::new(mix(self.seed() ^ mix(row.stream + 32)) ^ u64::from(pilot));
+            let from = (uniform(&mut rng) * wanted.len() as f32) as usize;
+            let all = wanted.iter().skip(from).chain(wanted).take(wanted.len());
+            let Some(place) = all.map(|wanted| wanted.place).find(|place| place.is_seen && row.places.hold(place))
+            else {
+                return;
+            };
+            let to_eye = place.to_eye.filter(|_| !step.kind.is_on_surfaces());
+            let basis = Basis::new(to_eye.unwrap_or(Vec3::Z), if to_eye.is_some() { slot.degree() } else { 0 });
+            let Some(told) = slot.lookup(&place, &basis, &reading) else { continue };
+            let guides = self.memory.guides[step.kind].as_slice();
+            let guide = Guided::new(&learnt_near(slot, guides, self.before[step.kind], place.point));
+            let looks = Looks { count: pilots::SAMPLES, guide: guide.as_ref(), learnt: None, to_eye: place.to_eye };
+            let mut estimate = Estimate { place, ..Estimate::default() };
+            if self.estimate(step, world, looks, &mut estimate, &mut rng, output) {
+                output.pilots.add(told, basis.expanded(estimate.sums.value, output.higher.as_slice()));
+            }
+            output.higher.clear();
+        }
+    }
+
+    /// Shrinks radii if pilots say so, and makes records where then none reach.
+    pub(super) fn shrink(&mut self) {
+        let found = self.at_hand().zip(self.pilots.factor(self.settings().error));
+        let Some(((step, effort), factor)) = found else {
+            self.begin(self.step + 1);
+            return;
+        };
+        self.shrunk += 1;
+        if let Some(effort) = self.caches.settings.effort_mut(step.kind) {
+            *effort = effort.nearer(factor);
+        }
+        self.is_cut |= !self.caches.slots[step.kind].shrink(factor, effort.limits.min);
+        self.batch = [0, 0];
+        self.next_batch();
+    }
+}
