@@ -253,13 +253,13 @@ fn an_image_equals_itself_and_time_limits_hold() {
     assert!(folder.names().contains(&"d.png".to_owned()));
 }
 
+/// What a long render to `a.pfm` leaves that is stopped after two seconds.
 #[cfg(unix)]
-#[test]
-fn ctrl_c_keeps_the_image_so_far() {
-    let folder = Folder::new("stop");
+fn interrupted(folder: &Folder, options: &[&str]) -> Output {
     let child = folder
         .fogbow()
-        .args(["render", SCENE, "--method", "path", "--size", "32x32", "--spp", "1000000", "-o", "a.pfm"])
+        .args(["render", SCENE, "--size", "32x32", "-o", "a.pfm"])
+        .args(options)
         .stderr(std::process::Stdio::piped())
         .spawn()
         .unwrap();
@@ -268,6 +268,14 @@ fn ctrl_c_keeps_the_image_so_far() {
     assert!(killed.success());
     let output = child.wait_with_output().unwrap();
     assert_eq!(output.status.code(), Some(1), "{}", said(&output));
+    output
+}
+
+#[cfg(unix)]
+#[test]
+fn ctrl_c_keeps_the_image_so_far() {
+    let folder = Folder::new("stop");
+    let output = interrupted(&folder, &["--method", "path", "--spp", "1000000"]);
     assert!(said(&output).contains("stopped early"), "{}", said(&output));
     assert_eq!(folder.names(), ["a.pfm"]);
 }
@@ -277,17 +285,7 @@ fn ctrl_c_keeps_the_image_so_far() {
 #[test]
 fn ctrl_c_while_caches_are_filled_leaves_no_image() {
     let folder = Folder::new("stop-filling");
-    let child = folder
-        .fogbow()
-        .args(["render", SCENE, "--size", "32x32", "--paths", "1000000", "-o", "a.pfm"])
-        .stderr(std::process::Stdio::piped())
-        .spawn()
-        .unwrap();
-    std::thread::sleep(core::time::Duration::from_secs(2));
-    let killed = Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
-    assert!(killed.success());
-    let output = child.wait_with_output().unwrap();
-    assert_eq!(output.status.code(), Some(1), "{}", said(&output));
+    let output = interrupted(&folder, &["--paths", "1000000"]);
     assert!(said(&output).contains("stopped before the caches had been filled"), "{}", said(&output));
     assert!(folder.names().is_empty());
 }

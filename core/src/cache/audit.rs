@@ -48,6 +48,10 @@ pub(super) fn rays_for(walks: u64) -> u32 {
 /// Standard errors beyond which a difference is no chance.
 pub(super) const SURE: f64 = 3.0;
 
+/// Standard error of a deviation from which on it says nothing. Larger: pictures that are off by as much pass without a word; smaller: words about
+/// pictures whose audit was short.
+const UNKNOWN: f64 = 0.5;
+
 /// A relative deviation and how well it is known.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Deviation {
@@ -68,6 +72,19 @@ impl Deviation {
     #[must_use]
     pub fn exceeds(&self, most: f64) -> bool {
         self.bias.abs() - SURE * self.error > most
+    }
+
+    /// Whether so little is known that nothing can be said: the standard error is more than half of the light. Not where there is no light, and
+    /// nothing to know.
+    ///
+    /// ```
+    /// # use fogbow::cache::Deviation;
+    /// let wild = Deviation { bias: 40.0, error: 27.0 };
+    /// assert!(wild.is_unknown() && !wild.exceeds(0.02));
+    /// ```
+    #[must_use]
+    pub fn is_unknown(&self) -> bool {
+        self.error > UNKNOWN && self.error < f64::INFINITY
     }
 }
 

@@ -249,10 +249,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Walk<'_, M, S> {
             if meets_lights && let Some(hit) = &end {
                 radiance += self.met(&ray, hit, properties.phase.pdf(deflection(ray.direction, to_eye)));
             }
-            if radiance.is_black() && (known.is_some() || end.is_none()) {
-                if known.is_some() {
-                    break;
-                }
+            if radiance.is_black() && end.is_none() && known.is_none() {
                 continue;
             }
             let marching = self.marching(rng);

@@ -62,7 +62,8 @@ pub struct CacheArguments {
     /// How light straight from the lights is scattered once.
     #[arg(long, value_enum, default_value_t = Single::Direct)]
     pub single: Single,
-    /// Eye rays along which the picture is compared with path tracing afterwards, to say how far it is off; 0 for no such comparison
+    /// Eye rays along which caches are compared with path tracing before the picture is made, to say how far it is off and to make anew
+    /// what is wrong; 0 for no such comparison
     /// [default: as many as take about a twentieth of the time, a tenth in dense fog].
     #[arg(long, value_name = "N")]
     pub audit: Option<u32>,

@@ -114,6 +114,10 @@ impl Report<'_> {
             let most = self.arguments.cache.error;
             if findings.all.exceeds(f64::from(most)) || findings.cached.exceeds(f64::from(most)) {
                 eprintln!("warning: the picture is off by more than the {} % of --error", 100.0 * most);
+            } else if findings.cached.is_unknown() {
+                eprintln!(
+                    "warning: how far the picture is off is not known: what is cached, or paths, vary too much; take more --audit rays"
+                );
             }
             if let Some(region) = map.worst(f64::from(most)) {
                 let [columns, rows] = pixels(region, self.size);
