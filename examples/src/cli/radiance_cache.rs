@@ -263,7 +263,7 @@ pub(crate) struct Audited {
     pub(crate) findings: Findings,
     pub(crate) map: Box<BiasMap>,
     /// What earlier audits had found, because of which records were made anew.
-    pub(crate) repaired: Vec<Findings>,
+    pub(crate) repaired: Vec<(Findings, Box<BiasMap>)>,
 }
 
 impl CacheJob<'_> {
@@ -344,7 +344,7 @@ impl WithMedium for CacheJob<'_> {
             {
                 break Some(Audited { findings, map, repaired });
             }
-            repaired.push(findings);
+            repaired.push((findings, map));
         };
         let clock = Stopwatch::start();
         if let Some(file) = &self.arguments.cache_out {

@@ -3,7 +3,7 @@
 use core::fmt::Write;
 use std::path::PathBuf;
 
-use fogbow::cache::{AuditedRegion, Deviation, Findings, Kind, MeanLight};
+use fogbow::cache::{AuditedRegion, BiasMap, Deviation, Findings, Kind, MeanLight};
 use fogbow_std::progress::Progress;
 use fogbow_std::stats::Seconds;
 use fogbow_std::tiles::{Outcome, Reason};
@@ -101,8 +101,16 @@ impl Report<'_> {
         let cpu = cpu.map_or_else(String::new, |c| format!(", {} of processor time", clock(c)));
         eprintln!("{}{cpu}, {:.2} million rays per second", clock(wall), self.rays_per_second() * 1e-6);
         if let Some(Audited { findings, map, repaired }) = self.audited {
-            for found in repaired {
-                eprintln!("repaired: bias was {} of what is cached{}", percent(&found.cached), blamed(found));
+            let most = self.arguments.cache.error;
+            let in_places = |map: &BiasMap| {
+                map.worst(f64::from(most)).map(|region| {
+                    let [columns, rows] = pixels(region, self.size);
+                    format!("in places, most in columns {columns} and rows {rows}: {}", percent(&region.cached))
+                })
+            };
+            for (found, map) in repaired {
+                let places = in_places(map).map_or_else(String::new, |places| format!("; {places}"));
+                eprintln!("repaired: bias was {} of what is cached{}{places}", percent(&found.cached), blamed(found));
             }
             eprintln!(
                 "bias {} of what is cached{}; {} of all light, by path tracing along {} eye rays",
@@ -111,7 +119,6 @@ impl Report<'_> {
                 percent(&findings.all),
                 findings.rays,
             );
-            let most = self.arguments.cache.error;
             if findings.all.exceeds(f64::from(most)) || findings.cached.exceeds(f64::from(most)) {
                 eprintln!("warning: the picture is off by more than the {} % of --error", 100.0 * most);
             } else if findings.cached.is_unknown() {
@@ -119,13 +126,8 @@ impl Report<'_> {
                     "warning: how far the picture is off is not known: what is cached, or paths, vary too much; take more --audit rays"
                 );
             }
-            if let Some(region) = map.worst(f64::from(most)) {
-                let [columns, rows] = pixels(region, self.size);
-                eprintln!(
-                    "warning: off by more than the {} % of --error in places, most in columns {columns} and rows {rows}: {}",
-                    100.0 * most,
-                    percent(&region.cached)
-                );
+            if let Some(places) = in_places(map) {
+                eprintln!("warning: off by more than the {} % of --error {places}", 100.0 * most);
             }
         }
         if counters.non_finite > 0 {
@@ -185,7 +187,7 @@ impl Report<'_> {
                 let all = [entry("all", &findings.all), entry("cached", &findings.cached)];
                 all.into_iter().chain(parts).collect::<Vec<_>>().join(", ")
             };
-            let repaired: Vec<String> = repaired.iter().map(|found| format!("{{{}}}", entries(found))).collect();
+            let repaired: Vec<String> = repaired.iter().map(|(found, _)| format!("{{{}}}", entries(found))).collect();
             let regions = map.regions().iter().map(|region| {
                 let light = |name: &str, light: &MeanLight| {
                     format!("\"{name}\": {{\"mean\": {}, \"error\": {}}}", number(light.mean), number(light.error))
