@@ -33,18 +33,18 @@ fn mapped(
     change: impl Fn(Settings) -> Settings,
     spoil: impl Fn(&mut RadianceCaches<'_>),
 ) -> (Findings, BiasMap) {
-    repaired(lights, rays, change, spoil, 0)
+    repaired([0.2, 1.8], (lights, rays), change, spoil, 0)
 }
 
-/// The same after so many repairs, if as many are called for.
+/// The same, in fog that absorbs and scatters so much (m⁻¹), after so many repairs, if as many are called for.
 fn repaired(
-    lights: &[Light<'_>],
-    rays: u32,
+    [absorption, scattering]: [f32; 2],
+    (lights, rays): (&[Light<'_>], u32),
     change: impl Fn(Settings) -> Settings,
     spoil: impl Fn(&mut RadianceCaches<'_>),
     repairs: u32,
 ) -> (Findings, BiasMap) {
-    let fog = Homogeneous::new(Spectrum::splat(0.2), Spectrum::splat(1.8), Phase::ISOTROPIC).unwrap();
+    let fog = Homogeneous::new(Spectrum::splat(absorption), Spectrum::splat(scattering), Phase::ISOTROPIC).unwrap();
     let ball = Placed::new(fog, Region::sphere(Vec3::ZERO, 1.0).unwrap());
     let world = World { medium: &ball, scene: &crate::host::Empty, lights: lights.into() };
     let bounds = Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE };
@@ -164,6 +164,8 @@ fn verdict(broken: Option<Broken>, repairs: u32) -> (bool, bool) {
                 effort.tolerance = 10.0;
             }
         }
+        // Pilots would mend what is to be found.
+        settings.error = 0.0;
         if repairs > 0 {
             // What takes the place of wrong records has four times as many.
             settings = settings.with_walks(128);
@@ -184,7 +186,7 @@ fn verdict(broken: Option<Broken>, repairs: u32) -> (bool, bool) {
         }
         Some(Broken::Tolerance | Broken::Walks) | None => {}
     };
-    let (found, map) = repaired(&lights, 2 * COMPARED, change, spoil, repairs);
+    let (found, map) = repaired([0.2, 1.8], (&lights, 2 * COMPARED), change, spoil, repairs);
     let most = f64::from(USUAL_ERROR);
     (found.cached.exceeds(most), map.worst(most).is_some())
 }
@@ -244,4 +246,18 @@ fn what_is_broken_in_records_is_repaired() {
         assert_eq!(verdict(Some(broken), MOST_REPAIRS), (false, false), "{broken:?}");
     }
     assert_eq!(verdict(Some(Broken::Walks), 1), (true, true));
+}
+
+/// At the edge of a cloud in the open light bends within a part of a free path. Ten of them, under an even sky: 2 % too dark, and
+/// more in the middle, unless pilots say how far records may reach.
+#[test]
+fn pilots_know_how_light_falls_off_in_a_cloud_in_the_open() {
+    let sky = [Light::Constant(Spectrum::ONE)];
+    let found = |error: f32| {
+        let change = |settings: Settings| Settings { error, ..settings.with_walks(512) };
+        repaired([0.5, 4.5], (&sky, COMPARED), change, |_| {}, 0).0.cached
+    };
+    let [without, with] = [0.0, USUAL_ERROR].map(found);
+    assert!(without.exceeds(0.01) && without.bias < 0.0, "{without:?}");
+    assert!(with.bias.abs() < 0.005 + 3.0 * with.error && with.error < 0.004, "{with:?}");
 }
