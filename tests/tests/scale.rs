@@ -159,10 +159,8 @@ fn virtual_lights_see_the_same_in_other_units() {
     assert_same(|scale| {
         in_world(scale, |world, bounds| {
             let usual = vpl::Settings::for_outline(&Outline::of(world, bounds));
-            // How often light by way of the glass is followed depends on scattering per unit of length: in the mean it is
-            // the same, sample by sample it is not.
-            let settings =
-                vpl::Settings { paths: 64, lights: 64, candidates: 2, samples: 1, has_mirrors: false, ..usual };
+            let settings = vpl::Settings { paths: 64, lights: 64, candidates: 2, samples: 1, ..usual };
+            assert!(settings.has_mirrors);
             let mut pass = VplPass::new(&settings, 0, Independent, &[]);
             finish(&mut pass, world, &mut VplOutput::default());
             let lights = pass.finish().unwrap();
@@ -195,7 +193,8 @@ fn settings_are_the_same_in_other_units() {
     let endless = |scale: f32| {
         in_world(scale, |world, bounds| {
             let outline = Outline { bounds: Bounds::EVERYTHING, ..Outline::of(world, bounds) };
-            vpl::usual_bound(&outline).radius() / scale
+            let beams = beams::Settings::for_outline(&outline);
+            [vpl::usual_bound(&outline).radius(), beams.radius, beams.longest, beams.depth].map(|length| length / scale)
         })
     };
     for scale in SCALES {

@@ -92,7 +92,8 @@ impl Settings {
     #[must_use]
     pub fn for_outline(outline: &Outline) -> Self {
         let size = outline.bounds.size().length();
-        let size = if size.is_finite() { size } else { 1.0 };
+        // Of an endless world some free paths are seen; of one without fog nothing that beams could show.
+        let size = [size, outline.mean_free_path].into_iter().find(|size| size.is_finite()).unwrap_or(1.0);
         Self {
             bounds: outline.bounds,
             walk: path::Settings::default(),

@@ -53,6 +53,13 @@ impl<'a, M: Medium> Overlap<'a, M> {
     }
 }
 
+/// No media: vacuum.
+impl<M> Default for Overlap<'_, M> {
+    fn default() -> Self {
+        Self(&[])
+    }
+}
+
 impl<M> Overlap<'_, M> {
     /// Bounds of the sum of all media.
     fn joined(&self, ask: impl Fn(&M) -> MajorantSegment) -> MajorantSegment {

@@ -227,9 +227,8 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Gatherer<'_, M, S> {
         };
         let reach = transmittance(self.world.medium, &way.with_length(hit.distance), rng);
         let weight = scattered * reach * sample.weight;
-        let strength = weight.max_element();
-        // Roulette: what is dim need not be followed.
-        let survives = float::min(strength, 1.0);
+        // Roulette: what is dim need not be followed. A coefficient per metre says nothing of that.
+        let survives = float::min((weight / receiver.scatterer.unit()).max_element(), 1.0);
         if !(survives > 0.0) || uniform(rng) >= survives {
             return Spectrum::ZERO;
         }

@@ -62,6 +62,15 @@ impl Scatterer {
         }
     }
 
+    /// What weights of samples are measured in: the greatest scattering coefficient of a medium (m⁻¹), 1 on a surface.
+    #[inline]
+    pub(super) fn unit(&self) -> f32 {
+        match self {
+            Self::Medium { scattering, .. } => scattering.max_element(),
+            Self::Surface { .. } => 1.0,
+        }
+    }
+
     /// Draws the direction from which light comes that leaves towards `to_eye`, with `f̂ D` over the density.
     #[inline]
     #[must_use]

@@ -1,6 +1,6 @@
 //! Media and where they are.
 
-use fogbow::host::{Empty, Medium, Properties};
+use fogbow::host::{Medium, Properties};
 use fogbow::math::Affine3;
 use fogbow::medium::{AnyMedium, Density, DensityGrid, Homogeneous, MediumError, MinMax, Overlap, Placed, Region};
 
@@ -47,13 +47,11 @@ pub(super) fn tables(scene: &SceneFile) -> Vec<MediumTable> {
 #[derive(Debug)]
 #[expect(clippy::large_enum_variant, reason = "there is one per scene")]
 pub enum Media<'a> {
-    /// No medium.
-    None,
     /// One that is the same everywhere inside its container.
     Homogeneous(Placed<'a, Homogeneous>),
     /// One grid.
     Grid(Placed<'a, DensityGrid<'a>>),
-    /// Several.
+    /// Several, or none.
     Several(Vec<Placed<'a, AnyMedium<'a>>>),
 }
 
@@ -91,7 +89,6 @@ impl<'a> Media<'a> {
             reason: e.to_string(),
         })?;
         Ok(match (&placed[..], &all_holes[..]) {
-            ([], _) => Self::None,
             ([one], [holes]) => match *one.medium() {
                 AnyMedium::Homogeneous(fog) => Self::Homogeneous(moved(one, holes, fog)),
                 AnyMedium::Grid(grid) => Self::Grid(moved(one, holes, grid)),
@@ -104,14 +101,17 @@ impl<'a> Media<'a> {
     /// Whether there is at most one medium, the same everywhere in its container.
     #[must_use]
     pub fn is_homogeneous(&self) -> bool {
-        matches!(self, Self::None | Self::Homogeneous(_))
+        match self {
+            Self::Homogeneous(_) => true,
+            Self::Grid(_) => false,
+            Self::Several(media) => media.is_empty(),
+        }
     }
 
     /// The phase functions there are.
     #[must_use]
     pub fn phases(&self) -> Vec<Phase> {
         match self {
-            Self::None => Vec::new(),
             Self::Homogeneous(fog) => vec![fog.medium().phase()],
             Self::Grid(grid) => vec![grid.medium().phase()],
             Self::Several(media) => media.iter().map(|p| p.medium().phase()).collect(),
@@ -121,14 +121,10 @@ impl<'a> Media<'a> {
     /// Does `work` with the medium.
     pub fn with<W: WithMedium>(&self, work: W) -> W::Output {
         match self {
-            Self::None => work.with(&Empty),
             Self::Homogeneous(fog) => work.with(fog),
             Self::Grid(grid) => work.with(grid),
             // The number of lobes was checked when the list was made.
-            Self::Several(media) => match Overlap::new(media, |p| p.medium().phase()) {
-                Ok(overlap) => work.with(&overlap),
-                Err(_) => work.with(&Empty),
-            },
+            Self::Several(media) => work.with(&Overlap::new(media, |p| p.medium().phase()).unwrap_or_default()),
         }
     }
 }
