@@ -33,6 +33,7 @@ use crate::world::World;
 mod estimates;
 mod pilot;
 mod shoot;
+mod smooth;
 
 pub(super) use estimates::MOST_PARTS;
 use estimates::usual_radius;
@@ -74,6 +75,10 @@ enum Round {
     Pilot,
     /// Estimates anew for records from a number on.
     Again {
+        from: u32,
+    },
+    /// Records from a number on, averaged with their neighbours.
+    Smooth {
         from: u32,
     },
     Done,
@@ -387,6 +392,10 @@ impl<'s, F> Filling<'s, F> {
                 self.blend(from as usize);
                 self.begin(self.step + 1);
             }
+            Round::Smooth { from } => {
+                self.take_means(from);
+                self.begin(self.step + 1);
+            }
             Round::Done => {}
         }
     }
@@ -426,6 +435,13 @@ impl<'s, F> Filling<'s, F> {
                     let from = self.before[step.kind].min(slot.len());
                     if slot.len() > from {
                         self.begin_again((step, effort), from);
+                        return;
+                    }
+                }
+                Pass::Smooth => {
+                    let from = self.before[step.kind].min(slot.len());
+                    if slot.len() > from {
+                        self.begin_smooth(step, from);
                         return;
                     }
                 }
@@ -599,6 +615,7 @@ where
             Round::Make => self.make(job, world, output),
             Round::Pilot => self.pilot(job, world, output),
             Round::Again { from } => self.again(from, job, world, output),
+            Round::Smooth { from } => self.smooth(from, job, output),
             Round::Done => {}
         }
     }
@@ -632,12 +649,14 @@ where
             Round::Search => "fill search",
             Round::Shoot | Round::Divide => "fill photons",
             Round::Done => "",
-            Round::Look | Round::Make | Round::Pilot | Round::Again { .. } => match STEPS[self.step].kind {
-                Kind::Single => "fill single",
-                Kind::Surface => "fill surface",
-                Kind::Multiple => "fill multiple",
-                Kind::Irradiance | Kind::CoarseIrradiance => "fill irradiance",
-            },
+            Round::Look | Round::Make | Round::Pilot | Round::Again { .. } | Round::Smooth { .. } => {
+                match STEPS[self.step].kind {
+                    Kind::Single => "fill single",
+                    Kind::Surface => "fill surface",
+                    Kind::Multiple => "fill multiple",
+                    Kind::Irradiance | Kind::CoarseIrradiance => "fill irradiance",
+                }
+            }
         }
     }
 }

@@ -111,6 +111,8 @@ pub(super) enum Pass {
     /// All records of this fill estimated anew, with their radii held and random numbers of `stream`; the new estimate
     /// counts by `share`.
     Again { stream: u64, share: f32 },
+    /// All records of this fill, on surfaces, averaged with their neighbours.
+    Smooth,
 }
 
 /// One step of a fill. All steps are lit by photons and by coarse irradiance.
@@ -126,10 +128,13 @@ const SECOND: f32 = 0.67;
 
 /// Steps in their order: first coarse irradiance, by which surfaces light everything else, and once more, from what it was revised to;
 /// then the final kinds, none of which needs another.
-pub(super) const STEPS: [Step; 9] = {
+pub(super) const STEPS: [Step; 11] = {
     use Kind::{CoarseIrradiance, Irradiance, Multiple, Single, Surface};
     const fn make(kind: Kind) -> Step {
         Step { kind, pass: Pass::Make }
+    }
+    const fn smooth(kind: Kind) -> Step {
+        Step { kind, pass: Pass::Smooth }
     }
     const fn again(kind: Kind, stream: u64, share: f32) -> Step {
         Step { kind, pass: Pass::Again { stream, share } }
@@ -137,6 +142,7 @@ pub(super) const STEPS: [Step; 9] = {
     [
         make(CoarseIrradiance),
         again(CoarseIrradiance, 0, 1.0),
+        smooth(CoarseIrradiance),
         make(Surface),
         again(Surface, 1, SECOND),
         make(Single),
@@ -144,5 +150,6 @@ pub(super) const STEPS: [Step; 9] = {
         again(Multiple, 100, SECOND),
         make(Irradiance),
         again(Irradiance, 101, SECOND),
+        smooth(Irradiance),
     ]
 };

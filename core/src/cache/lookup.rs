@@ -303,7 +303,7 @@ impl SurfaceCache<'_> {
 
 /// A surface record's distance over its radius, with what normals and planes differ by.
 #[inline]
-fn facing_distance(point: Vec3, normal: Vec3, record: &Record, facing: &Facing, share: f32) -> f32 {
+pub(super) fn facing_distance(point: Vec3, normal: Vec3, record: &Record, facing: &Facing, share: f32) -> f32 {
     let turn = float::safe_sqrt(2.0 - 2.0 * normal.dot(facing.normal));
     // On a bent surface points lie off the mean of their planes by up to a quarter of the bend.
     let offset = 0.5 * (facing.normal + normal).dot(point - record.position).abs() / record.radius;

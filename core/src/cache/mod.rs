@@ -70,6 +70,7 @@ mod room;
 mod set_bytes;
 mod settings;
 mod slot;
+mod smooth;
 mod store;
 
 pub use asked::{Asked, Wanted};

@@ -173,6 +173,14 @@ impl<'s> Slot<'s> {
         }
     }
 
+    /// Takes `sums` in place of what a record on a surface says.
+    pub(super) fn revise(&mut self, number: usize, sums: &Sums, new: Attached<'_>) {
+        if let (Self::Surface(cache), Attached::Facing(facing)) = (self, new) {
+            // What is no number leaves the record as it is.
+            let _ = cache.revise(number as u32, sums.value, &sums.gradient, &[facing]);
+        }
+    }
+
     /// Makes all radii smaller: see [`Cache::shrink`]. Whether the indices have room for them.
     pub(super) fn shrink(&mut self, factor: f32, least: f32) -> bool {
         match self {
