@@ -116,7 +116,7 @@ pub struct Face {
     pub jump: Spectrum,
 }
 
-/// A participating medium, as the host knows it. Two methods are enough for one that is smooth, does not glow and is some metres large:
+/// A participating medium, as the host knows it. Two methods are enough for one that is smooth, does not glow and varies over centimetres or more:
 ///
 /// ```
 /// # use fogbow::{host::{MajorantSegment, Medium, Properties}, math::{Ray, Vec3}, spectrum::Spectrum};
@@ -136,10 +136,17 @@ pub struct Face {
 /// assert!((through[0] - (-(1.0 - (-3.0f32).exp())).exp()).abs() < 1e-4);
 /// ```
 ///
-/// Bounds must hold, `minorant ≤ σₜ ≤ majorant` up to `until`, and equal ones say that all properties are constant: nothing checks them. A medium
-/// that glows must say so ([`Medium::is_emissive`]), or its emission is left out; one of another size, its [`Medium::resolution`]; one with a
-/// sharp border, its [`Medium::faces`], or it is written without a border and put into a [`Placed`](crate::medium::Placed), which tells
-/// them:
+/// What a medium promises:
+///
+/// * Both methods are pure: the same arguments give the same answer, on any thread (`Sync`, where there are threads).
+/// * Coefficients are finite and not negative, everywhere in space.
+/// * Bounds hold, `minorant ≤ σₜ ≤ majorant` in every channel up to `until`; equal ones say that all properties are constant as far as that, and a
+///   majorant of 0 that nothing is there, emission included. Nothing checks this: wrong bounds make wrong pictures.
+/// * `until` lies beyond where the segment begins, and is infinite where nothing follows. (Where it does not advance, rays still end.)
+///
+/// What it must say where the default does not fit: that it glows ([`Medium::is_emissive`]), or its emission is left out; over what length it varies, if
+/// not over a centimetre ([`Medium::resolution`]); where it ends abruptly ([`Medium::faces`]). A medium with a sharp border is best written without it and put
+/// into a [`Placed`](crate::medium::Placed), which knows the faces of its region:
 ///
 /// ```
 /// # use fogbow::{host::{MajorantSegment, Medium}, math::{Ray, Vec3}, medium::{Homogeneous, Placed, Region}, phase::Phase};
@@ -264,7 +271,7 @@ pub trait Medium {
         let _ = (ray, visit);
     }
 
-    /// Whether extinction is the same in every channel, everywhere: then tracking is simpler.
+    /// Whether extinction is the same in every channel, everywhere: then tracking is simpler. Where it wrongly says so, colours are wrong.
     fn is_grey(&self) -> bool {
         false
     }

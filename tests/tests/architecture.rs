@@ -531,6 +531,38 @@ fn no_file_names_a_path_of_somebodys_machine() {
     assert!(complaints.is_empty(), "\n{complaints}");
 }
 
+/// Decisions whose title is not in the index, as a link to their file, and lines that a merge has left.
+fn index_complaints(index: &str, decisions: &[(String, String)]) -> Vec<String> {
+    let missing = decisions.iter().filter_map(|(file, text)| {
+        let title = text.lines().next()?.split_once(". ").map_or("", |(_, title)| title);
+        (title.is_empty() || !index.contains(&format!("[{title}]({file})"))).then(|| file.clone())
+    });
+    let merged =
+        index.lines().filter(|line| ["<<<<<<<", "=======", ">>>>>>>"].iter().any(|mark| line.starts_with(mark)));
+    missing.chain(merged.map(str::to_owned)).collect()
+}
+
+#[test]
+fn the_index_of_decisions_has_every_one_by_its_title() {
+    let folder = repository().join("core/decisions");
+    let files = fs::read_dir(&folder).expect("decisions can be listed").flatten().map(|entry| entry.path());
+    let numbered =
+        files.filter(|path| path.file_name().is_some_and(|name| name.as_encoded_bytes()[0].is_ascii_digit()));
+    let name = |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let decisions: Vec<_> = numbered.map(|path| (name(&path), read(&path))).collect();
+    assert!(decisions.len() > 50);
+    let complaints = index_complaints(&read(&folder.join("README.md")), &decisions);
+    assert!(complaints.is_empty(), "{complaints:#?}");
+}
+
+#[test]
+fn decisions_without_an_entry_and_marks_of_merges_are_told() {
+    let decision = |file: &str, text: &str| (file.to_owned(), text.to_owned());
+    let decisions = [decision("1-a.md", "# 1. Light\n"), decision("2-b.md", "# 2. Fog\n"), decision("3-c.md", "Smoke")];
+    let index = "| 1 | [Light](1-a.md) |\n<<<<<<< HEAD\n| 2 | [Mist](2-b.md) |\n";
+    assert_eq!(index_complaints(index, &decisions), ["2-b.md", "3-c.md", "<<<<<<< HEAD"]);
+}
+
 /// The programs outside the workspace have lock files of their own; they must name the same
 /// versions, or CI would prove something about other crates than the ones in use.
 #[test]

@@ -4,8 +4,8 @@
 //! frozen caches, many in a round; then they are inserted in order, and those left out that an earlier one of the same round
 //! covers. The order of kinds is that of [`STEPS`].
 //!
-//! Of each record places and radii come from some samples, values for the most part from as many others, so that
-//! noise in one does not steer the other.
+//! Places and radii of records come from some samples, values for the most part from others, as many or more, so that
+//! noise in one does not steer the other (decision 13).
 
 use core::ops::Range;
 
@@ -138,8 +138,9 @@ pub struct Filling<'s, F> {
     before: ByKind<usize>,
     /// All records computed, by kind.
     all_computed: ByKind<u64>,
-    /// Photons before this round.
+    /// Photons before this round, and in it.
     photons_before: u32,
+    photons_of_round: u32,
     is_cut: bool,
 }
 
@@ -209,6 +210,7 @@ impl<'s> RadianceCaches<'s> {
             before,
             all_computed: ByKind([0; Kind::COUNT]),
             photons_before: 0,
+            photons_of_round: 0,
             is_cut,
         }
     }

@@ -25,6 +25,7 @@
 //! | `pilots` | whether records reach too far, measured in this world |
 //! | `photons` | [`PhotonEffort`]: light in cells, brought by photons, at which walks end |
 //! | `slot` | a cache of either sort, as filling needs it |
+//! | `smooth` | irradiance averaged over neighbouring records |
 //! | `readers` | probes, fluence, irradiance, in-scattered light; many at a time |
 //! | `set_bytes` | all caches as bytes |
 //! | `record` | [`Record`], [`Attachment`]: what is stored |

@@ -23,8 +23,12 @@ pub(super) const MAX_DEGREE: usize = TURNING_DEGREE;
 
 const MAX_COEFFICIENTS: usize = sh::coefficient_count(MAX_DEGREE);
 
-/// Photons that must have passed a cell before walks end there. Fewer: their noise is seen; more: walks go on where light is well known.
+/// Counted photons that must have passed a cell for walks to end there. Fewer: their noise is seen; more: walks go on where light is well known.
 const LEAST_PATHS: u32 = 8;
+
+/// Part of all photons that are only counted. Where walks end must not depend on the photons whose light they find: dark cells that many
+/// happened to pass would be too bright. Larger: photons that bring no light; smaller: walks end nowhere but where light is known very well.
+const COUNTED: f64 = 0.25;
 
 /// Part of the lit cells that photons are to know well. More: all wait for the darkest corner; less: dark parts of a picture are noisy.
 const KNOWN: f64 = 0.9;
@@ -32,6 +36,9 @@ const KNOWN: f64 = 0.9;
 /// How much of what cells do not resolve by direction may be left where walks end: each scattering blurs it. More: what is scattered
 /// sharply forward lands in the wrong place, by some 5 % of a picture at 0.5; less: memory for cells, and longer walks.
 pub(super) const SHARPEST: f32 = 0.3;
+
+/// Photons of the first round.
+const FIRST: u32 = 4096;
 
 /// Photons of one job.
 pub(super) const PATHS_PER_JOB: u32 = 32;
@@ -58,7 +65,7 @@ pub struct PhotonEffort {
     pub paths: u32,
     /// Flights of photons, at which no more paths begin.
     pub flights: u64,
-    /// Photons that are to have passed nearly every lit cell: then no more paths begin.
+    /// Photons that are to bring light to nearly every cell that walks may end in.
     pub enough: u32,
 }
 
@@ -97,7 +104,7 @@ pub struct PhotonDeposit {
 /// Who came by one cell.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct PhotonCell {
-    /// How many photons came by, and the last of them.
+    /// How many counted photons came by, and the last of them.
     paths: u32,
     last: u32,
     /// Where the first did (m).
@@ -118,6 +125,8 @@ pub struct PhotonGrid<'s> {
     moments: List<'s, Spectrum>,
     paths: u32,
     flights: u64,
+    /// How many paths were only counted, and up to which number light is brought; `None` while all are counted.
+    lit: Option<[u32; 2]>,
 }
 
 #[cfg(feature = "alloc")]
@@ -158,10 +167,12 @@ impl PhotonGrid<'static> {
         let (mut cells, mut deposits) = (Self::default(), List::default());
         // Growing memory is never full.
         let _ = cells.reset(effort);
-        while cells.paths < effort.paths && cells.flights < effort.flights {
-            deposits.clear();
-            let flights = cells.shoot(cells.paths, world, (effort, walk, seed), &mut deposits).unwrap_or(0);
-            cells.accept(deposits.as_slice(), 1, u64::from(flights));
+        while let Some(more) = cells.next_round(effort) {
+            for _ in 0..more {
+                deposits.clear();
+                let flights = cells.shoot(cells.paths, world, (effort, walk, seed), &mut deposits).unwrap_or(0);
+                cells.accept(deposits.as_slice(), 1, u64::from(flights));
+            }
         }
         for number in 0..cells.len() as u32 {
             if cells.is_whole(number, world.scene) {
@@ -174,12 +185,22 @@ impl PhotonGrid<'static> {
 
 impl<'s> PhotonGrid<'s> {
     pub(super) fn new(cells: List<'s, PhotonCell>, moments: List<'s, Spectrum>) -> Self {
-        Self { first: Vec3::ZERO, side: 0.0, counts: [0; 3], cells, degree: 0, moments, paths: 0, flights: 0 }
+        Self {
+            first: Vec3::ZERO,
+            side: 0.0,
+            counts: [0; 3],
+            cells,
+            degree: 0,
+            moments,
+            paths: 0,
+            flights: 0,
+            lit: None,
+        }
     }
 
     /// Dark cells that fill the bounds.
     pub(super) fn reset(&mut self, effort: &PhotonEffort) -> Result<(), Full> {
-        (self.paths, self.flights, self.counts) = (0, 0, [0; 3]);
+        (self.paths, self.flights, self.counts, self.lit) = (0, 0, [0; 3], None);
         self.cells.clear();
         self.moments.clear();
         let Some((side, counts)) = effort.division() else { return Ok(()) };
@@ -198,13 +219,32 @@ impl<'s> PhotonGrid<'s> {
         self.paths
     }
 
-    pub(super) fn flights(&self) -> u64 {
-        self.flights
+    /// Photons of the next round, no more than all before it; `None` after the last. First they are counted, so long that they are about [`COUNTED`]
+    /// of all, then they bring light: as many as it takes until [`PhotonEffort::enough`] pass nearly every cell that walks may end in.
+    pub(super) fn next_round(&mut self, effort: &PhotonEffort) -> Option<u32> {
+        let paths = self.paths;
+        if paths == 0 {
+            let first = f64::from(FIRST).min(COUNTED * f64::from(effort.paths)) as u32;
+            return (effort.paths > 0 && effort.flights > 0).then_some(first.max(1));
+        }
+        // As many in all as flights allow. Casts saturate.
+        let per_path = (self.flights as f64 / f64::from(paths)).max(1.0);
+        let most = effort.paths.min((effort.flights as f64 / per_path) as u32);
+        if self.lit.is_none() {
+            let wanted = f64::from(paths) * (1.0 + self.times(effort.enough));
+            let counted = (COUNTED * wanted.min(f64::from(most))) as u32;
+            if paths < counted {
+                return Some(paths.min(counted - paths));
+            }
+            self.lit = Some([paths, most.min(wanted as u32)]);
+        }
+        let end = self.lit.map_or(0, |[_, end]| end.min(most));
+        (paths < end).then(|| paths.min(end - paths))
     }
 
-    /// How many times the paths so far it takes until `enough` photons have passed nearly every cell that walks may end in: 1 or less if
-    /// they have. Infinite if none has been passed by some.
-    pub(super) fn times(&self, enough: u32) -> f64 {
+    /// How many times the counted paths it takes until `enough` photons have passed nearly every cell that walks may end in.
+    /// Infinite if none has been passed by some.
+    fn times(&self, enough: u32) -> f64 {
         let lit = || self.cells.as_slice().iter().map(|cell| cell.paths).filter(|&paths| paths >= LEAST_PATHS);
         let (all, most) = lit().fold((0_u32, 0), |(all, most), paths| (all + 1, most.max(paths)));
         let most_dark = (1.0 - KNOWN) * f64::from(all);
@@ -283,20 +323,25 @@ impl<'s> PhotonGrid<'s> {
         self.flights += flights;
         let stride = self.stride();
         let (cells, moments) = (self.cells.as_mut_slice(), self.moments.as_mut_slice());
+        if self.lit.is_none() {
+            for deposit in deposits {
+                let Some(cell) = cells.get_mut(deposit.cell as usize) else { continue };
+                if cell.paths == 0 {
+                    cell.met = deposit.at;
+                }
+                if cell.paths == 0 || cell.last != deposit.path {
+                    (cell.paths, cell.last) = (cell.paths + 1, deposit.path);
+                }
+            }
+            return;
+        }
         let mut basis = [0.0; MAX_COEFFICIENTS];
         for deposit in deposits {
             let cell = deposit.cell as usize;
             let Some(sums) = moments.get_mut(cell * stride..(cell + 1) * stride) else { continue };
-            let Some(cell) = cells.get_mut(cell) else { continue };
             sh::evaluate(deposit.direction, self.degree, &mut basis[..stride]);
             for (sum, y) in sums.iter_mut().zip(basis) {
                 *sum += deposit.light * y;
-            }
-            if cell.paths == 0 {
-                cell.met = deposit.at;
-            }
-            if cell.paths == 0 || cell.last != deposit.path {
-                (cell.paths, cell.last) = (cell.paths + 1, deposit.path);
             }
         }
     }
@@ -367,7 +412,11 @@ impl<'s> PhotonGrid<'s> {
         let index = self.cell_of(point)?;
         let cell = self.trusted(index)?;
         let basis = TurningBasis::new(to_eye, self.degree);
-        let scale = 1.0 / (self.paths as f32 * self.side * self.side * self.side);
+        let paths = self.lit.map_or(0, |[counted, _]| self.paths - counted);
+        if paths == 0 {
+            return None;
+        }
+        let scale = 1.0 / (paths as f32 * self.side * self.side * self.side);
         let moments: [Spectrum; MAX_DEGREE + 1] = core::array::from_fn(|l| properties.phase.moment(l) * scale);
         let of_degree = |l: usize| l * l..(l + 1) * (l + 1);
         let light = |cell: &[Spectrum]| -> Spectrum {

@@ -270,7 +270,8 @@ fn photons(outline: &Outline, scale: f32) -> PhotonEffort {
     let thickness = outline.bounds.size().max_element() * outline.extinction;
     // Casts saturate, and take NaN to 0.
     let cells = ((CELLS_PER_FREE_PATH * thickness) as u32).clamp(CELLS[0], CELLS[1]);
-    let finer = f64::from(1.0 / (scale * scale));
+    // Noise of cells is the same for all that looks at them, and photons are cheap: of rough pictures they are spared less than walks.
+    let finer = f64::from(1.0 / (scale * scale.min(1.0)));
     let degree = photons::degree_for(&outline.phase);
     let sharper = f64::from(photons::spread(&outline.phase, degree) / EVEN).max(1.0);
     PhotonEffort {

@@ -1,9 +1,9 @@
 //! What caches answer besides eye rays: light at a point, as coefficients, fluence, irradiance; one by one or many at a
 //! time.
 //!
-//! All of these are answers from records alone, and say `None` where no record reaches, not even twice as far as
-//! it is valid. Light straight from the lights is in them where it is cached ([`Settings::single`](super::Settings::single)); otherwise a host
-//! adds it, by [`RadianceCaches::in_scattered`] or by its own shadow maps.
+//! All but [`RadianceCaches::in_scattered`], which samples what is not cached, answer from records alone, and say so where no record reaches, not even
+//! twice as far as it is valid. Light straight from the lights and scattered once is in them where it is cached ([`Settings::single`](super::Settings::single));
+//! otherwise a host adds it, from [`ScatteredLight::single`] or by its own shadow maps. It is never in irradiance. Light that a medium emits is in none.
 
 use glam::Vec3;
 
@@ -154,7 +154,8 @@ impl RadianceCaches<'_> {
     }
 
     /// In-scattered radiance at `point` in spherical harmonics: what a probe in fog stores. See [`VolumeCache::expansion`] for the
-    /// coefficients, to be evaluated in the direction from `point` to the eye. The phase function is in them, σₛ is not: they light fog, not
+    /// coefficients; their dot product with [`sh::evaluate`](crate::sh::evaluate) in the direction from `point` to the eye is radiance. As many are
+    /// worth asking for as [`VolumeCache::degree`] says; those of higher degrees are 0. The phase function is in them, σₛ is not: they light fog, not
     /// surfaces (for these, see [`RadianceCaches::irradiance`]).
     ///
     /// The sum over the parts that are cached; `false`, and zeros, where one of them has no record. Light straight from the lights is

@@ -7,9 +7,6 @@ use crate::cache::settings::Settings;
 use crate::host::{Medium, Scene};
 use crate::world::World;
 
-/// Photons of the first round of them.
-const FIRST_PHOTONS: u32 = 4096;
-
 impl<F> Filling<'_, F> {
     /// The photons to shoot: none if nothing is made by walks.
     pub(super) fn photons(&self) -> Option<PhotonEffort> {
@@ -17,22 +14,15 @@ impl<F> Filling<'_, F> {
         photons.filter(|_| multiple.is_some() || irradiance.is_some())
     }
 
-    /// The next round of photons, no larger than all before it, or after the last what follows.
+    /// The next round of photons, or after the last what follows.
     pub(super) fn shoot_more(&mut self, effort: &PhotonEffort) {
-        let (paths, flights) = (self.memory.photons.paths(), self.memory.photons.flights());
-        let mut more = if paths == 0 { FIRST_PHOTONS.min(effort.paths) } else { paths.min(effort.paths - paths) };
-        if paths > 0 {
-            let left = effort.flights.saturating_sub(flights) as f64 * f64::from(paths) / flights.max(1) as f64;
-            // Casts saturate.
-            more =
-                more.min(left as u32).min((f64::from(paths) * (self.memory.photons.times(effort.enough) - 1.0)) as u32);
-        }
-        let jobs = more / PATHS_PER_JOB;
-        self.photons_before = paths;
-        if jobs > 0 {
-            self.enter(Round::Shoot, jobs);
-        } else {
-            self.enter(Round::Divide, (self.memory.photons.len() as u32).div_ceil(CELLS_PER_JOB).max(1));
+        let photons = &mut self.memory.photons;
+        self.photons_before = photons.paths();
+        let (more, cells) = (photons.next_round(effort), photons.len() as u32);
+        self.photons_of_round = more.unwrap_or(0);
+        match more {
+            Some(more) => self.enter(Round::Shoot, more.div_ceil(PATHS_PER_JOB)),
+            None => self.enter(Round::Divide, cells.div_ceil(CELLS_PER_JOB).max(1)),
         }
     }
 
@@ -44,8 +34,9 @@ impl<F> Filling<'_, F> {
     ) {
         let (photons, settings) = (&self.memory.photons, self.settings());
         let Some(effort) = &settings.photons else { return };
-        for path in 0..PATHS_PER_JOB {
-            let path = self.photons_before + job * PATHS_PER_JOB + path;
+        let first = job * PATHS_PER_JOB;
+        for path in first..(first + PATHS_PER_JOB).min(self.photons_of_round) {
+            let path = self.photons_before + path;
             match photons.shoot(path, world, (effort, &settings.paths, self.seed()), &mut output.deposits) {
                 Ok(flights) => output.flights += u64::from(flights),
                 Err(_) => output.is_cut = true,
