@@ -134,8 +134,8 @@ fn caches_of_anything_else_are_refused() {
         (vec!["render", SCENE, "--method", "path", "--cache-in", "a.caches"], &["--method radiance-cache"]),
         (vec!["render", SCENE, "--method", "path", "--cache-out", "b.caches"], &["--method radiance-cache"]),
         (
-            vec!["render", SCENE, "--time", "1", "--cache-out", "b.caches"],
-            &["--cache-out need radiance caching", "--time would", "--method radiance-cache"],
+            vec!["render", SCENE, "--max-depth", "5", "--cache-out", "b.caches"],
+            &["--cache-out need radiance caching", "any depth", "--method radiance-cache"],
         ),
         (vec!["records", SCENE, "--cache-in", "a.caches", "-o", "a.gif"], &["a.gif: the extension"]),
         (vec!["records", SCENE, "--cache-in", "a.png", "-o", "b.png"], &["a.png: is not a file of radiance caches"]),

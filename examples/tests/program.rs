@@ -253,6 +253,29 @@ fn an_image_equals_itself_and_time_limits_hold() {
     assert!(folder.names().contains(&"d.png".to_owned()));
 }
 
+/// With limited time caches are filled for smaller and smaller errors, down to the one asked for.
+#[test]
+fn time_makes_pictures_from_caches_better() {
+    let folder = Folder::new("time");
+    let render = |options: &[&str]| -> serde_json::Value {
+        let small = ["render", SCENE, "--size", "24x24", "--stats", "s.json", "-o", "a.pfm"];
+        let output = folder.run(&[&small[..], options].concat());
+        assert_eq!(output.status.code(), Some(0), "{}", said(&output));
+        assert!(said(&output).contains("made for an error of"), "{}", said(&output));
+        let stats = std::fs::read(folder.0.join("s.json")).unwrap();
+        serde_json::from_slice(&stats).unwrap()
+    };
+    let error = |stats: &serde_json::Value| stats["audit"]["made_for"].as_f64().unwrap();
+    let first = render(&["--time", "0.01"]);
+    assert!(first["method"] == "radiance-cache" && first["ended"] == "time", "{first}");
+    assert!((error(&first) - 0.16).abs() < 1e-6, "{first}");
+    // Not nearly a minute.
+    let asked = render(&["--time", "60", "--error", "0.1"]);
+    assert!((error(&asked) - 0.1).abs() < 1e-6 && asked["ended"] == "done", "{asked}");
+    let longer = render(&["--time", "6"]);
+    assert!(error(&longer) < 0.1 && longer["ended"] == "time", "{longer}");
+}
+
 /// What a long render to `a.pfm` leaves that is stopped after two seconds.
 #[cfg(unix)]
 fn interrupted(folder: &Folder, options: &[&str]) -> Output {

@@ -40,6 +40,7 @@
 //! | `evidence` | how far gradients can be believed; edges of the sky |
 //! | `eye` | [`places`] and [`radiance`] of eye rays |
 //! | `audit`, `bias_map` | [`Audit`]: how far pictures from caches are off; [`BiasMap`]: where |
+//! | `refine` | pictures of falling error, where time is limited |
 //! | `room` | [`Slots`] and [`room_for`]: lent memory, and how much of it is needed |
 //! | [`bytes`] | caches as bytes, to be saved |
 
@@ -67,6 +68,7 @@ mod presets;
 mod radius;
 mod readers;
 mod record;
+mod refine;
 mod room;
 mod set_bytes;
 mod settings;
@@ -92,6 +94,7 @@ pub use presets::{ERROR_BOUNDS, MOST_REPAIRS, MOST_SAMPLES, USUAL_ERROR};
 pub use radius::{Limits, clamp_gradient, clearance, log_gradient_radius, neighbour_clamped, valid_radius};
 pub use readers::ScatteredLight;
 pub use record::{Attachment, Facing, Record};
+pub use refine::Refinement;
 pub use room::{Room, Slots, room_for};
 pub use set_bytes::CachesError;
 pub use settings::{Effort, Settings};

@@ -172,6 +172,7 @@ impl Settings {
         let error = error.clamp(ERROR_BOUNDS[0], ERROR_BOUNDS[1]);
         let scale = error / USUAL_ERROR;
         let coarser = float::sqrt(scale).min(COARSEST);
+        let rougher = float::sqrt(scale).max(1.0);
         let walks = (f64::from(WALKS) / f64::from(scale * scale)) as u32;
         let size = outline.bounds.size().max_element();
         let phase = &outline.phase;
@@ -201,8 +202,9 @@ impl Settings {
                 max_vertices: VERTICES,
                 ..multiple_scatter::Settings::new(Steps::Length(STEP * outline.resolution))
             },
+            pixels: Self::default().pixels.map(|pixels| pixels * rougher),
             light_samples: (LIGHT_SAMPLES[0] / outline.lights.all.max(1) as u32).clamp(1, LIGHT_SAMPLES[1]),
-            finest: FINEST * size,
+            finest: FINEST * size * rougher,
             ..Self::default()
         }
     }
@@ -280,7 +282,7 @@ fn photons(outline: &Outline, scale: f32) -> PhotonEffort {
         degree,
         paths: (f64::from(PHOTONS) * finer) as u32,
         flights: (FLIGHTS * finer) as u64,
-        enough: (f64::from(ENOUGH) * finer * sharper) as u32,
+        enough: ((f64::from(ENOUGH) * finer).max(24.0) * sharper) as u32,
     }
 }
 

@@ -26,7 +26,7 @@ impl Choice {
             }
             return Ok(Self { method, instead: None });
         }
-        let Some(reason) = obstacle(arguments, paths, world) else {
+        let Some(reason) = obstacle(paths, world) else {
             return Ok(Self { method: Method::RadianceCache, instead: None });
         };
         if arguments.cache.has_files() {
@@ -49,14 +49,11 @@ impl Choice {
 }
 
 /// Why radiance caching is not for this render; `None` if it is.
-fn obstacle(arguments: &RenderArguments, paths: &path::Settings, world: &World<'_>) -> Option<String> {
+fn obstacle(paths: &path::Settings, world: &World<'_>) -> Option<String> {
     match paths.max_scatterings {
         limit @ (0 | 1) => Some(format!("nothing is left to cache of paths of depth {}", limit + 1)),
         u32::MAX if !world.has_cacheable() => Some("nothing scatters light but mirrors and glass".to_owned()),
-        u32::MAX => {
-            let is_timed = arguments.time.is_some();
-            is_timed.then(|| "--time would only count from when caches are full".to_owned())
-        }
+        u32::MAX => None,
         limit => Some(format!("caches hold light of paths of any depth, not of at most {}", u64::from(limit) + 1)),
     }
 }

@@ -1,17 +1,20 @@
 //! `fogbow render` by radiance caching.
 
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 use clap::{Arg, Args, ValueEnum};
 use fogbow::bytes::Crc;
 use fogbow::cache::{
     self, Asked, Audit, BiasMap, CachedRadiance, CachesError, Extrapolation, Findings, RadianceCaches, RaySettings,
+    Refinement,
 };
 use fogbow::covariance::image_sampling::Plan;
 use fogbow::host::Medium;
 use fogbow::light::Lights;
 use fogbow::math::{Ray, Vec2};
 use fogbow::path;
+use fogbow::picture::LEAST_SAMPLES;
 use fogbow::sampling::uniform2;
 use fogbow::sh;
 use fogbow::work::Rounds;
@@ -38,8 +41,8 @@ use crate::world::{WithMedium, World};
 #[command(next_help_heading = "Radiance caching", mut_args(told))]
 pub struct CacheArguments {
     /// Relative error that the picture may have, noise and bias together: tolerances, walks and samples follow from it.
-    #[arg(long, value_name = "E", value_parser = error_asked, default_value_t = cache::USUAL_ERROR)]
-    pub error: f32,
+    #[arg(long, value_name = "E", value_parser = error_asked)]
+    pub error: Option<f32>,
     /// Error tolerance of all caches: smaller is finer and slower.
     #[arg(long, value_name = "E", value_parser = output::positive)]
     pub tolerance: Option<f64>,
@@ -77,6 +80,11 @@ pub struct CacheArguments {
 }
 
 impl CacheArguments {
+    /// The error asked for, where time is not limited.
+    pub(super) fn error(&self) -> f32 {
+        self.error.unwrap_or(cache::USUAL_ERROR)
+    }
+
     /// # Errors
     /// A file that cannot be written: better before a long render than after it.
     pub(super) fn check(&self) -> Result<(), String> {
@@ -126,6 +134,7 @@ fn told(option: Arg) -> Arg {
             );
             with_default(option, text)
         }
+        "error" => with_default(option, format!("{}; with --time as small as is done in time", cache::USUAL_ERROR)),
         "paths" => with_default(option, usual.multiple.map_or(0, |effort| effort.samples).to_string()),
         _ => option,
     }
@@ -224,7 +233,7 @@ pub(super) struct CacheJob<'a> {
     pub(super) settings: &'a tiles::Settings,
     pub(super) control: &'a Control<'a>,
     /// Is told of every stage of filling, again and again.
-    pub(super) tell: &'a dyn Fn(&'static str),
+    pub(super) tell: &'a (dyn Fn(&'static str) + Sync),
     pub(super) arguments: &'a CacheArguments,
     /// Which pixels are computed; `None` for all.
     pub(super) plan: Option<&'a Plan<'a>>,
@@ -247,6 +256,20 @@ pub(super) struct Cached {
     pub(super) audited: Option<Audited>,
 }
 
+/// Caches as far as they were filled.
+struct Filled {
+    caches: RadianceCaches<'static>,
+    ending: Ending,
+    audited: Option<Audited>,
+}
+
+/// What all fills of a render took.
+#[derive(Default)]
+struct Spent {
+    filled: Vec<(&'static str, Seconds)>,
+    computed: u64,
+}
+
 /// Adds times to those of the same stages.
 fn add_times(all: &mut Vec<(&'static str, Seconds)>, more: Vec<(&'static str, Seconds)>) {
     for (stage, time) in more {
@@ -260,18 +283,26 @@ fn add_times(all: &mut Vec<(&'static str, Seconds)>, more: Vec<(&'static str, Se
 /// What an audit has found.
 #[derive(Debug, Clone)]
 pub(crate) struct Audited {
+    /// The error that the picture was made for.
+    pub(crate) error: f32,
     pub(crate) findings: Findings,
     pub(crate) map: Box<BiasMap>,
     /// What earlier audits had found, because of which records were made anew.
     pub(crate) repaired: Vec<(Findings, Box<BiasMap>)>,
 }
 
+/// Share of the time of a fill that its audit may take where time is limited.
+const AUDIT_SHARE: f64 = 0.05;
+
 impl CacheJob<'_> {
+    fn save(&self, caches: &RadianceCaches<'static>) -> Result<(), Failure> {
+        Ok(self.arguments.cache_out.as_ref().map_or(Ok(()), |file| files::save(file, caches, self.tag))?)
+    }
+
     /// What suits the world, with what the user says otherwise.
-    fn settings(&self, outline: &Outline) -> cache::Settings {
+    fn settings(&self, outline: &Outline, error: f32) -> cache::Settings {
         let arguments = self.arguments;
-        let preset =
-            cache::Settings::for_outline(outline, arguments.error).for_pixels(self.film.width() * self.film.height());
+        let preset = cache::Settings::for_outline(outline, error).for_pixels(self.film.width() * self.film.height());
         let mut settings = match arguments.single {
             Single::Direct => preset,
             Single::Cached => preset.with_single_cached(outline),
@@ -305,71 +336,101 @@ impl CacheJob<'_> {
     }
 }
 
-impl WithMedium for CacheJob<'_> {
-    type Output = Result<Cached, Failure>;
+/// A picture and what it is made for, where time is limited.
+struct Level {
+    film: Film,
+    filled: Filled,
+    render: Outcome,
+}
 
-    fn with<M: Medium + Sync>(self, medium: &M) -> Self::Output {
-        let world = LitWorld { medium, scene: self.world, lights: self.lights };
-        let settings = self.settings(&self.world.outline(&world));
-        let (width, height) = (self.film.width() as f32, self.film.height() as f32);
-        let ray = |at: [f32; 2]| -> Ray { self.camera.ray(Vec2::from(at)) };
+/// The stages of one job, with the medium of any type.
+struct Stages<'j, 'a, M> {
+    job: &'j CacheJob<'a>,
+    medium: &'j M,
+    outline: Outline,
+    pool: Threads,
+}
+
+impl<M: Medium + Sync> Stages<'_, '_, M> {
+    fn world(&self) -> LitWorld<'_, M, World<'_>> {
+        LitWorld { medium: self.medium, scene: self.job.world, lights: self.job.lights }
+    }
+
+    fn ray(&self, at: [f32; 2]) -> Ray {
+        self.job.camera.ray(Vec2::from(at))
+    }
+
+    /// Fills caches until nothing is missing, or `time` is up; audits them, and, where time is not limited, makes anew what is wrong.
+    fn fill(
+        &self,
+        mut caches: RadianceCaches<'static>,
+        error: f32,
+        time: Option<Duration>,
+        spent: &mut Spent,
+    ) -> Filled {
+        let (job, world) = (self.job, self.world());
+        let ray = |at: [f32; 2]| self.ray(at);
+        let width = job.film.width() as f32;
         let apart = ray([0.5, 0.5]).direction.angle_between(ray([0.5 + 1.0 / width, 0.5]).direction);
-        let clock = Stopwatch::start();
-        let caches = self.arguments.load(settings, self.tag)?;
-        let loaded = clock.elapsed();
-        let pool = Threads::new(self.settings.threads)?;
-        let tell = |filling: &_| (self.tell)(Rounds::<LitWorld<'_, M, World<'_>>>::stage(filling));
-        let (mut caches, mut filled, mut computed, mut repaired) = (caches, Vec::new(), 0, Vec::new());
-        let mut ending;
-        let audited = loop {
+        let tell = |filling: &_| (job.tell)(Rounds::<LitWorld<'_, M, World<'_>>>::stage(filling));
+        let mut repaired = Vec::new();
+        loop {
+            let clock = Stopwatch::start();
             let mut filling = caches.fill(Asked::View { ray, pixel: apart });
-            let ran = threads::run(&mut filling, &world, &pool, self.control, None, tell);
-            add_times(&mut filled, ran.stages);
-            computed += cache::Kind::ALL.into_iter().map(|kind| filling.computed(kind)).sum::<u64>();
-            let audit_rays = self.arguments.audit.unwrap_or_else(|| filling.audit_rays());
+            let ran = threads::run(&mut filling, &world, &self.pool, job.control, time, tell);
+            add_times(&mut spent.filled, ran.stages);
+            spent.computed += cache::Kind::ALL.into_iter().map(|kind| filling.computed(kind)).sum::<u64>();
+            let audit_rays = job.arguments.audit.unwrap_or_else(|| filling.audit_rays());
             caches = filling.finish();
-            ending = ran.ending;
-            if ending != Ending::Done || audit_rays == 0 || self.paths.max_scatterings == 0 {
-                break None;
+            if ran.ending != Ending::Done || audit_rays == 0 || job.paths.max_scatterings == 0 {
+                return Filled { caches, ending: ran.ending, audited: None };
             }
             let mut audit = Audit::new(&caches, ray, audit_rays);
-            let ran = threads::run(&mut audit, &world, &pool, self.control, None, |_| {});
-            add_times(&mut filled, ran.stages);
-            ending = ran.ending;
-            if ending != Ending::Done {
-                break None;
+            // A part of its rays are as good as all of a shorter one.
+            let share = time.map(|_| Duration::from_secs_f64(AUDIT_SHARE * clock.elapsed().wall));
+            let ran = threads::run(&mut audit, &world, &self.pool, job.control, share, |_| {});
+            add_times(&mut spent.filled, ran.stages);
+            if ran.ending == Ending::Cancelled {
+                return Filled { caches, ending: ran.ending, audited: None };
             }
             let (findings, map) = (audit.findings(), Box::new(audit.map()));
-            if repaired.len() as u32 >= cache::MOST_REPAIRS || !caches.drop_wrong(&findings, &map, self.arguments.error)
-            {
-                break Some(Audited { findings, map, repaired });
+            let is_over = time.is_some() || repaired.len() as u32 >= cache::MOST_REPAIRS;
+            if is_over || !caches.drop_wrong(&findings, &map, error) {
+                return Filled {
+                    caches,
+                    ending: Ending::Done,
+                    audited: Some(Audited { error, findings, map, repaired }),
+                };
             }
             repaired.push((findings, map));
-        };
-        let clock = Stopwatch::start();
-        if let Some(file) = &self.arguments.cache_out {
-            files::save(file, &caches, self.tag)?;
         }
-        let files = [loaded, clock.elapsed()];
-        if ending == Ending::Cancelled {
-            return Err(Stopped("caches").into());
-        }
-        let has_layers = self.film.layers().len() > 1;
-        let render = tiles::render(self.film, self.settings, self.control, |sample, rng, layers| {
+    }
+
+    /// Adds samples to a film.
+    fn picture(
+        &self,
+        film: &mut Film,
+        caches: &RadianceCaches<'static>,
+        settings: &tiles::Settings,
+    ) -> Result<Outcome, Failure> {
+        let job = self.job;
+        let has_layers = film.layers().len() > 1;
+        let (width, height) = (film.width() as f32, film.height() as f32);
+        Ok(tiles::render(film, settings, job.control, |sample, rng, layers| {
             let world = LitWorld {
-                medium: &CountingMedium { medium, tally: sample.tally },
-                scene: &CountingScene { scene: self.world, tally: sample.tally },
-                lights: self.lights,
+                medium: &CountingMedium { medium: self.medium, tally: sample.tally },
+                scene: &CountingScene { scene: job.world, tally: sample.tally },
+                lights: job.lights,
             };
             let jitter = uniform2(rng);
             let film = Vec2::new((sample.x as f32 + jitter.x) / width, (sample.y as f32 + jitter.y) / height);
-            let ray = self.camera.ray(film);
-            let seen = if self.paths.max_scatterings == 0 {
+            let ray = job.camera.ray(film);
+            let seen = if job.paths.max_scatterings == 0 {
                 CachedRadiance {
-                    emitted: path::radiance(&ray, &world, &self.paths, rng).emitted,
+                    emitted: path::radiance(&ray, &world, &job.paths, rng).emitted,
                     ..CachedRadiance::default()
                 }
-            } else if is_computed(self.plan, sample, width as u32) {
+            } else if is_computed(job.plan, sample, width as u32) {
                 caches.radiance(&ray, &world, rng)
             } else {
                 caches.radiance_beyond(&ray, &world, rng)
@@ -389,7 +450,89 @@ impl WithMedium for CacheJob<'_> {
             } else if let Some(total) = layers.first_mut() {
                 *total = seen.total();
             }
-        })?;
+        })?)
+    }
+
+    /// Pictures of falling error, until the time granted is up or the error asked for is reached: the last that is complete. All time counts.
+    fn timed(&self, time: Duration, spent: &mut Spent) -> Result<Level, Failure> {
+        let (job, clock) = (self.job, Stopwatch::start());
+        let left = || time.saturating_sub(Duration::from_secs_f64(clock.elapsed().wall));
+        let finest = job.arguments.error.unwrap_or(cache::ERROR_BOUNDS[0]);
+        let mut refinement = Refinement::new(finest);
+        let mut film = Film::new(job.film.width(), job.film.height(), job.film.layers())?;
+        let mut best: Option<Level> = None;
+        loop {
+            let (began, error) = (left(), refinement.error());
+            let caches = RadianceCaches::new(job.settings(&self.outline, error));
+            // Without any picture there is nothing to stop for.
+            let filled = self.fill(caches, error, Some(if best.is_some() { began } else { Duration::MAX }), spent);
+            if filled.ending == Ending::Cancelled && best.is_none() {
+                return Err(Stopped("caches").into());
+            }
+            if let Some(mut best) = best.take_if(|_| filled.ending != Ending::Done) {
+                if filled.ending == Ending::Cancelled {
+                    best.render.reason = tiles::Reason::Cancelled;
+                }
+                return Ok(best);
+            }
+            film.clear();
+            let goal = job.settings.goal.or(Some(tiles::Goal { noise: error, least: LEAST_SAMPLES }));
+            let samples = job.settings.samples.min(cache::MOST_SAMPLES);
+            let settings = tiles::Settings { samples, goal, time: Some(left()), ..*job.settings };
+            let render = self.picture(&mut film, &filled.caches, &settings)?;
+            let took = began.saturating_sub(left());
+            let mut level = Level { film: film.clone(), filled, render };
+            if render.reason == tiles::Reason::Cancelled {
+                return Ok(level);
+            }
+            if refinement.advance(took, left()) {
+                best = Some(level);
+                continue;
+            }
+            // Where more is wanted nothing is as good a use of the rest as less noise.
+            let settings = tiles::Settings { time: Some(left()), ..*job.settings };
+            if job.arguments.error.is_none_or(|due| error > due) && !left().is_zero() {
+                let more = self.picture(&mut level.film, &level.filled.caches, &settings)?;
+                let (counters, seconds) = (render.counters + more.counters, render.seconds + more.seconds);
+                level.render = Outcome { counters, seconds, ..more };
+            }
+            return Ok(level);
+        }
+    }
+}
+
+impl WithMedium for CacheJob<'_> {
+    type Output = Result<Cached, Failure>;
+
+    fn with<M: Medium + Sync>(self, medium: &M) -> Self::Output {
+        let world = LitWorld { medium, scene: self.world, lights: self.lights };
+        let outline = self.world.outline(&world);
+        let stages = Stages { job: &self, medium, outline, pool: Threads::new(self.settings.threads)? };
+        let mut spent = Spent::default();
+        let clock = Stopwatch::start();
+        let (mut loaded, asked) = (clock.elapsed(), self.arguments.error());
+        let level = match self.settings.time {
+            Some(time) if !self.arguments.has_files() => stages.timed(time, &mut spent)?,
+            _ => {
+                let caches = self.arguments.load(self.settings(&outline, asked), self.tag)?;
+                loaded = clock.elapsed();
+                let filled = stages.fill(caches, asked, None, &mut spent);
+                let mut film = Film::new(self.film.width(), self.film.height(), self.film.layers())?;
+                if filled.ending == Ending::Cancelled {
+                    self.save(&filled.caches)?;
+                    return Err(Stopped("caches").into());
+                }
+                let render = stages.picture(&mut film, &filled.caches, self.settings)?;
+                Level { film, filled, render }
+            }
+        };
+        drop(stages);
+        let clock = Stopwatch::start();
+        self.save(&level.filled.caches)?;
+        let files = [loaded, clock.elapsed()];
+        let Level { film, filled: Filled { caches, audited, .. }, render } = level;
+        *self.film = film;
+        let Spent { filled, computed } = spent;
         Ok(Cached { caches, filled, computed, files, render, audited })
     }
 }

@@ -46,7 +46,7 @@ use crate::world::{Storage, WithMedium, World, light_tree, view};
 pub struct RenderArguments {
     /// The scene file.
     pub scene: PathBuf,
-    /// How light is computed [default: radiance-cache; path with --time, with a limit on depth, and where only mirrors and glass
+    /// How light is computed [default: radiance-cache; path with a limit on depth, and where only mirrors and glass
     /// scatter light].
     #[arg(long, value_enum)]
     pub method: Option<Method>,
@@ -57,7 +57,7 @@ pub struct RenderArguments {
     /// that of whole passes.
     #[arg(long, value_name = "E", value_parser = output::positive)]
     pub noise: Option<f64>,
-    /// Seconds to render for, on the wall clock.
+    /// Seconds to render for, on the wall clock; radiance caching fills caches for smaller and smaller errors as long as they last.
     #[arg(long, value_name = "SECONDS", value_parser = output::positive)]
     pub time: Option<f64>,
     /// Longest path, as Mitsuba counts: 1 is lights only, 2 adds one scattering [default: what the scene says].
@@ -384,7 +384,7 @@ impl RenderArguments {
     /// Samples of a pixel at most, given what the scene names, and the noise at which fewer are enough.
     fn samples(&self, method: Method, named: u32) -> (u32, Option<f64>) {
         let is_free = self.spp.is_none() && self.time.is_none();
-        let usual = (is_free && method == Method::RadianceCache).then_some(f64::from(self.cache.error));
+        let usual = (is_free && method == Method::RadianceCache).then_some(f64::from(self.cache.error()));
         let samples = match (self.spp, self.time, method) {
             (Some(spp), ..) => spp,
             (None, Some(_), _) => u32::MAX,

@@ -100,8 +100,13 @@ impl Report<'_> {
         eprintln!("{width} x {height} pixels, {} samples per pixel{ending}", self.samples_per_pixel());
         let cpu = cpu.map_or_else(String::new, |c| format!(", {} of processor time", clock(c)));
         eprintln!("{}{cpu}, {:.2} million rays per second", clock(wall), self.rays_per_second() * 1e-6);
-        if let Some(Audited { findings, map, repaired }) = self.audited {
-            let most = self.arguments.cache.error;
+        if let Some(Audited { error: most, findings, map, repaired }) = self.audited {
+            let most = *most;
+            let per_cent = (1e4 * most).round() / 100.0;
+            let due = format!("{per_cent} % {}", if self.is_timed() { "it was made for" } else { "of --error" });
+            if self.is_timed() {
+                eprintln!("made for an error of {per_cent} %; more --time makes it smaller");
+            }
             let in_places = |map: &BiasMap| {
                 map.worst(f64::from(most)).map(|region| {
                     let [columns, rows] = pixels(region, self.size);
@@ -120,14 +125,14 @@ impl Report<'_> {
                 findings.rays,
             );
             if findings.all.exceeds(f64::from(most)) || findings.cached.exceeds(f64::from(most)) {
-                eprintln!("warning: the picture is off by more than the {} % of --error", 100.0 * most);
+                eprintln!("warning: the picture is off by more than the {due}");
             } else if findings.cached.is_unknown() {
                 eprintln!(
                     "warning: how far the picture is off is not known: what is cached, or paths, vary too much; take more --audit rays"
                 );
             }
             if let Some(places) = in_places(map) {
-                eprintln!("warning: off by more than the {} % of --error {places}", 100.0 * most);
+                eprintln!("warning: off by more than the {due} {places}");
             }
         }
         if counters.non_finite > 0 {
@@ -136,6 +141,11 @@ impl Report<'_> {
         for file in self.outputs.iter().chain(&self.arguments.cache.cache_out) {
             eprintln!("wrote {}", file.display());
         }
+    }
+
+    /// Whether time decided what error caches were filled for.
+    fn is_timed(&self) -> bool {
+        self.arguments.time.is_some() && !self.arguments.cache.has_files()
     }
 
     fn rays_per_second(&self) -> f64 {
@@ -177,7 +187,7 @@ impl Report<'_> {
                 recovered.join(", "),
             )
         });
-        let findings = self.audited.map_or_else(String::new, |Audited { findings, map, repaired }| {
+        let findings = self.audited.map_or_else(String::new, |Audited { error: made_for, findings, map, repaired }| {
             let number = |x: f64| if x.is_finite() { format!("{x:.6e}") } else { "null".to_owned() };
             let entry = |name: &str, found: &Deviation| {
                 format!("{}: {{\"bias\": {}, \"error\": {}}}", quoted(name), number(found.bias), number(found.error))
@@ -203,7 +213,7 @@ impl Report<'_> {
             let regions: Vec<String> = regions.collect();
             let map = format!("{{\"side\": {}, \"by_row\": [{}]}}", map.side(), regions.join(", "));
             let (rays, all, repaired) = (findings.rays, entries(findings), repaired.join(", "));
-            format!("\"audit\": {{\"rays\": {rays}, {all}, \"repaired\": [{repaired}], \"regions\": {map}}},\n  ")
+            format!("\"audit\": {{\"made_for\": {made_for}, \"rays\": {rays}, {all}, \"repaired\": [{repaired}], \"regions\": {map}}},\n  ")
         });
         let (bytes, records) = (listed(&self.statistics.bytes), listed(&self.statistics.records));
         let instead = self.choice.instead.as_ref();
