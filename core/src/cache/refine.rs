@@ -92,16 +92,15 @@ mod tests {
         for time in [1.0, 2.0, 5.0, 10.0, 30.0, 100.0, 1000.0] {
             let cost = |error: f32| 0.5 + 1e-3 / f64::from(error * error);
             let mut refinement = Refinement::new(1e-3);
-            let (mut now, mut useful) = (0.0, 0.0);
-            loop {
+            let mut now = 0.0;
+            let useful = loop {
                 let took = cost(refinement.error());
                 now += took;
                 assert!(now <= time, "{time}: {refinement:?} is late at {now}");
-                useful = took;
                 if !refinement.advance(Duration::from_secs_f64(took), Duration::from_secs_f64(time - now)) {
-                    break;
+                    break took;
                 }
-            }
+            };
             assert!(useful > 0.5 * now && useful > 0.1 * time, "{useful} of {now} of {time}");
             assert!(refinement.error() <= last);
             last = refinement.error();

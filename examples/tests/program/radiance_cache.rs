@@ -153,7 +153,10 @@ fn every_picture_from_caches_says_how_far_it_is_off() {
         let output = folder.run(&[&common[..], &walks, &["--stats", "s.json"], options].concat());
         assert_eq!(output.status.code(), Some(0), "{options:?}: {}", said(&output));
         let statistics = std::fs::read_to_string(folder.0.join("s.json")).unwrap();
-        let audit = statistics.lines().find(|line| line.contains("\"audit\": {\"rays\"")).map(str::to_owned);
+        let audit = statistics
+            .lines()
+            .find(|line| line.contains("\"audit\": {\"made_for\": 0.02, \"rays\""))
+            .map(str::to_owned);
         (said(&output), audit, std::fs::read(folder.0.join("a.pfm")).unwrap())
     };
     let (told, audit, image) = render(&["--threads", "1"]);
@@ -200,7 +203,7 @@ fn caching_is_what_is_taken_unless_something_speaks_against_it() {
         (&foggy, &["--max-depth", "3"], &[traced, "not of at most 3"]),
         (&foggy, &["--max-depth", "2"], &[traced, "nothing is left to cache of paths of depth 2"]),
         (&foggy, &["--max-depth", "1"], &[traced, "nothing is left to cache of paths of depth 1"]),
-        (&foggy, &["--time", "0.1"], &[traced, "--time would only count"]),
+        (&foggy, &["--time", "0.1"], &[cached]),
         (&polished, &[], &[traced, "but mirrors and glass"]),
     ];
     for (world, options, words) in cases {
