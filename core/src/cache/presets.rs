@@ -18,7 +18,7 @@ pub(super) const WALKS: u32 = 512;
 /// Directions of the other kinds, as a share of [`WALKS`]. Light of surfaces varies least from direction to direction; of single
 /// scattering only lights with extent need any.
 const SHARES: [(Kind, f64); 4] =
-    [(Kind::Single, 1.0 / 64.0), (Kind::Surface, 0.25), (Kind::Multiple, 1.0), (Kind::Irradiance, 0.5)];
+    [(Kind::Single, 1.0 / 64.0), (Kind::Surface, 0.25), (Kind::Multiple, 1.0), (Kind::Irradiance, 1.0)];
 
 /// `ε` of Eq. 34 for single scattering, light of surfaces, multiple scattering, and irradiance. Larger: borders of shadows blur, corners turn too
 /// bright, light that falls off like 1/r is carried too far. Smaller: records, and time, by the square.
@@ -53,8 +53,8 @@ const PHOTONS: u32 = 1 << 20;
 /// See [`PHOTONS`].
 const FLIGHTS: f64 = 3e7;
 
-/// Photons that know the light of a cell: 9 % of noise, of which a walk meets a mean over many cells.
-const ENOUGH: u32 = 128;
+/// Photons that know the light of a cell: 7 % of noise, of which a walk meets a mean over many cells.
+const ENOUGH: u32 = 192;
 
 /// Photons are as many times as many as what cells say of one direction varies more than their fluence does, over this. Less: time; more:
 /// clouds of noise where scattering is sharp, which all records of a place share.
@@ -132,6 +132,10 @@ impl PhotonEffort {
         }
     }
 }
+
+/// Part of the error asked for that noise of pixels may take; in the sum of squares the rest is for what caches have wrong. Larger: pictures miss the
+/// error asked for; smaller: samples, by the square.
+pub const PIXEL_NOISE: f32 = 0.9;
 
 /// The most samples per pixel for that. More: time at edges between black and a lamp, where noise falls no faster; fewer: jagged edges.
 pub const MOST_SAMPLES: u32 = 256;
