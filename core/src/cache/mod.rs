@@ -90,7 +90,7 @@ pub use kind::Kind;
 pub use lookup::{Basis, Reading, TURNING_DEGREE, TurningBasis};
 pub use memory::{Estimate, FilledRecords, FillingMemory};
 pub use photons::{PhotonCell, PhotonDeposit, PhotonEffort, PhotonGrid};
-pub use presets::{ERROR_BOUNDS, MOST_REPAIRS, MOST_SAMPLES, PIXEL_NOISE, USUAL_ERROR};
+pub use presets::{ERROR_BOUNDS, MOST_REPAIRS, MOST_SAMPLES, USUAL_ERROR};
 pub use radius::{Limits, clamp_gradient, clearance, log_gradient_radius, neighbour_clamped, valid_radius};
 pub use readers::ScatteredLight;
 pub use record::{Attachment, Facing, Record};

@@ -18,7 +18,7 @@ pub(super) const WALKS: u32 = 512;
 /// Directions of the other kinds, as a share of [`WALKS`]. Light of surfaces varies least from direction to direction; of single
 /// scattering only lights with extent need any.
 const SHARES: [(Kind, f64); 4] =
-    [(Kind::Single, 1.0 / 64.0), (Kind::Surface, 0.25), (Kind::Multiple, 1.0), (Kind::Irradiance, 1.0)];
+    [(Kind::Single, 1.0 / 64.0), (Kind::Surface, 0.25), (Kind::Multiple, 1.0), (Kind::Irradiance, 0.75)];
 
 /// `ε` of Eq. 34 for single scattering, light of surfaces, multiple scattering, and irradiance. Larger: borders of shadows blur, corners turn too
 /// bright, light that falls off like 1/r is carried too far. Smaller: records, and time, by the square.
@@ -132,10 +132,6 @@ impl PhotonEffort {
         }
     }
 }
-
-/// Part of the error asked for that noise of pixels may take; in the sum of squares the rest is for what caches have wrong. Larger: pictures miss the
-/// error asked for; smaller: samples, by the square.
-pub const PIXEL_NOISE: f32 = 0.9;
 
 /// The most samples per pixel for that. More: time at edges between black and a lamp, where noise falls no faster; fewer: jagged edges.
 pub const MOST_SAMPLES: u32 = 256;

@@ -18,7 +18,8 @@ pub const MOST_SAMPLES: u32 = 65536;
 /// ‖error‖ / √(mean² + (0.1 mean of the picture)²) ≤ noise,   root mean square over the pixels of the tile
 /// ```
 ///
-/// of layer 0, mean of the channels. The error is told by how far the mean of `m` samples lies from that of
+/// of layer 0, mean of the channels; and the same of the pixels' light together, `√Σ error²/√Σ (mean² + …)`, so that a few bright pixels are not lost
+/// among dark ones. The error is told by how far the mean of `m` samples lies from that of
 /// the `n` before them, times `√(nm)/(n + m)`. For independent samples that is exact in the mean square. Of an even sequence,
 /// as one of low discrepancy, the halves differ by more than that: if doubling divides the variance `V` by `q`, then
 ///
@@ -166,12 +167,17 @@ impl<'s> Noise<'s> {
         let floor = FLOOR * total.abs() / pixels.len().max(1) as f64;
         let of = |tile: &TileNoise| &pixels[tile.pixels[0] as usize..tile.pixels[1] as usize];
         let noise_of = |tile: &TileNoise| {
-            let of_pixel = |pixel: &PixelNoise| match pixel.error_squared() {
-                0.0 => 0.0,
-                error => error / (pixel.after.mean() * pixel.after.mean() + floor * floor),
-            };
-            let pixels = of(tile);
-            pixels.iter().map(of_pixel).sum::<f64>() / pixels.len().max(1) as f64
+            let (mut shares, mut errors, mut light) = (0.0, 0.0, 0.0);
+            for pixel in of(tile) {
+                let (error, here) = (pixel.error_squared(), pixel.after.mean() * pixel.after.mean() + floor * floor);
+                light += here;
+                if error > 0.0 {
+                    (shares, errors) = (shares + error / here, errors + error);
+                }
+            }
+            // Of what is bright, and of all pixels alike.
+            let by_light = if errors > 0.0 { errors / light } else { 0.0 };
+            f64::max(shares / of(tile).len().max(1) as f64, by_light)
         };
         let (mut last, mut now) = (0.0, 0.0);
         for tile in self.tiles.as_mut_slice().iter_mut().filter(|tile| !tile.is_enough) {
@@ -227,6 +233,21 @@ mod tests {
         let noise = libm::sqrtf((0.04_f32 + 0.01) / 2.0 / 1.01);
         assert_eq!(of(noise * 1.0001), (false, true));
         assert_eq!(of(noise * 0.9999), (false, false));
+    }
+
+    /// Three dark pixels without noise and a bright one: by pixels alike the noise is a half of its own, by light nearly all of it.
+    #[test]
+    fn a_bright_pixel_is_not_lost_among_dark_ones() {
+        let is_enough = |noise| {
+            let mut all = self::noise(Goal { noise, least: 8 }, &[4]);
+            pass(&mut all, 0, &[(1.0, 1.0), (1.0, 1.0), (1.0, 1.0), (9.0, 11.0)]);
+            all.judge(8)
+        };
+        // The error is 1 of 10; the mean of all pixels 3.25.
+        let floor = 0.01 * 3.25 * 3.25_f32;
+        let (alike, by_light) = (libm::sqrtf(1.0 / (100.0 + floor) / 4.0), libm::sqrtf(1.0 / (103.0 + 4.0 * floor)));
+        assert!(by_light > 1.9 * alike);
+        assert!(is_enough(by_light * 1.0001) && !is_enough(by_light * 0.9999));
     }
 
     #[test]

@@ -476,8 +476,7 @@ impl<M: Medium + Sync> Stages<'_, '_, M> {
                 return Ok(best);
             }
             film.clear();
-            let goal =
-                job.settings.goal.or(Some(tiles::Goal { noise: cache::PIXEL_NOISE * error, least: LEAST_SAMPLES }));
+            let goal = job.settings.goal.or(Some(tiles::Goal { noise: error, least: LEAST_SAMPLES }));
             let samples = job.settings.samples.min(cache::MOST_SAMPLES);
             let settings = tiles::Settings { samples, goal, time: Some(left()), ..*job.settings };
             let render = self.picture(&mut film, &filled.caches, &settings)?;

@@ -384,8 +384,7 @@ impl RenderArguments {
     /// Samples of a pixel at most, given what the scene names, and the noise at which fewer are enough.
     fn samples(&self, method: Method, named: u32) -> (u32, Option<f64>) {
         let is_free = self.spp.is_none() && self.time.is_none();
-        let usual =
-            (is_free && method == Method::RadianceCache).then_some(f64::from(cache::PIXEL_NOISE * self.cache.error()));
+        let usual = (is_free && method == Method::RadianceCache).then_some(f64::from(self.cache.error()));
         let samples = match (self.spp, self.time, method) {
             (Some(spp), ..) => spp,
             (None, Some(_), _) => u32::MAX,
