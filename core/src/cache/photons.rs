@@ -3,6 +3,8 @@
 //! Walks from a point to the lights are long where fog is dense, and rarely find light where it is dark. Photons bring the light of whole
 //! paths, wherever it goes, at the cost of one walk for all the cells it passes. A cell's light is a mean over its volume, too
 //! coarse for a picture, but what is gathered from many cells some scatterings away is neither blurred nor noisy.
+//!
+//! Where walks may end is decided by photons that are only counted (decision 56).
 
 use super::lookup::{TURNING_DEGREE, TurningBasis};
 use crate::host::{Medium, Properties, Scene};
