@@ -476,9 +476,8 @@ impl<M: Medium + Sync> Stages<'_, '_, M> {
                 return Ok(best);
             }
             film.clear();
-            let goal = job.settings.goal.or(Some(tiles::Goal { noise: error, least: LEAST_SAMPLES }));
-            let samples = job.settings.samples.min(cache::MOST_SAMPLES);
-            let settings = tiles::Settings { samples, goal, time: Some(left()), ..*job.settings };
+            // Of a picture that a better one may replace, one sample of each pixel will do.
+            let settings = tiles::Settings { samples: 1, goal: None, time: Some(left()), ..*job.settings };
             let render = self.picture(&mut film, &filled.caches, &settings)?;
             let took = began.saturating_sub(left());
             let mut level = Level { film: film.clone(), filled, render };
@@ -489,9 +488,13 @@ impl<M: Medium + Sync> Stages<'_, '_, M> {
                 best = Some(level);
                 continue;
             }
-            // Where more is wanted nothing is as good a use of the rest as less noise.
-            let settings = tiles::Settings { time: Some(left()), ..*job.settings };
-            if job.arguments.error.is_none_or(|due| error > due) && !left().is_zero() {
+            // Nothing is as good a use of the rest as less noise; down to the error asked for, if that is what caches are filled for.
+            let is_due = job.arguments.error.is_some_and(|due| error <= due);
+            let usual = is_due.then_some(tiles::Goal { noise: error, least: LEAST_SAMPLES });
+            let samples = job.settings.samples.min(if is_due { cache::MOST_SAMPLES } else { u32::MAX });
+            let goal = job.settings.goal.or(usual);
+            let settings = tiles::Settings { samples, goal, time: Some(left()), ..*job.settings };
+            if !left().is_zero() {
                 let more = self.picture(&mut level.film, &level.filled.caches, &settings)?;
                 let (counters, seconds) = (render.counters + more.counters, render.seconds + more.seconds);
                 level.render = Outcome { counters, seconds, ..more };
