@@ -10,7 +10,7 @@ const FIRST_ERROR: f32 = 0.16;
 const LONGER: f64 = 1.5;
 
 /// By how much that grows from halving to halving: what does not depend on the error counts less and less. Larger: time is left; smaller: as above.
-const STEEPER: f64 = 1.6;
+const STEEPER: f64 = 2.0;
 
 /// Most that it grows to: noise goes with the root of time.
 const LONGEST: f64 = 4.0;
@@ -19,7 +19,7 @@ const LONGEST: f64 = 4.0;
 const HALVINGS: i32 = 2;
 
 /// Share of the time left that a next picture may be foretold to take.
-const TIMELY: f64 = 0.85;
+const TIMELY: f64 = 0.8;
 
 /// Pictures of falling error, one after the other: each is filled caches for half the error of the one before, or a quarter, if that is
 /// foretold to be done in time. As time goes with the square of the error, all before the last take a part of its time.
@@ -30,7 +30,7 @@ const TIMELY: f64 = 0.85;
 /// let mut refinement = Refinement::new(ERROR_BOUNDS[0]);
 /// assert_eq!(refinement.error(), 0.16);
 /// // Fill caches with settings for this error and make a picture: one second. Ten are left, and a picture of half the error would
-/// // take two, of a quarter some six.
+/// // take one and a half, of a quarter some four or five.
 /// let seconds = Duration::from_secs;
 /// assert!(refinement.advance(seconds(1), seconds(10)));
 /// assert_eq!(refinement.error(), 0.04);

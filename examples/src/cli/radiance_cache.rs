@@ -498,6 +498,8 @@ impl<M: Medium + Sync> Stages<'_, '_, M> {
                 let more = self.picture(&mut level.film, &level.filled.caches, &settings)?;
                 let (counters, seconds) = (render.counters + more.counters, render.seconds + more.seconds);
                 level.render = Outcome { counters, seconds, ..more };
+            } else {
+                level.render.reason = tiles::Reason::TimeUp;
             }
             return Ok(level);
         }
