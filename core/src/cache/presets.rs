@@ -56,6 +56,9 @@ const FLIGHTS: f64 = 3e7;
 /// Photons that know the light of a cell: 7 % of noise, of which a walk meets a mean over many cells.
 const ENOUGH: u32 = 192;
 
+/// The same at least, of rough pictures. Fewer: few cells are known, and walks, which then go on, take longer than the photons; more: time.
+const FEWEST: f64 = 24.0;
+
 /// Photons are as many times as many as what cells say of one direction varies more than their fluence does, over this. Less: time; more:
 /// clouds of noise where scattering is sharp, which all records of a place share.
 const EVEN: f32 = 2.0;
@@ -172,6 +175,7 @@ impl Settings {
         let error = error.clamp(ERROR_BOUNDS[0], ERROR_BOUNDS[1]);
         let scale = error / USUAL_ERROR;
         let coarser = float::sqrt(scale).min(COARSEST);
+        // Noise of rough pictures hides small things: the least radius and what counts as noise of samples grow without a bound.
         let rougher = float::sqrt(scale).max(1.0);
         let walks = (f64::from(WALKS) / f64::from(scale * scale)) as u32;
         let size = outline.bounds.size().max_element();
@@ -282,7 +286,7 @@ fn photons(outline: &Outline, scale: f32) -> PhotonEffort {
         degree,
         paths: (f64::from(PHOTONS) * finer) as u32,
         flights: (FLIGHTS * finer) as u64,
-        enough: ((f64::from(ENOUGH) * finer).max(24.0) * sharper) as u32,
+        enough: ((f64::from(ENOUGH) * finer).max(FEWEST) * sharper) as u32,
     }
 }
 

@@ -291,6 +291,9 @@ pub(crate) struct Audited {
     pub(crate) repaired: Vec<(Findings, Box<BiasMap>)>,
 }
 
+/// Share of the time left that a finer fill is granted: one foretold to be done in it may take longer.
+const TIMELY: f64 = 0.9;
+
 /// Share of the time of a fill that its audit may take where time is limited.
 const AUDIT_SHARE: f64 = 0.05;
 
@@ -338,6 +341,7 @@ impl CacheJob<'_> {
 
 /// A picture and what it is made for, where time is limited.
 struct Level {
+    error: f32,
     film: Film,
     filled: Filled,
     render: Outcome,
@@ -459,50 +463,44 @@ impl<M: Medium + Sync> Stages<'_, '_, M> {
         let left = || time.saturating_sub(Duration::from_secs_f64(clock.elapsed().wall));
         let finest = job.arguments.error.unwrap_or(cache::ERROR_BOUNDS[0]);
         let mut refinement = Refinement::new(finest);
-        let mut film = Film::new(job.film.width(), job.film.height(), job.film.layers())?;
         let mut best: Option<Level> = None;
-        loop {
+        let mut level = loop {
             let (began, error) = (left(), refinement.error());
             let caches = RadianceCaches::new(job.settings(&self.outline, error));
-            // Without any picture there is nothing to stop for.
-            let filled = self.fill(caches, error, Some(if best.is_some() { began } else { Duration::MAX }), spent);
-            if filled.ending == Ending::Cancelled && best.is_none() {
-                return Err(Stopped("caches").into());
+            // Without any picture there is nothing to stop for; what takes longer than foretold leaves some time to the one there is.
+            let granted = if best.is_some() { began.mul_f64(TIMELY) } else { Duration::MAX };
+            let filled = self.fill(caches, error, Some(granted), spent);
+            if filled.ending != Ending::Done {
+                break best.ok_or(Stopped("caches"))?;
             }
-            if let Some(mut best) = best.take_if(|_| filled.ending != Ending::Done) {
-                if filled.ending == Ending::Cancelled {
-                    best.render.reason = tiles::Reason::Cancelled;
-                }
-                return Ok(best);
-            }
-            film.clear();
+            let mut film = Film::new(job.film.width(), job.film.height(), job.film.layers())?;
             // Of a picture that a better one may replace, one sample of each pixel will do.
             let settings = tiles::Settings { samples: 1, goal: None, time: Some(left()), ..*job.settings };
             let render = self.picture(&mut film, &filled.caches, &settings)?;
-            let took = began.saturating_sub(left());
-            let mut level = Level { film: film.clone(), filled, render };
-            if render.reason == tiles::Reason::Cancelled {
-                return Ok(level);
+            let level = Level { error, film, filled, render };
+            if render.reason == tiles::Reason::Cancelled || !refinement.advance(began.saturating_sub(left()), left()) {
+                break level;
             }
-            if refinement.advance(took, left()) {
-                best = Some(level);
-                continue;
-            }
-            // Nothing is as good a use of the rest as less noise; down to the error asked for, if that is what caches are filled for.
-            let is_due = job.arguments.error.is_some_and(|due| error <= due);
-            let usual = is_due.then_some(tiles::Goal { noise: error, least: LEAST_SAMPLES });
-            let samples = job.settings.samples.min(if is_due { cache::MOST_SAMPLES } else { u32::MAX });
-            let goal = job.settings.goal.or(usual);
-            let settings = tiles::Settings { samples, goal, time: Some(left()), ..*job.settings };
-            if !left().is_zero() {
-                let more = self.picture(&mut level.film, &level.filled.caches, &settings)?;
-                let (counters, seconds) = (render.counters + more.counters, render.seconds + more.seconds);
-                level.render = Outcome { counters, seconds, ..more };
-            } else {
-                level.render.reason = tiles::Reason::TimeUp;
-            }
+            best = Some(level);
+        };
+        if job.control.is_cancelled() {
+            level.render.reason = tiles::Reason::Cancelled;
             return Ok(level);
         }
+        if left().is_zero() {
+            level.render.reason = tiles::Reason::TimeUp;
+            return Ok(level);
+        }
+        // Nothing is as good a use of the rest as less noise; down to the error asked for, if that is what caches are filled for.
+        let is_due = job.arguments.error.is_some_and(|due| level.error <= due);
+        let usual = is_due.then_some(tiles::Goal { noise: level.error, least: LEAST_SAMPLES });
+        let samples = job.settings.samples.min(if is_due { cache::MOST_SAMPLES } else { u32::MAX });
+        let goal = job.settings.goal.or(usual);
+        let settings = tiles::Settings { samples, goal, time: Some(left()), ..*job.settings };
+        let more = self.picture(&mut level.film, &level.filled.caches, &settings)?;
+        let (counters, seconds) = (level.render.counters + more.counters, level.render.seconds + more.seconds);
+        level.render = Outcome { counters, seconds, ..more };
+        Ok(level)
     }
 }
 
@@ -528,14 +526,14 @@ impl WithMedium for CacheJob<'_> {
                     return Err(Stopped("caches").into());
                 }
                 let render = stages.picture(&mut film, &filled.caches, self.settings)?;
-                Level { film, filled, render }
+                Level { error: asked, film, filled, render }
             }
         };
         drop(stages);
         let clock = Stopwatch::start();
         self.save(&level.filled.caches)?;
         let files = [loaded, clock.elapsed()];
-        let Level { film, filled: Filled { caches, audited, .. }, render } = level;
+        let Level { film, filled: Filled { caches, audited, .. }, render, .. } = level;
         *self.film = film;
         let Spent { filled, computed } = spent;
         Ok(Cached { caches, filled, computed, files, render, audited })
