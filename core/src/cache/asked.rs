@@ -68,6 +68,11 @@ impl<F: Fn([f32; 2]) -> Ray> Asked<F> {
         crc.value()
     }
 
+    /// Where on the film ray number `number` of a view begins.
+    pub(super) fn at(number: u32) -> [f32; 2] {
+        even2(number + 1)
+    }
+
     /// Calls `visit(place, distance of the eye)` for the places that ray number `number` asks for.
     pub(super) fn visit<M: Medium + ?Sized, S: Scene + ?Sized>(
         &self,
@@ -79,7 +84,7 @@ impl<F: Fn([f32; 2]) -> Ray> Asked<F> {
         let mut rng = Generator::new(mix(settings.seed ^ 0x70_1a_ce) ^ u64::from(number));
         match self {
             Self::View { ray, .. } => {
-                let ray = ray(even2(number + 1));
+                let ray = ray(Self::at(number));
                 places(&ray, world, &settings.eye, &mut rng, |place| visit(place, place.point.distance(ray.origin)));
             }
             Self::Box(bounds) => {

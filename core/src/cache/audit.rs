@@ -287,18 +287,18 @@ where
             let [all, truth] = [told.total(), truth].map(|light| f64::from(light.mean()));
             output.truth += truth;
             output.all += all - truth;
-            let mut off = 0.0;
-            for ((kind, sum), (told, known)) in
-                Kind::FINAL.into_iter().zip(&mut output.parts).zip(by_kind(&told).into_iter().zip(by_kind(&known)))
+            let mut parts = [0.0; 4];
+            for ((kind, part), (told, known)) in
+                Kind::FINAL.into_iter().zip(&mut parts).zip(by_kind(&told).into_iter().zip(by_kind(&known)))
             {
                 // Both estimate what is not cached, each with noise of its own.
                 if settings.effort(kind).is_some() {
-                    let difference = f64::from(told.mean()) - f64::from(known.mean());
-                    *sum += difference;
-                    off += difference;
+                    *part = f64::from(told.mean()) - f64::from(known.mean());
                 }
             }
-            output.samples[output.rays as usize] = Sample { at, told: all, traced: truth, cached: off };
+            output.parts.iter_mut().zip(parts).for_each(|(sum, part)| *sum += part);
+            let cached = parts.iter().sum();
+            output.samples[output.rays as usize] = Sample { at, told: all, traced: truth, cached, parts };
             output.rays += 1;
         }
     }

@@ -1,5 +1,7 @@
 //! Tests of audits: of caches that are right, and of caches that are broken on purpose.
 
+use alloc::vec::Vec;
+
 use super::slot::Slot;
 use super::{
     Asked, Audit, AuditedRegion, BiasMap, Compared, Findings, Kind, MOST_REPAIRS, RadianceCaches, Record, Settings,
@@ -33,7 +35,8 @@ fn mapped(
     change: impl Fn(Settings) -> Settings,
     spoil: impl Fn(&mut RadianceCaches<'_>),
 ) -> (Findings, BiasMap) {
-    repaired([0.2, 1.8], (lights, rays), change, spoil, 0)
+    let (findings, map, _) = repaired([0.2, 1.8], (lights, rays), change, spoil, 0);
+    (findings, map)
 }
 
 /// The same, in fog that absorbs and scatters so much (m⁻¹), after so many repairs, if as many are called for.
@@ -41,9 +44,9 @@ fn repaired(
     [absorption, scattering]: [f32; 2],
     (lights, rays): (&[Light<'_>], u32),
     change: impl Fn(Settings) -> Settings,
-    spoil: impl Fn(&mut RadianceCaches<'_>),
+    spoil: impl FnOnce(&mut RadianceCaches<'_>),
     repairs: u32,
-) -> (Findings, BiasMap) {
+) -> (Findings, BiasMap, RadianceCaches<'static>) {
     let fog = Homogeneous::new(Spectrum::splat(absorption), Spectrum::splat(scattering), Phase::ISOTROPIC).unwrap();
     let ball = Placed::new(fog, Region::sphere(Vec3::ZERO, 1.0).unwrap());
     let world = World { medium: &ball, scene: &crate::host::Empty, lights: lights.into() };
@@ -62,8 +65,8 @@ fn repaired(
         let mut audit = Audit::new(&caches, camera, rays);
         finish(&mut audit, &world, &mut Compared::default());
         let (findings, map) = (audit.findings(), audit.map());
-        if left == 0 || !caches.drop_wrong(&findings, &map, USUAL_ERROR) {
-            return (findings, map);
+        if left == 0 || !caches.drop_wrong((&findings, &map), USUAL_ERROR, camera, &world) {
+            return (findings, map, caches);
         }
         caches = fill(caches);
     }
@@ -129,14 +132,37 @@ fn nothing_compared_says_nothing() {
     assert!(!found.all.exceeds(0.0));
 }
 
+fn in_corner(record: &Record) -> bool {
+    record.position.x.min(record.position.y) > 0.2
+}
+
+fn spoil_corner(caches: &mut RadianceCaches<'_>) {
+    for kind in [Kind::Multiple, Kind::Surface] {
+        each(caches, kind, |record| if in_corner(&record) { times(record, 1.5) } else { record });
+    }
+}
+
+#[test]
+fn what_is_wrong_in_a_corner_is_made_anew_there_and_nowhere_else() {
+    let mut before = Vec::new();
+    let spoil = |caches: &mut RadianceCaches<'_>| {
+        spoil_corner(caches);
+        before.extend_from_slice(caches.records(Kind::Multiple));
+    };
+    let (found, map, caches) = repaired([0.2, 1.8], (&within(), 2 * COMPARED), |settings| settings, spoil, 1);
+    assert!(!found.cached.exceeds(0.02) && map.worst(0.02).is_none(), "{found:?} {:?}", map.worst(0.02));
+    let after = caches.records(Kind::Multiple);
+    // Most of what was wrong is gone, and most of the rest is not.
+    let kept = |wrong: bool| {
+        let all: Vec<_> = before.iter().filter(|record| in_corner(record) == wrong).collect();
+        all.iter().filter(|record| after.contains(record)).count() as f32 / all.len() as f32
+    };
+    assert!(kept(true) < 0.25 && kept(false) > 0.5, "{} {}", kept(true), kept(false));
+}
+
 #[test]
 fn what_is_wrong_in_a_corner_is_found_there_and_nowhere_else() {
-    let in_corner = |record: &Record| record.position.x.min(record.position.y) > 0.2;
-    let spoil = |caches: &mut RadianceCaches<'_>| {
-        for kind in [Kind::Multiple, Kind::Surface] {
-            each(caches, kind, |record| if in_corner(&record) { times(record, 1.5) } else { record });
-        }
-    };
+    let spoil = spoil_corner;
     let (_, map) = mapped(&within(), 2 * COMPARED, |settings| settings, spoil);
     assert_eq!(map.side(), 8);
     for region in map.regions() {
@@ -186,7 +212,7 @@ fn verdict(broken: Option<Broken>, repairs: u32) -> (bool, bool) {
         }
         Some(Broken::Tolerance | Broken::Walks) | None => {}
     };
-    let (found, map) = repaired([0.2, 1.8], (&lights, 2 * COMPARED), change, spoil, repairs);
+    let (found, map, _) = repaired([0.2, 1.8], (&lights, 2 * COMPARED), change, spoil, repairs);
     let most = f64::from(USUAL_ERROR);
     (found.cached.exceeds(most), map.worst(most).is_some())
 }

@@ -1,10 +1,11 @@
 //! All caches of a world together.
 
+use super::asked::Asked;
 use super::audit::Findings;
-use super::bias_map::BiasMap;
+use super::bias_map::{Apart, BiasMap};
 use super::eye::{CachedRadiance, Caches, Reader, radiance, radiance_beyond};
 use super::kind::Kind;
-use super::presets::finer_by;
+use super::presets::{BLAMED, finer_by};
 use super::record::Record;
 use super::room::{chunks_of, stride_of};
 use super::settings::Settings;
@@ -226,50 +227,67 @@ impl RadianceCaches<'_> {
         radiance_beyond(ray, &self.estimator(world), &self.reader(), &self.settings.eye, rng)
     }
 
-    /// Drops all records of the kinds that an [`Audit`](super::Audit) has found off by certainly more than `error`, and of those that these were
-    /// made from, to be made anew by the next fill: finer by what they are off, with four times the samples. If what is cached is off as a whole or
-    /// in places, and no kind is to blame, all are dropped. Returns whether any were.
+    /// Drops the records that an [`Audit`](super::Audit) has found off by certainly more than `error`, to be made anew by the next fill: finer by
+    /// what they are off, with four times the samples. If regions are off, and the others together are not, those go that are seen in them along
+    /// `ray`, of the kinds that are off there; else all of the kinds that are to blame, or of every kind if none is alone. Returns whether any were
+    /// dropped.
     ///
     /// What finer records do not mend (walks that are cut, lights without surfaces) stays as it is: audit again, and say so.
     ///
     /// ```
     /// # #[cfg(feature = "alloc")] {
     /// use fogbow::{cache::{Audit, RadianceCaches, Settings}, math::{Ray, Vec3}};
+    /// # use fogbow::{host::Empty, world::World};
+    /// # let world = World { medium: &Empty, scene: &Empty, lights: (&[]).into() };
     /// let mut caches = RadianceCaches::new(Settings::default());
+    /// let ray = |_| Ray::new(Vec3::ZERO, Vec3::Z);
     /// // Nothing was compared: nothing is wrong.
-    /// let audit = Audit::new(&caches, |_| Ray::new(Vec3::ZERO, Vec3::Z), 64);
+    /// let audit = Audit::new(&caches, ray, 64);
     /// let (findings, map) = (audit.findings(), audit.map());
-    /// assert!(!caches.drop_wrong(&findings, &map, 0.02));
+    /// assert!(!caches.drop_wrong((&findings, &map), 0.02, ray, &world));
     /// # }
     /// ```
-    pub fn drop_wrong(&mut self, findings: &Findings, map: &BiasMap, error: f32) -> bool {
+    pub fn drop_wrong<M: Medium + ?Sized, S: Scene + ?Sized>(
+        &mut self,
+        (findings, map): (&Findings, &BiasMap),
+        error: f32,
+        ray: impl Fn([f32; 2]) -> Ray,
+        world: &World<'_, M, S>,
+    ) -> bool {
         let most = f64::from(error);
-        let is_cached = |kind: &Kind| self.settings.effort(*kind).is_some();
-        let to_blame = |kind: Kind| findings.of(kind).is_some_and(|found| found.exceeds(most));
-        let in_places = || map.worst(most).map(|region| region.cached);
-        let off_together = Some(findings.cached).filter(|found| found.exceeds(most)).or_else(in_places);
-        let none_alone = !Kind::FINAL.into_iter().any(to_blame);
-        let mut wrong = ByKind([None; Kind::COUNT]);
-        for kind in Kind::FINAL.into_iter().filter(is_cached) {
-            wrong[kind] = match findings.of(kind).filter(|_| to_blame(kind)) {
-                Some(found) => Some(found),
-                None => off_together.filter(|_| none_alone),
-            };
-        }
+        let to_blame = |kind: Kind| findings.of(kind).filter(|found| found.exceeds(most));
+        let none_alone = Kind::FINAL.into_iter().all(|kind| to_blame(kind).is_none());
+        let together = Some(findings.cached).filter(|found| found.exceeds(most));
+        let apart = map.apart(most);
+        let places = apart.filter(|apart| !apart.rest.exceeds(most)).and_then(|apart| Some((apart, map.worst(most)?)));
         let mut any = false;
-        for kind in Kind::FINAL {
-            let Some(found) = wrong[kind] else { continue };
+        for (kind, number) in Kind::FINAL.into_iter().zip(0..) {
+            let found = match places {
+                Some((Apart { parts, .. }, worst)) => Some(worst.cached).filter(|_| parts[number].abs() > BLAMED),
+                None => {
+                    if none_alone {
+                        together
+                    } else {
+                        to_blame(kind)
+                    }
+                }
+            };
+            let Some(found) = found.filter(|_| self.settings.effort(kind).is_some()) else { continue };
             any = true;
+            match places {
+                Some(_) => self.doubt_seen(kind, |at| map.at(at).is_off(most, map.regions().len() as u32), &ray, world),
+                None => self.forget(kind),
+            }
+            // What is off everywhere may be so because of what lights it.
+            if matches!(kind, Kind::Surface | Kind::Irradiance) && places.is_none() {
+                self.forget(Kind::CoarseIrradiance);
+            }
             let finer = finer_by(most, found.bias);
             if let Some(effort) = self.settings.effort_mut(kind) {
                 *effort = effort.finer(finer);
             }
             if let Some(photons) = self.settings.photons.as_mut().filter(|_| kind == Kind::Multiple) {
                 *photons = photons.finer();
-            }
-            self.forget(kind);
-            if matches!(kind, Kind::Surface | Kind::Irradiance) {
-                self.forget(Kind::CoarseIrradiance);
             }
         }
         if any {
@@ -282,6 +300,26 @@ impl RadianceCaches<'_> {
     fn forget(&mut self, kind: Kind) {
         self.slots[kind].clear();
         self.settled[kind] = 0;
+    }
+
+    /// Drops the records of a kind that reach what eye rays at points of the picture that are `wrong` ask for.
+    fn doubt_seen<M: Medium + ?Sized, S: Scene + ?Sized>(
+        &mut self,
+        kind: Kind,
+        wrong: impl Fn([f32; 2]) -> bool,
+        ray: impl Fn([f32; 2]) -> Ray,
+        world: &World<'_, M, S>,
+    ) {
+        let (settings, slot) = (&self.settings, &mut self.slots[kind]);
+        let asked = Asked::View { ray, pixel: 0.0 };
+        for number in (0..settings.rays).filter(|number| wrong(Asked::<fn([f32; 2]) -> Ray>::at(*number))) {
+            asked.visit(number, world, settings, |place, _| {
+                if place.is_seen && kind.row().places.hold(&place) {
+                    slot.doubt(place.point);
+                }
+            });
+        }
+        self.settled[kind] = slot.drop_doubted(self.settled[kind]);
     }
 
     /// Brings all records into the indices.

@@ -95,6 +95,9 @@ const COARSEST: f32 = 1.5;
 /// How often records are made anew because an audit has found them wrong. More: time for what finer records do not mend; fewer: what one finer step leaves stays.
 pub const MOST_REPAIRS: u32 = 2;
 
+/// Part of what is off in regions from which on a kind is to blame. Larger: what several kinds have wrong stays; smaller: records are made anew that are right.
+pub(super) const BLAMED: f64 = 0.25;
+
 /// Samples of records, and photons, that take the place of wrong ones, as a multiple. More: time; fewer: noise that made them wrong stays.
 const REPAIR_SAMPLES: u32 = 4;
 

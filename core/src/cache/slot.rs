@@ -190,6 +190,24 @@ impl<'s> Slot<'s> {
         }
     }
 
+    /// Marks the records that reach a point, to be dropped.
+    pub(super) fn doubt(&mut self, point: Vec3) {
+        match self {
+            Self::Off => {}
+            Self::Volume(cache) => cache.doubt(point),
+            Self::Surface(cache) => cache.doubt(point),
+        }
+    }
+
+    /// Drops those that were marked; how many of the first `first` are left.
+    pub(super) fn drop_doubted(&mut self, first: usize) -> usize {
+        match self {
+            Self::Off => 0,
+            Self::Volume(cache) => cache.drop_doubted(first),
+            Self::Surface(cache) => cache.drop_doubted(first),
+        }
+    }
+
     /// Forgets all records.
     pub(super) fn clear(&mut self) {
         match self {

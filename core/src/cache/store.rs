@@ -64,6 +64,9 @@ pub struct Cache<'s, E> {
 /// cells.
 const WIDER: usize = 3;
 
+/// The radius of a record that is to be dropped; no other has it.
+const DOUBTED: f32 = 0.0;
+
 /// By how much spheres are widened: in the medium for points that none contains, on surfaces against noise.
 pub(super) const WIDE: f32 = 2.0;
 
@@ -422,6 +425,38 @@ impl<'s, E: Attachment> Cache<'s, E> {
         self.finish()
     }
 
+    /// Marks the records whose spheres contain `point`, for [`Cache::drop_doubted`]: they are no longer valid.
+    pub(super) fn doubt(&mut self, point: Vec3) {
+        let Self { records, index, .. } = self;
+        let records = records.as_mut_slice();
+        index.visit(point, |i, _| records[i as usize].radius = DOUBTED);
+        for record in &mut records[index.len() as usize..] {
+            if squared_share(record.position, record.radius, point) < 1.0 {
+                record.radius = DOUBTED;
+            }
+        }
+    }
+
+    /// Drops the records that were marked. How many of the first `first` are left.
+    pub(super) fn drop_doubted(&mut self, first: usize) -> usize {
+        let (stride, mut kept, mut kept_of_first) = (self.stride, 0, 0);
+        let (records, attached) = (self.records.as_mut_slice(), self.attached.as_mut_slice());
+        for i in 0..records.len() {
+            if records[i].radius == DOUBTED {
+                continue;
+            }
+            records[kept] = records[i];
+            attached.copy_within(i * stride..(i + 1) * stride, kept * stride);
+            kept += 1;
+            kept_of_first += usize::from(i < first);
+        }
+        self.records.truncate(kept);
+        self.attached.truncate(kept * stride);
+        // Without room for the index records are looked at one by one.
+        let _ = self.finish();
+        kept_of_first
+    }
+
     /// Forgets all records and keeps the memory.
     pub fn clear(&mut self) {
         self.records.clear();
@@ -594,6 +629,25 @@ mod tests {
             cache.insert(new, &[]).unwrap();
         }
         (near as f32 / count as f32, loose as f32 / count as f32)
+    }
+
+    #[test]
+    fn what_reaches_a_doubtful_point_is_dropped_and_nothing_else() {
+        let rng = &mut Generator::new(11);
+        let facing = |i: usize| Facing { normal: Vec3::Z, turn: Gradient::outer(Spectrum::splat(i as f32), Vec3::X) };
+        let mut cache = SurfaceCache::growing(1);
+        places(1000, rng).into_iter().enumerate().for_each(|(i, new)| cache.insert(new, &[facing(i)]).unwrap());
+        let points = [point(rng), point(rng), Vec3::splat(0.3)];
+        let reaches = |r: &Record| points.iter().any(|p| squared_share(r.position, r.radius, *p) < 1.0);
+        let left = cache.records().iter().zip(cache.attachments()).filter(|(r, _)| !reaches(r));
+        let left: Vec<_> = left.map(|(r, e)| (*r, *e)).collect();
+        assert!(left.len() < cache.len() && left.len() > cache.len() / 2, "{}", left.len());
+        let of_first = cache.records()[..100].iter().filter(|r| !reaches(r)).count();
+        points.iter().for_each(|p| cache.doubt(*p));
+        assert_eq!(cache.drop_doubted(100), of_first);
+        assert!(cache.records().iter().zip(cache.attachments()).map(|(r, e)| (*r, *e)).eq(left));
+        assert!(cache.is_finished());
+        points.iter().for_each(|p| cache.visit(*p, |_, _, _| panic!("dropped")));
     }
 
     #[test]

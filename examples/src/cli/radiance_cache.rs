@@ -399,7 +399,7 @@ impl<M: Medium + Sync> Stages<'_, '_, M> {
             }
             let (findings, map) = (audit.findings(), Box::new(audit.map()));
             let is_over = time.is_some() || repaired.len() as u32 >= cache::MOST_REPAIRS;
-            if is_over || !caches.drop_wrong(&findings, &map, error) {
+            if is_over || !caches.drop_wrong((&findings, &map), error, ray, &world) {
                 return Filled {
                     caches,
                     ending: Ending::Done,
