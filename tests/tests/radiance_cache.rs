@@ -18,7 +18,7 @@ use fogbow::spectrum::Spectrum;
 use fogbow::storage::Chunk;
 use fogbow::surface::Surface;
 use fogbow::transmittance::thickness::Steps;
-use fogbow::work::{Rounds, finish};
+use fogbow::work::{Rounds, finish, step};
 use fogbow::world::World;
 use fogbow::{multiple_scatter, single_scatter::Sums};
 use fogbow_std::film::Film;
@@ -300,6 +300,37 @@ fn filling_for_another_view_adds_what_is_missing_there() {
     for (before, after) in before.into_iter().zip(counts(&filling.finish())) {
         assert!(after >= before && after <= before + before / 4 + 1, "{before} records, then {after}");
     }
+}
+
+fn stage_in<W: ?Sized, R: Rounds<W>>(_: &W, work: &R) -> &'static str {
+    work.stage()
+}
+
+#[test]
+fn photons_are_shot_once_for_all_views() {
+    let (room, fog, lights) = (room(), fog(), [lamp()]);
+    let world = World { medium: &fog, scene: &room, lights: (&lights).into() };
+    let other: Eye = |film| Ray { origin: Vec3::new(0.05, 0.0, -1.5), ..eye_ray(film) };
+    // The caches after one more view, and how many jobs had to do with photons.
+    let seen = |caches: Caches, ray: Eye| {
+        let (mut filling, mut shots) = (caches.fill(Asked::View { ray, pixel: PIXEL }), 0);
+        let mut output = FilledRecords::default();
+        loop {
+            let is_shot = stage_in(&world, &filling) == "fill photons";
+            if !step(&mut filling, &world, &mut output) {
+                return (filling.finish(), shots);
+            }
+            shots += u32::from(is_shot);
+        }
+    };
+    let (first, shots) = seen(RadianceCaches::new(settings()), eye_ray);
+    assert!(shots > 0 && first.photon_bytes() > 0);
+    let (kept, none) = seen(first, other);
+    assert_eq!(none, 0);
+    let (mut again, _) = seen(RadianceCaches::new(settings()), eye_ray);
+    again.forget_photons();
+    let (again, as_many) = seen(again, other);
+    assert_eq!((as_many, stored(&again) == stored(&kept)), (shots, true));
 }
 
 #[test]

@@ -5,6 +5,7 @@ use super::audit::Findings;
 use super::bias_map::{Apart, BiasMap};
 use super::eye::{CachedRadiance, Caches, Reader, radiance, radiance_beyond};
 use super::kind::Kind;
+use super::photons::{PhotonEffort, PhotonGrid};
 use super::presets::{BLAMED, finer_by};
 use super::record::Record;
 use super::room::{chunks_of, stride_of};
@@ -83,6 +84,10 @@ pub struct RadianceCaches<'s> {
     pub(super) settled: ByKind<usize>,
     /// How often records were dropped: those that take their place must not meet the same chances.
     pub(super) dropped: u32,
+    /// How often when photons were last to meet other chances.
+    dropped_with_photons: u32,
+    /// The light in cells that the last complete shooting has left: of the world, not of a view.
+    pub(super) photons: PhotonGrid<'s>,
 }
 
 #[cfg(feature = "alloc")]
@@ -101,6 +106,8 @@ impl RadianceCaches<'static> {
             views: List::default(),
             settled: ByKind([0; Kind::COUNT]),
             dropped: 0,
+            dropped_with_photons: 0,
+            photons: PhotonGrid::none(),
         }
     }
 }
@@ -146,7 +153,15 @@ impl<'s> RadianceCaches<'s> {
         });
         let mut views = views.into();
         views.clear();
-        Self { settings, slots: ByKind(slots), views, settled: ByKind([0; Kind::COUNT]), dropped: 0 }
+        Self {
+            settings,
+            slots: ByKind(slots),
+            views,
+            settled: ByKind([0; Kind::COUNT]),
+            dropped: 0,
+            dropped_with_photons: 0,
+            photons: PhotonGrid::none(),
+        }
     }
 }
 
@@ -288,6 +303,7 @@ impl RadianceCaches<'_> {
             }
             if let Some(photons) = self.settings.photons.as_mut().filter(|_| kind == Kind::Multiple) {
                 *photons = photons.finer();
+                self.dropped_with_photons = self.dropped + 1;
             }
         }
         if any {
@@ -295,6 +311,46 @@ impl RadianceCaches<'_> {
             self.dropped += 1;
         }
         any
+    }
+
+    /// The photons to shoot, and their random numbers; none if nothing is made by walks.
+    pub(super) fn photon_effort(&self) -> Option<(PhotonEffort, u64)> {
+        let Settings { photons, multiple, irradiance, .. } = &self.settings;
+        let effort = photons.filter(|_| multiple.is_some() || irradiance.is_some())?;
+        Some((effort, self.settings.seed ^ u64::from(self.dropped_with_photons) << 32))
+    }
+
+    /// Bytes of memory that the light in cells holds: see [`RadianceCaches::forget_photons`].
+    #[must_use]
+    pub fn photon_bytes(&self) -> usize {
+        self.photons.bytes()
+    }
+
+    /// Forgets the light in cells that photons have left, and gives its memory back. It is kept after a fill, because the next one, for another
+    /// view, needs the same, and shooting photons is most of its work; who fills no more, or rarely, may want the memory. It is not saved.
+    ///
+    /// ```
+    /// # #[cfg(feature = "alloc")] {
+    /// # use fogbow::cache::{Asked, FilledRecords, RadianceCaches, Settings};
+    /// # use fogbow::{host::Empty, light::Light, math::{Bounds, Ray, Vec3}, medium::{Homogeneous, Placed, Region}, phase::Phase};
+    /// # use fogbow::{spectrum::Spectrum, work, world::{Outline, World}};
+    /// # let fog = Homogeneous::new(Spectrum::ONE, Spectrum::ONE, Phase::ISOTROPIC)?;
+    /// # let ball = Placed::new(fog, Region::sphere(Vec3::ZERO, 1.0)?);
+    /// # let sky = [Light::Constant(Spectrum::ONE)];
+    /// # let world = World { medium: &ball, scene: &Empty, lights: (&sky).into() };
+    /// # let bounds = Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE };
+    /// # let settings = Settings { rays: 16, ..Settings::for_outline(&Outline::of(&world, bounds), 0.02).with_walks(16) };
+    /// let mut filling = RadianceCaches::new(settings).fill(Asked::<fn([f32; 2]) -> Ray>::Box(bounds));
+    /// work::finish(&mut filling, &world, &mut FilledRecords::default());
+    /// let mut caches = filling.finish();
+    /// assert!(caches.photon_bytes() > 1 << 20);
+    /// caches.forget_photons();
+    /// assert_eq!(caches.photon_bytes(), 0);
+    /// # }
+    /// # Ok::<(), fogbow::medium::MediumError>(())
+    /// ```
+    pub fn forget_photons(&mut self) {
+        self.photons = PhotonGrid::none();
     }
 
     fn forget(&mut self, kind: Kind) {

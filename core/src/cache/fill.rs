@@ -17,6 +17,7 @@ use super::guide::Guide;
 use super::kind::{Kind, Pass, STEPS, Step};
 use super::lookup::Reading;
 use super::memory::{Estimate, FilledRecords, FillingMemory};
+use super::photons::PhotonGrid;
 use super::pilots::Pilots;
 use super::radius::clearance;
 use super::settings::{Effort, Settings};
@@ -178,8 +179,11 @@ impl<'s> RadianceCaches<'s> {
     /// # Ok::<(), Box<dyn core::error::Error>>(())
     /// ```
     #[must_use]
-    pub fn fill_in<F: Fn([f32; 2]) -> Ray>(self, mut memory: FillingMemory<'s>, asked: Asked<F>) -> Filling<'s, F> {
+    pub fn fill_in<F: Fn([f32; 2]) -> Ray>(mut self, mut memory: FillingMemory<'s>, asked: Asked<F>) -> Filling<'s, F> {
         memory.clear();
+        if self.photon_effort().is_some_and(|(effort, seed)| self.photons.is_made_for(&effort, seed)) {
+            memory.photons = core::mem::replace(&mut self.photons, PhotonGrid::none());
+        }
         let view = asked.mark(&self.settings);
         let (before, rays) = (self.settled, self.settings.rays);
         let is_known = self.views.as_slice().contains(&view);
@@ -226,6 +230,9 @@ impl<'s, F> Filling<'s, F> {
     /// The caches, filled so far, to be read. What was made counts, and a later fill estimates it anew.
     #[must_use]
     pub fn finish(mut self) -> RadianceCaches<'s> {
+        if self.memory.photons.is_made() {
+            self.caches.photons = self.memory.photons;
+        }
         self.caches.finish();
         self.caches
     }
@@ -363,19 +370,22 @@ impl<'s, F> Filling<'s, F> {
                 let is_settled = !self.caches.is_open();
                 if self.memory.wanted.is_empty() && is_settled {
                     self.complete();
-                } else if let Some(effort) = self.photons() {
+                } else if let Some((effort, seed)) = self.caches.photon_effort()
+                    && !self.memory.photons.is_made_for(&effort, seed)
+                {
                     self.is_cut |= self.memory.photons.reset(&effort).is_err();
-                    self.shoot_more(&effort);
+                    self.shoot_more();
                 } else {
                     self.begin(0);
                 }
             }
-            Round::Shoot => {
-                if let Some(effort) = self.settings().photons {
-                    self.shoot_more(&effort);
+            Round::Shoot => self.shoot_more(),
+            Round::Divide => {
+                if let Some((effort, seed)) = self.caches.photon_effort() {
+                    self.memory.photons.finish(&effort, seed);
                 }
+                self.begin(0);
             }
-            Round::Divide => self.begin(0),
             Round::Look => {
                 core::mem::swap(&mut self.memory.open, &mut self.memory.still_open);
                 if !self.choose() {

@@ -129,6 +129,8 @@ pub struct PhotonGrid<'s> {
     flights: u64,
     /// How many paths were only counted, and up to which number light is brought; `None` while all are counted.
     lit: Option<[u32; 2]>,
+    /// What all this was done for, and with which random numbers, once it is done.
+    made_for: Option<(PhotonEffort, u64)>,
 }
 
 #[cfg(feature = "alloc")]
@@ -197,12 +199,38 @@ impl<'s> PhotonGrid<'s> {
             paths: 0,
             flights: 0,
             lit: None,
+            made_for: None,
         }
+    }
+
+    /// Without cells.
+    pub(super) fn none() -> Self {
+        Self::new((&mut [][..]).into(), (&mut [][..]).into())
+    }
+
+    /// Whether it is what photons of such an effort and such random numbers leave, to the end.
+    pub(super) fn is_made_for(&self, effort: &PhotonEffort, seed: u64) -> bool {
+        self.made_for == Some((*effort, seed))
+    }
+
+    /// Whether it is done.
+    pub(super) fn is_made(&self) -> bool {
+        self.made_for.is_some()
+    }
+
+    /// It is done.
+    pub(super) fn finish(&mut self, effort: &PhotonEffort, seed: u64) {
+        self.made_for = Some((*effort, seed));
+    }
+
+    /// Bytes of memory that cells hold.
+    pub(super) fn bytes(&self) -> usize {
+        size_of_val(self.cells.as_slice()) + size_of_val(self.moments.as_slice())
     }
 
     /// Dark cells that fill the bounds.
     pub(super) fn reset(&mut self, effort: &PhotonEffort) -> Result<(), Full> {
-        (self.paths, self.flights, self.counts, self.lit) = (0, 0, [0; 3], None);
+        (self.paths, self.flights, self.counts, self.lit, self.made_for) = (0, 0, [0; 3], None, None);
         self.cells.clear();
         self.moments.clear();
         let Some((side, counts)) = effort.division() else { return Ok(()) };

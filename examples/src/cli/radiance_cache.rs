@@ -263,6 +263,14 @@ struct Filled {
     audited: Option<Audited>,
 }
 
+impl Filled {
+    /// No more views follow, for which photons were kept.
+    fn new(mut caches: RadianceCaches<'static>, ending: Ending, audited: Option<Audited>) -> Self {
+        caches.forget_photons();
+        Self { caches, ending, audited }
+    }
+}
+
 /// What all fills of a render took.
 #[derive(Default)]
 struct Spent {
@@ -387,7 +395,7 @@ impl<M: Medium + Sync> Stages<'_, '_, M> {
             let audit_rays = job.arguments.audit.unwrap_or_else(|| filling.audit_rays());
             caches = filling.finish();
             if ran.ending != Ending::Done || audit_rays == 0 || job.paths.max_scatterings == 0 {
-                return Filled { caches, ending: ran.ending, audited: None };
+                return Filled::new(caches, ran.ending, None);
             }
             let mut audit = Audit::new(&caches, ray, audit_rays);
             // A part of its rays are as good as all of a shorter one.
@@ -395,16 +403,12 @@ impl<M: Medium + Sync> Stages<'_, '_, M> {
             let ran = threads::run(&mut audit, &world, &self.pool, job.control, share, |_| {});
             add_times(&mut spent.filled, ran.stages);
             if ran.ending == Ending::Cancelled {
-                return Filled { caches, ending: ran.ending, audited: None };
+                return Filled::new(caches, ran.ending, None);
             }
             let (findings, map) = (audit.findings(), Box::new(audit.map()));
             let is_over = time.is_some() || repaired.len() as u32 >= cache::MOST_REPAIRS;
             if is_over || !caches.drop_wrong((&findings, &map), error, ray, &world) {
-                return Filled {
-                    caches,
-                    ending: Ending::Done,
-                    audited: Some(Audited { error, findings, map, repaired }),
-                };
+                return Filled::new(caches, Ending::Done, Some(Audited { error, findings, map, repaired }));
             }
             repaired.push((findings, map));
         }

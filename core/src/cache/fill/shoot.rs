@@ -2,23 +2,17 @@
 
 use super::{Filling, Round};
 use crate::cache::memory::FilledRecords;
-use crate::cache::photons::{CELLS_PER_JOB, PATHS_PER_JOB, PhotonEffort};
-use crate::cache::settings::Settings;
+use crate::cache::photons::{CELLS_PER_JOB, PATHS_PER_JOB};
 use crate::host::{Medium, Scene};
 use crate::world::World;
 
 impl<F> Filling<'_, F> {
-    /// The photons to shoot: none if nothing is made by walks.
-    pub(super) fn photons(&self) -> Option<PhotonEffort> {
-        let Settings { photons, multiple, irradiance, .. } = self.settings();
-        photons.filter(|_| multiple.is_some() || irradiance.is_some())
-    }
-
     /// The next round of photons, or after the last what follows.
-    pub(super) fn shoot_more(&mut self, effort: &PhotonEffort) {
+    pub(super) fn shoot_more(&mut self) {
+        let Some((effort, _)) = self.caches.photon_effort() else { return };
         let photons = &mut self.memory.photons;
         self.photons_before = photons.paths();
-        let (more, cells) = (photons.next_round(effort), photons.len() as u32);
+        let (more, cells) = (photons.next_round(&effort), photons.len() as u32);
         self.photons_of_round = more.unwrap_or(0);
         match more {
             Some(more) => self.enter(Round::Shoot, more.div_ceil(PATHS_PER_JOB)),
@@ -33,11 +27,11 @@ impl<F> Filling<'_, F> {
         output: &mut FilledRecords<'_>,
     ) {
         let (photons, settings) = (&self.memory.photons, self.settings());
-        let Some(effort) = &settings.photons else { return };
+        let Some((effort, seed)) = self.caches.photon_effort() else { return };
         let first = job * PATHS_PER_JOB;
         for path in first..(first + PATHS_PER_JOB).min(self.photons_of_round) {
             let path = self.photons_before + path;
-            match photons.shoot(path, world, (effort, &settings.paths, self.seed()), &mut output.deposits) {
+            match photons.shoot(path, world, (&effort, &settings.paths, seed), &mut output.deposits) {
                 Ok(flights) => output.flights += u64::from(flights),
                 Err(_) => output.is_cut = true,
             }
