@@ -1,4 +1,4 @@
-//! Layer 0: what is saved and sent: little-endian elements and a checksum.
+//! Layer 0a: what is saved and sent: little-endian elements and a checksum.
 
 use bytemuck::Pod;
 

@@ -1,4 +1,4 @@
-//! Layer 0: colours and their derivatives.
+//! Layer 0b: colours and their derivatives.
 //!
 //! Channels never mix except by min, max or mean, so a host may carry three wavelengths instead
 //! of red, green and blue.

@@ -1,4 +1,4 @@
-//! Layer 0: storage whose size nobody knows beforehand.
+//! Layer 0a: storage whose size nobody knows beforehand.
 //!
 //! Who knows the bound owns the memory. Where nobody does (cache records, beams),
 //! a [`List`] takes either a slice lent by the host or, with feature `alloc`, a growing `Vec`. What takes several lists lays

@@ -1,4 +1,4 @@
-//! Layer 0: work in rounds, the one protocol of everything that may run in parallel.
+//! Layer 0a: work in rounds, the one protocol of everything that may run in parallel.
 //!
 //! A method that takes many steps says which pure *jobs* may run now; the host runs them wherever it likes, in any order,
 //! and hands the results back in the order of their numbers. When all results of a round are in, the next round

@@ -293,6 +293,18 @@ fn modules_import_from_lower_layers_only() {
 }
 
 #[test]
+fn every_module_says_its_layer_as_the_table_does() {
+    let layers = layers();
+    let tops = core_files()
+        .into_iter()
+        .filter(|(name, module, _)| module.len() == 1 && (name.ends_with("mod.rs") || !name.contains('/')));
+    for (name, module, source) in tops {
+        let due = format!("//! Layer {}: ", layers[&module[0]]);
+        assert!(source.starts_with(&due), "core/src/{name} must begin with `{due}`");
+    }
+}
+
+#[test]
 fn the_table_names_every_module_and_no_other() {
     let table: BTreeSet<String> = layers().into_keys().collect();
     let modules: BTreeSet<String> = core_files().into_iter().map(|(_, module, _)| module[0].clone()).collect();

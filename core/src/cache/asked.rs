@@ -33,6 +33,25 @@ pub struct Wanted {
     pub(super) ray: u32,
 }
 
+impl Asked {
+    /// [`Asked::Box`] where no eye rays tell the type of `F`.
+    ///
+    /// ```
+    /// # use fogbow::{cache::Asked, math::{Bounds, Vec3}};
+    /// let bounds = Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE };
+    /// assert!(matches!(Asked::anywhere_in(bounds), Asked::Box(inside) if inside == bounds));
+    /// ```
+    #[must_use]
+    pub fn anywhere_in(bounds: Bounds) -> Self {
+        Self::Box(bounds)
+    }
+
+    /// Where on the film ray number `number` of a view begins.
+    pub(super) fn at(number: u32) -> [f32; 2] {
+        even2(number + 1)
+    }
+}
+
 impl<F: Fn([f32; 2]) -> Ray> Asked<F> {
     /// A mark of where eye rays go and how densely places are asked for.
     pub(super) fn mark(&self, settings: &Settings) -> u64 {
@@ -68,11 +87,6 @@ impl<F: Fn([f32; 2]) -> Ray> Asked<F> {
         crc.value()
     }
 
-    /// Where on the film ray number `number` of a view begins.
-    pub(super) fn at(number: u32) -> [f32; 2] {
-        even2(number + 1)
-    }
-
     /// Calls `visit(place, distance of the eye)` for the places that ray number `number` asks for.
     pub(super) fn visit<M: Medium + ?Sized, S: Scene + ?Sized>(
         &self,
@@ -84,7 +98,7 @@ impl<F: Fn([f32; 2]) -> Ray> Asked<F> {
         let mut rng = Generator::new(mix(settings.seed ^ 0x70_1a_ce) ^ u64::from(number));
         match self {
             Self::View { ray, .. } => {
-                let ray = ray(Self::at(number));
+                let ray = ray(Asked::at(number));
                 places(&ray, world, &settings.eye, &mut rng, |place| visit(place, place.point.distance(ray.origin)));
             }
             Self::Box(bounds) => {

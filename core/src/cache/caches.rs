@@ -33,7 +33,7 @@ use crate::world::World;
 ///
 /// // Anywhere in a box: coarser than usual, so that this example is quick.
 /// let settings = Settings { rays: 200, ..Settings::for_outline(&Outline::of(&world, bounds), 0.02).with_walks(64) };
-/// let mut filling = RadianceCaches::new(settings).fill(Asked::<fn([f32; 2]) -> Ray>::Box(bounds));
+/// let mut filling = RadianceCaches::new(settings).fill(Asked::anywhere_in(bounds));
 /// work::finish(&mut filling, &world, &mut FilledRecords::default());
 /// assert!(!filling.is_cut() && filling.computed(Kind::Multiple) > 0);
 /// assert!(!filling.caches().records(Kind::Multiple).is_empty());
@@ -135,7 +135,7 @@ impl<'s> RadianceCaches<'s> {
     /// let caches = RadianceCaches::lent(settings, &mut views[..], &mut memory);
     ///
     /// // As much for the fill and for its jobs; here there is none, so that no place is even looked for.
-    /// let asked = Asked::<fn([f32; 2]) -> Ray>::Box(bounds);
+    /// let asked = Asked::anywhere_in(bounds);
     /// let mut filling = caches.fill_in(FillingMemory::lent(Slots::default()), asked);
     /// work::finish(&mut filling, &world, &mut FilledRecords::lent(&mut [], &mut [], &mut [], &mut []));
     /// assert!(filling.is_cut() && filling.finish().records(Kind::Surface).is_empty());
@@ -340,7 +340,7 @@ impl RadianceCaches<'_> {
     /// # let world = World { medium: &ball, scene: &Empty, lights: (&sky).into() };
     /// # let bounds = Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE };
     /// # let settings = Settings { rays: 16, ..Settings::for_outline(&Outline::of(&world, bounds), 0.02).with_walks(16) };
-    /// let mut filling = RadianceCaches::new(settings).fill(Asked::<fn([f32; 2]) -> Ray>::Box(bounds));
+    /// let mut filling = RadianceCaches::new(settings).fill(Asked::anywhere_in(bounds));
     /// work::finish(&mut filling, &world, &mut FilledRecords::default());
     /// let mut caches = filling.finish();
     /// assert!(caches.photon_bytes() > 1 << 20);
@@ -368,7 +368,7 @@ impl RadianceCaches<'_> {
     ) {
         let (settings, slot) = (&self.settings, &mut self.slots[kind]);
         let asked = Asked::View { ray, pixel: 0.0 };
-        for number in (0..settings.rays).filter(|number| wrong(Asked::<fn([f32; 2]) -> Ray>::at(*number))) {
+        for number in (0..settings.rays).filter(|number| wrong(Asked::at(*number))) {
             asked.visit(number, world, settings, |place, _| {
                 if place.is_seen && kind.row().places.hold(&place) {
                     slot.doubt(place.point);

@@ -97,7 +97,7 @@ enum Round {
 /// # let world = World { medium: &fog, scene: &Empty, lights: (&[]).into() };
 /// # let bounds = Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE };
 /// # let settings = Settings { rays: 20, ..Settings::for_outline(&Outline::of(&world, bounds), 0.02).with_walks(16) };
-/// # let asked = Asked::<fn([f32; 2]) -> Ray>::Box(bounds);
+/// # let asked = Asked::anywhere_in(bounds);
 /// let mut filling = RadianceCaches::new(settings).fill_in(FillingMemory::default(), asked);
 /// let mut output = FilledRecords::default();
 /// for _ in 0..10 {
@@ -167,7 +167,7 @@ impl<'s> RadianceCaches<'s> {
     /// # let world = World { medium: &fog, scene: &Empty, lights: (&[]).into() };
     /// # let bounds = Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE };
     /// # let settings = Settings { rays: 20, ..Settings::for_outline(&Outline::of(&world, bounds), 0.02).with_walks(16) };
-    /// # let asked = || Asked::<fn([f32; 2]) -> Ray>::Box(bounds);
+    /// # let asked = || Asked::anywhere_in(bounds);
     /// let mut output = FilledRecords::default();
     /// let mut filling = RadianceCaches::new(settings).fill_in(FillingMemory::default(), asked());
     /// work::finish(&mut filling, &world, &mut output);

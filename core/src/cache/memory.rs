@@ -78,7 +78,7 @@ impl<'o> FilledRecords<'o> {
     /// # let world = World { medium: &fog, scene: &Empty, lights: (&[]).into() };
     /// # let bounds = Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE };
     /// # let settings = Settings { rays: 20, ..Settings::for_outline(&Outline::of(&world, bounds), 0.02).with_walks(16) };
-    /// # let asked = || Asked::<fn([f32; 2]) -> Ray>::Box(bounds);
+    /// # let asked = || Asked::anywhere_in(bounds);
     /// let room = room_for(&settings, 2000, 100);
     /// let (mut wanted, mut open) = (vec![Wanted::default(); room.of_job_wanted], vec![0; room.of_job_open]);
     /// let mut higher = vec![Coefficient::ZERO; room.of_job_higher];
@@ -140,7 +140,7 @@ impl<'s> FillingMemory<'s> {
     /// # let world = World { medium: &fog, scene: &Empty, lights: (&[]).into() };
     /// # let bounds = Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE };
     /// # let settings = Settings { rays: 20, ..Settings::for_outline(&Outline::of(&world, bounds), 0.02).with_walks(16) };
-    /// # let asked = || Asked::<fn([f32; 2]) -> Ray>::Box(bounds);
+    /// # let asked = || Asked::anywhere_in(bounds);
     /// let room = room_for(&settings, 2000, 100);
     /// let mut wanted = vec![Wanted::default(); room.wanted];
     /// let [mut open, mut still_open] = [(); 2].map(|()| vec![0; room.open]);

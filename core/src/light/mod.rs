@@ -1,4 +1,4 @@
-//! Layer 4: lights.
+//! Layer 4a: lights.
 //!
 //! | file | holds |
 //! |---|---|

@@ -1,4 +1,4 @@
-//! Layer 0: numbers, directions, rays, boxes and quadrature.
+//! Layer 0a: numbers, directions, rays, boxes and quadrature.
 //!
 //! | file | holds |
 //! |---|---|

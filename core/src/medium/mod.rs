@@ -1,4 +1,4 @@
-//! Layer 4: media that need no host.
+//! Layer 4a: media that need no host.
 //!
 //! A medium answers for its coefficients at a point and for bounds on extinction along a segment
 //! of a ray:

@@ -1,4 +1,4 @@
-//! Layer 6: light scattered more than once, by random walks with gradients.
+//! Layer 6a: light scattered more than once, by random walks with gradients.
 //!
 //! ```text
 //! L_m ≈ (1/N) Σ_paths Σ_{k≥1} W_k L_s(x_k, ω'_k),

@@ -1,4 +1,4 @@
-//! Layer 6: the volumetric path tracer, unbiased: the truth that every faster method is held to.
+//! Layer 6a: the volumetric path tracer, unbiased: the truth that every faster method is held to.
 //!
 //! | file | holds |
 //! |---|---|

@@ -1,4 +1,4 @@
-//! Layer 4: how light gets through a medium.
+//! Layer 4a: how light gets through a medium.
 //!
 //! | file | holds |
 //! |---|---|
