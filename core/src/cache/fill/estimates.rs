@@ -65,10 +65,10 @@ fn usual_value(records: &[Record]) -> f32 {
 
 /// Samples for a record that reaches `radius` (m): what reaches less far than `usual` lights fewer pixels. If one sample is
 /// as noisy everywhere, the noise of a picture whose records light areas `R²` is least, for a given sum of samples, where
-/// these go as `R`. No fewer than a quarter, because dark corners are where that is not so.
-/// Of what is seen through fog or in mirrors a share is as good as all of it.
-fn samples(effort: &Effort, radius: f32, usual: f32, seen: f32) -> u32 {
-    let share = if radius < usual { (radius / usual).max(LEAST_SHARE) } else { 1.0 };
+/// these go as `R`. No fewer than a quarter, because dark corners are where that is not so; and of what all else stands on no fewer at all,
+/// because records of a corner light each other. Of what is seen through fog or in mirrors a share is as good as all of it.
+fn samples(kind: Kind, effort: &Effort, radius: f32, usual: f32, seen: f32) -> u32 {
+    let share = if radius < usual && !kind.row().is_ground { (radius / usual).max(LEAST_SHARE) } else { 1.0 };
     ((effort.samples as f32 * share * seen) as u32).max(LEAST_SAMPLES)
 }
 
@@ -96,7 +96,7 @@ impl<F> Filling<'_, F> {
         let limits = limits.within(self.reach((step.kind, &effort), &place, world));
         let number = self.first.wrapping_add(self.computed + u64::from(index));
         let seen = if step.kind == Kind::Irradiance { place.share.max(LEAST_SEEN) } else { 1.0 };
-        let count = samples(&effort, limits.max, self.usual, seen);
+        let count = samples(step.kind, &effort, limits.max, self.usual, seen);
         let mut rng = Generator::new(mix(self.seed() ^ mix(step.kind.row().stream + 1)) ^ number ^ stream_of(part));
         let mut estimate = Estimate { number: index, place, limits, effort: 1.0, ..Estimate::default() };
         (estimate.learnt.seen, estimate.learnt.to_eye) = (seen, place.to_eye);
@@ -121,7 +121,7 @@ impl<F> Filling<'_, F> {
         let brightness = record.value.mean() / self.bright;
         let more = varies.max(brightness * float::sqrt(varies)).clamp(1.0, MOST_SAMPLES);
         let seen = guides.get(offset).map_or(1.0, |guide| guide.seen);
-        let count = samples(&effort, record.radius, self.usual, seen) as f32 * more;
+        let count = samples(step.kind, &effort, record.radius, self.usual, seen) as f32 * more;
         Some((around, more, count as u32))
     }
 
