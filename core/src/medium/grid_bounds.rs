@@ -27,6 +27,43 @@ pub(super) enum Joining {
     Loose,
 }
 
+/// Bounds of all densities of a grid, or of its one density: most grids have no other, and asking for a segment is half of the time of
+/// rays through smoke.
+trait DensityBounds: Copy + PartialEq {
+    fn of(grid: &DensityGrid<'_>, block: Option<usize>) -> Self;
+    fn union(&self, other: &Self) -> Self;
+    fn is_constant(&self) -> bool;
+    fn is_empty(&self) -> bool;
+    fn all(&self) -> FieldBounds;
+}
+
+impl DensityBounds for MinMax {
+    #[inline(always)]
+    fn of(grid: &DensityGrid<'_>, block: Option<usize>) -> Self {
+        grid.density.bounds(block)
+    }
+
+    #[inline(always)]
+    fn union(&self, other: &Self) -> Self {
+        MinMax::union(*self, *other)
+    }
+
+    #[inline(always)]
+    fn is_constant(&self) -> bool {
+        self.min == self.max
+    }
+
+    #[inline(always)]
+    fn is_empty(&self) -> bool {
+        self.max == 0.0
+    }
+
+    #[inline(always)]
+    fn all(&self) -> FieldBounds {
+        FieldBounds { density: *self, absorption: *self, emission: *self }
+    }
+}
+
 /// Bounds of the densities of a grid; those without a field repeat the first.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct FieldBounds {
@@ -35,7 +72,14 @@ pub(super) struct FieldBounds {
     emission: MinMax,
 }
 
-impl FieldBounds {
+impl DensityBounds for FieldBounds {
+    #[inline]
+    fn of(grid: &DensityGrid<'_>, block: Option<usize>) -> Self {
+        let density = grid.density.bounds(block);
+        let of = |field: &Option<Field<'_>>| field.as_ref().map_or(density, |f| f.bounds(block));
+        Self { density, absorption: of(&grid.absorption_density), emission: of(&grid.emission_density) }
+    }
+
     #[inline]
     fn union(&self, other: &Self) -> Self {
         Self {
@@ -54,6 +98,11 @@ impl FieldBounds {
     fn is_empty(&self) -> bool {
         self.density.max == 0.0 && self.absorption.max == 0.0 && self.emission.max == 0.0
     }
+
+    #[inline]
+    fn all(&self) -> FieldBounds {
+        *self
+    }
 }
 
 impl DensityGrid<'_> {
@@ -61,17 +110,26 @@ impl DensityGrid<'_> {
     /// [`Medium::marching_segment`](crate::host::Medium::marching_segment) of a grid.
     #[inline]
     pub(super) fn joined_segment(&self, ray: &Ray, from: f32, joining: Joining) -> MajorantSegment {
+        if self.absorption_density.is_none() && self.emission_density.is_none() {
+            self.joined::<MinMax>(ray, from, joining)
+        } else {
+            self.joined::<FieldBounds>(ray, from, joining)
+        }
+    }
+
+    #[inline]
+    fn joined<B: DensityBounds>(&self, ray: &Ray, from: f32, joining: Joining) -> MajorantSegment {
         let line = LocalLine::new(&self.cells_from_world, ray);
         let origin = ray.origin.abs().max_element();
         let mut walk = match Walk::enter(&line, self.size, from, origin, &self.reach) {
             Entry::Miss => return MajorantSegment::vacuum(f32::INFINITY),
             Entry::Coarse(near, _) if near > from => return MajorantSegment::vacuum(near),
-            Entry::Coarse(_, far) => return self.segment_of(&self.bounds(None), far),
+            Entry::Coarse(_, far) => return self.segment_of(&B::of(self, None).all(), far),
             Entry::Blocks(walk) => walk,
         };
         let (mut found, mut until) = loop {
             let Some(span) = walk.next() else { return MajorantSegment::vacuum(f32::INFINITY) };
-            let bounds = self.bounds(Some(span.block));
+            let bounds = B::of(self, Some(span.block));
             if !bounds.is_empty() {
                 if span.begin > from {
                     return MajorantSegment::vacuum(span.begin);
@@ -83,10 +141,10 @@ impl DensityGrid<'_> {
             }
         };
         let is_constant = found.is_constant();
-        let mut thickness = self.thickest(&found) * (until - from);
+        let mut thickness = self.thickest(&found.all()) * (until - from);
         while until < ray.length && (is_constant || joining == Joining::Loose || thickness < ENOUGH) {
             let Some(span) = walk.next() else { break };
-            let bounds = self.bounds(Some(span.block));
+            let bounds = B::of(self, Some(span.block));
             let joined = found.union(&bounds);
             if is_constant {
                 if joined != found {
@@ -98,8 +156,8 @@ impl DensityGrid<'_> {
                 }
                 found = joined;
             } else {
-                let higher = self.thickest(&joined);
-                thickness += self.thickest(&bounds) * (span.end - until);
+                let higher = self.thickest(&joined.all());
+                thickness += self.thickest(&bounds.all()) * (span.end - until);
                 let is_wasteful = higher * (span.end - from) - thickness > WASTE;
                 if is_wasteful || bounds.is_constant() && !bounds.is_empty() {
                     break;
@@ -108,15 +166,13 @@ impl DensityGrid<'_> {
             }
             until = span.end;
         }
-        self.segment_of(&found, until)
+        self.segment_of(&found.all(), until)
     }
 
     /// Bounds of every density in a block, or in the whole grid.
     #[inline]
     pub(super) fn bounds(&self, block: Option<usize>) -> FieldBounds {
-        let density = self.density.bounds(block);
-        let of = |field: &Option<Field<'_>>| field.as_ref().map_or(density, |f| f.bounds(block));
-        FieldBounds { density, absorption: of(&self.absorption_density), emission: of(&self.emission_density) }
+        FieldBounds::of(self, block)
     }
 
     /// Upper bound of extinction (m⁻¹) in any channel.

@@ -96,9 +96,12 @@ impl<'a> Field<'a> {
         Ok(Self { density, blocks, whole })
     }
 
-    #[inline]
+    #[inline(always)]
     pub(super) fn bounds(&self, block: Option<usize>) -> MinMax {
-        block.map_or(self.whole, |i| self.blocks.get(i).copied().unwrap_or(self.whole))
+        match block.and_then(|block| self.blocks.get(block)) {
+            Some(bounds) => *bounds,
+            None => self.whole,
+        }
     }
 }
 
