@@ -1,6 +1,7 @@
 //! Rounds in which records on surfaces are averaged with their neighbours.
 
-use super::{Filling, Round, attached};
+use super::steps::attached;
+use super::{Filling, Round};
 use crate::cache::kind::Step;
 use crate::cache::memory::{Estimate, FilledRecords};
 
