@@ -321,6 +321,11 @@ impl RadianceCaches<'_> {
     }
 
     /// Bytes of memory that the light in cells holds: see [`RadianceCaches::forget_photons`].
+    ///
+    /// ```
+    /// # #[cfg(feature = "alloc")]
+    /// assert_eq!(fogbow::cache::RadianceCaches::new(Default::default()).photon_bytes(), 0); // none were shot
+    /// ```
     #[must_use]
     pub fn photon_bytes(&self) -> usize {
         self.photons.bytes()

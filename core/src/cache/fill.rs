@@ -20,6 +20,7 @@ use super::lookup::Reading;
 use super::memory::{FilledRecords, FillingMemory};
 use super::photons::PhotonGrid;
 use super::pilots::Pilots;
+use super::presets::noise_goal;
 use super::radius::clearance;
 use super::settings::{Effort, Settings};
 use super::slot::ByKind;
@@ -96,6 +97,7 @@ enum Round {
 /// }
 /// // What there is by now can be read at any time.
 /// assert!(!filling.is_cut() && filling.audit_rays() >= 4096);
+/// assert_eq!(filling.noise_goal(0.02, 1 << 20), 0.02); // of a large picture, from few records
 /// assert!(filling.computed(Kind::Single) == 0 && filling.caches().reader().single.is_none());
 /// let caches = filling.finish();
 /// # }
@@ -245,9 +247,21 @@ impl<'s, F> Filling<'s, F> {
     /// enough to see whether a picture is grossly wrong.
     #[must_use]
     pub fn audit_rays(&self) -> u32 {
+        rays_for(self.walks())
+    }
+
+    /// The noise that a picture of so many pixels may have (`picture::Goal::noise`) where `error` is asked for, noise of records
+    /// included: as much, or down to half of it where the picture then takes less than a quarter of the work of this fill. Small
+    /// pictures gain most by samples, large ones by records.
+    #[must_use]
+    pub fn noise_goal(&self, error: f32, pixels: u32) -> f32 {
+        noise_goal(error, pixels, self.walks())
+    }
+
+    /// Walks and directions of all records of this fill.
+    fn walks(&self) -> u64 {
         let samples = |kind: Kind| self.settings().effort(kind).map_or(0, |effort| u64::from(effort.samples));
-        let walks: u64 = Kind::ALL.into_iter().map(|kind| self.computed(kind) * samples(kind)).sum();
-        rays_for(walks)
+        Kind::ALL.into_iter().map(|kind| self.computed(kind) * samples(kind)).sum()
     }
 
     fn settings(&self) -> &Settings {

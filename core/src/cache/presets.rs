@@ -139,6 +139,22 @@ impl PhotonEffort {
     }
 }
 
+/// Samples of a pixel at which most pictures have [`USUAL_ERROR`] of noise, each of which takes as long as so many walks of records.
+const PIXEL: [f64; 2] = [16.0, 4.0];
+
+/// Work of a picture over that of its records up to which less noise is asked for, and how much less at most. More: time that large records make
+/// useless; less: small pictures are noisy for no gain.
+const PICTURE: [f64; 2] = [0.25, 0.5];
+
+/// See [`Filling::noise_goal`](super::Filling::noise_goal): noise falls with the root of samples.
+pub(super) fn noise_goal(error: f32, pixels: u32, walks: u64) -> f32 {
+    let scale = f64::from(error / USUAL_ERROR);
+    let work = f64::from(pixels) * PIXEL[0] / (scale * scale) * PIXEL[1];
+    let share = libm::sqrt(work / (PICTURE[0] * walks as f64));
+    // Without records NaN or infinite: written so that the first means all.
+    if share < 1.0 { error * share.max(PICTURE[1]) as f32 } else { error }
+}
+
 /// The most samples per pixel for that. More: time at edges between black and a lamp, where noise falls no faster; fewer: jagged edges.
 pub const MOST_SAMPLES: u32 = 256;
 

@@ -231,6 +231,8 @@ pub(super) struct CacheJob<'a> {
     pub(super) paths: path::Settings,
     pub(super) film: &'a mut Film,
     pub(super) settings: &'a tiles::Settings,
+    /// Whether nobody says how many samples there are to be, or how little noise.
+    pub(super) has_usual_goal: bool,
     pub(super) control: &'a Control<'a>,
     /// Is told of every stage of filling, again and again.
     pub(super) tell: &'a (dyn Fn(&'static str) + Sync),
@@ -260,14 +262,21 @@ pub(super) struct Cached {
 struct Filled {
     caches: RadianceCaches<'static>,
     ending: Ending,
+    /// Noise that a picture from them may have.
+    noise: f32,
     audited: Option<Audited>,
 }
 
 impl Filled {
     /// No more views follow, for which photons were kept.
-    fn new(mut caches: RadianceCaches<'static>, ending: Ending, audited: Option<Audited>) -> Self {
+    fn new(mut caches: RadianceCaches<'static>, (ending, noise): (Ending, f32), audited: Option<Audited>) -> Self {
         caches.forget_photons();
-        Self { caches, ending, audited }
+        Self { caches, ending, noise, audited }
+    }
+
+    /// When pixels have enough samples, unless told otherwise.
+    fn usual_goal(&self) -> tiles::Goal {
+        tiles::Goal { noise: self.noise, least: LEAST_SAMPLES }
     }
 }
 
@@ -385,7 +394,7 @@ impl<M: Medium + Sync> Stages<'_, '_, M> {
         let width = job.film.width() as f32;
         let apart = ray([0.5, 0.5]).direction.angle_between(ray([0.5 + 1.0 / width, 0.5]).direction);
         let tell = |filling: &_| (job.tell)(Rounds::<LitWorld<'_, M, World<'_>>>::stage(filling));
-        let mut repaired = Vec::new();
+        let (mut repaired, mut noise) = (Vec::new(), error);
         loop {
             let clock = Stopwatch::start();
             let mut filling = caches.fill(Asked::View { ray, pixel: apart });
@@ -393,9 +402,10 @@ impl<M: Medium + Sync> Stages<'_, '_, M> {
             add_times(&mut spent.filled, ran.stages);
             spent.computed += cache::Kind::ALL.into_iter().map(|kind| filling.computed(kind)).sum::<u64>();
             let audit_rays = job.arguments.audit.unwrap_or_else(|| filling.audit_rays());
+            noise = noise.min(filling.noise_goal(error, job.film.width() * job.film.height()));
             caches = filling.finish();
             if ran.ending != Ending::Done || audit_rays == 0 || job.paths.max_scatterings == 0 {
-                return Filled::new(caches, ran.ending, None);
+                return Filled::new(caches, (ran.ending, noise), None);
             }
             let mut audit = Audit::new(&caches, ray, audit_rays);
             // A part of its rays are as good as all of a shorter one.
@@ -403,12 +413,12 @@ impl<M: Medium + Sync> Stages<'_, '_, M> {
             let ran = threads::run(&mut audit, &world, &self.pool, job.control, share, |_| {});
             add_times(&mut spent.filled, ran.stages);
             if ran.ending == Ending::Cancelled {
-                return Filled::new(caches, ran.ending, None);
+                return Filled::new(caches, (ran.ending, noise), None);
             }
             let (findings, map) = (audit.findings(), Box::new(audit.map()));
             let is_over = time.is_some() || repaired.len() as u32 >= cache::MOST_REPAIRS;
             if is_over || !caches.drop_wrong((&findings, &map), error, ray, &world) {
-                return Filled::new(caches, Ending::Done, Some(Audited { error, findings, map, repaired }));
+                return Filled::new(caches, (Ending::Done, noise), Some(Audited { error, findings, map, repaired }));
             }
             repaired.push((findings, map));
         }
@@ -497,7 +507,7 @@ impl<M: Medium + Sync> Stages<'_, '_, M> {
         }
         // Nothing is as good a use of the rest as less noise; down to the error asked for, if that is what caches are filled for.
         let is_due = job.arguments.error.is_some_and(|due| level.error <= due);
-        let usual = is_due.then_some(tiles::Goal { noise: level.error, least: LEAST_SAMPLES });
+        let usual = is_due.then(|| level.filled.usual_goal());
         let samples = job.settings.samples.min(if is_due { cache::MOST_SAMPLES } else { u32::MAX });
         let goal = job.settings.goal.or(usual);
         let settings = tiles::Settings { samples, goal, time: Some(left()), ..*job.settings };
@@ -529,7 +539,9 @@ impl WithMedium for CacheJob<'_> {
                     self.save(&filled.caches)?;
                     return Err(Stopped("caches").into());
                 }
-                let render = stages.picture(&mut film, &filled.caches, self.settings)?;
+                let goal = self.settings.goal.or_else(|| self.has_usual_goal.then(|| filled.usual_goal()));
+                let settings = tiles::Settings { goal, ..*self.settings };
+                let render = stages.picture(&mut film, &filled.caches, &settings)?;
                 Level { error: asked, film, filled, render }
             }
         };

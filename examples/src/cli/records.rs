@@ -112,6 +112,7 @@ pub(super) fn run(arguments: &RecordsArguments) -> Result<Ending, Failure> {
         paths,
         film: &mut film,
         settings: &settings,
+        has_usual_goal: false,
         control: &control,
         tell: &|stage| bar.tell(stage),
         arguments: &arguments.cache,

@@ -337,6 +337,7 @@ pub(crate) fn render(arguments: &RenderArguments) -> Result<Rendered, Failure> {
                 paths,
                 film: &mut film,
                 settings: &settings,
+                has_usual_goal: arguments.spp.is_none() && arguments.noise.is_none() && arguments.time.is_none(),
                 control: &control,
                 tell: &|stage| bar.tell(stage),
                 arguments: &arguments.cache,
@@ -383,8 +384,6 @@ impl RenderArguments {
 
     /// Samples of a pixel at most, given what the scene names, and the noise at which fewer are enough.
     fn samples(&self, method: Method, named: u32) -> (u32, Option<f64>) {
-        let is_free = self.spp.is_none() && self.time.is_none();
-        let usual = (is_free && method == Method::RadianceCache).then_some(f64::from(self.cache.error()));
         let samples = match (self.spp, self.time, method) {
             (Some(spp), ..) => spp,
             (None, Some(_), _) => u32::MAX,
@@ -393,7 +392,7 @@ impl RenderArguments {
             (None, None, Method::Vpl) => self.beams.pass_samples.map_or(fogbow::vpl::SAMPLES, core::num::NonZero::get),
             (None, None, _) => named,
         };
-        (samples, self.noise.or(usual))
+        (samples, self.noise)
     }
 
     /// Whether anything asked for takes a covariance grid.
