@@ -301,7 +301,9 @@ impl RadianceCaches<'_> {
             if let Some(effort) = self.settings.effort_mut(kind) {
                 *effort = effort.finer(finer);
             }
-            if let Some(photons) = self.settings.photons.as_mut().filter(|_| kind == Kind::Multiple) {
+            // Noise of cells is seen in many places, or again after records were made anew.
+            let are_doubted = kind == Kind::Multiple && (places.is_none() || self.dropped > 0);
+            if let Some(photons) = self.settings.photons.as_mut().filter(|_| are_doubted) {
                 *photons = photons.finer();
                 self.dropped_with_photons = self.dropped + 1;
             }
