@@ -21,6 +21,13 @@ const HALVINGS: i32 = 2;
 /// Share of the time left that a next picture may be foretold to take.
 const TIMELY: f64 = 0.8;
 
+/// Share of the time left that filling caches for a next picture is granted, as it may take longer than foretold. More: less is left for the picture that
+/// there is, if the next is not done; less: fills are cut that would have been done.
+const GRANTED: f64 = 0.9;
+
+/// Share of the time of a fill that its audit may take where time is limited. More: time that less noise would use better; less: it says nothing.
+const AUDITED: f64 = 0.05;
+
 /// Pictures of falling error, one after the other: each is filled caches for half the error of the one before, or a quarter, if that is
 /// foretold to be done in time. As time goes with the square of the error, all before the last take a part of its time.
 ///
@@ -59,6 +66,35 @@ impl Refinement {
     #[must_use]
     pub fn error(&self) -> f32 {
         self.error
+    }
+
+    /// How long filling caches for the picture that is due may take, of the time `left`, before there is more use in going on with the one before: without
+    /// end if there is none.
+    ///
+    /// ```
+    /// # use core::time::Duration;
+    /// # use fogbow::cache::{ERROR_BOUNDS, Refinement};
+    /// let mut refinement = Refinement::new(ERROR_BOUNDS[0]);
+    /// let seconds = Duration::from_secs;
+    /// assert_eq!(refinement.granted(seconds(10)), Duration::MAX);
+    /// assert!(refinement.advance(seconds(1), seconds(10)));
+    /// assert!(refinement.granted(seconds(10)) < seconds(10));
+    /// ```
+    #[must_use]
+    pub fn granted(&self, left: Duration) -> Duration {
+        if self.before.is_some() { left.mul_f64(GRANTED) } else { Duration::MAX }
+    }
+
+    /// How long an audit may take after a fill that `took` so long: a part of its rays are as good as all of a shorter one.
+    ///
+    /// ```
+    /// # use core::time::Duration;
+    /// # use fogbow::cache::Refinement;
+    /// assert_eq!(Refinement::audit_time(Duration::from_secs(20)), Duration::from_secs(1));
+    /// ```
+    #[must_use]
+    pub fn audit_time(took: Duration) -> Duration {
+        took.mul_f64(AUDITED)
     }
 
     /// Goes on to the next picture, after this one `took` so long and while `left` is left; `false` if it would not be done in time, or

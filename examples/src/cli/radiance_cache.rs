@@ -308,12 +308,6 @@ pub(crate) struct Audited {
     pub(crate) repaired: Vec<(Findings, Box<BiasMap>)>,
 }
 
-/// Share of the time left that a finer fill is granted: one foretold to be done in it may take longer.
-const TIMELY: f64 = 0.9;
-
-/// Share of the time of a fill that its audit may take where time is limited.
-const AUDIT_SHARE: f64 = 0.05;
-
 impl CacheJob<'_> {
     fn save(&self, caches: &RadianceCaches<'static>) -> Result<(), Failure> {
         Ok(self.arguments.cache_out.as_ref().map_or(Ok(()), |file| files::save(file, caches, self.tag))?)
@@ -408,8 +402,7 @@ impl<M: Medium + Sync> Stages<'_, '_, M> {
                 return Filled::new(caches, (ran.ending, noise), None);
             }
             let mut audit = Audit::new(&caches, ray, audit_rays);
-            // A part of its rays are as good as all of a shorter one.
-            let share = time.map(|_| Duration::from_secs_f64(AUDIT_SHARE * clock.elapsed().wall));
+            let share = time.map(|_| Refinement::audit_time(Duration::from_secs_f64(clock.elapsed().wall)));
             let ran = threads::run(&mut audit, &world, &self.pool, job.control, share, |_| {});
             add_times(&mut spent.filled, ran.stages);
             if ran.ending == Ending::Cancelled {
@@ -481,9 +474,7 @@ impl<M: Medium + Sync> Stages<'_, '_, M> {
         let mut level = loop {
             let (began, error) = (left(), refinement.error());
             let caches = RadianceCaches::new(job.settings(&self.outline, error));
-            // Without any picture there is nothing to stop for; what takes longer than foretold leaves some time to the one there is.
-            let granted = if best.is_some() { began.mul_f64(TIMELY) } else { Duration::MAX };
-            let filled = self.fill(caches, error, Some(granted), spent);
+            let filled = self.fill(caches, error, Some(refinement.granted(began)), spent);
             if filled.ending != Ending::Done {
                 break best.ok_or(Stopped("caches"))?;
             }
