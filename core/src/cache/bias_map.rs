@@ -145,21 +145,10 @@ impl BiasMap {
         let certain = |region: &AuditedRegion| region.cached.bias.abs() - sure(looks) * region.cached.error;
         off.max_by(|a, b| certain(a).total_cmp(&certain(b)))
     }
-}
 
-/// What is off in a picture, as far as regions tell.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Apart {
-    /// What is cached over all regions that are not [off](AuditedRegion::is_off).
-    pub(super) rest: Deviation,
-    /// By kind, in the order of [`Kind::FINAL`](super::Kind::FINAL), over those that are, as parts of what is off there.
-    pub(super) parts: [f64; 4],
-}
-
-impl BiasMap {
     /// The regions that are certainly off by more than `most`, apart from the others; `None` if none are.
     pub(super) fn apart(&self, most: f64) -> Option<Apart> {
-        self.worst(most)?;
+        let worst = self.worst(most)?.cached;
         let looks = self.regions().len() as u32;
         let (mut light, mut off, mut squares) = (0.0, 0.0, 0.0);
         let mut parts = [0.0; 4];
@@ -182,8 +171,19 @@ impl BiasMap {
             Deviation { bias: 0.0, error: f64::INFINITY }
         };
         let all: f64 = parts.iter().sum();
-        Some(Apart { rest, parts: parts.map(|part| part / all) })
+        Some(Apart { worst, rest, parts: parts.map(|part| part / all) })
     }
+}
+
+/// What is off in a picture, as far as regions tell.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Apart {
+    /// What is cached in [the worst](BiasMap::worst) of the regions that are [off](AuditedRegion::is_off).
+    pub(super) worst: Deviation,
+    /// What is cached over all regions that are not.
+    pub(super) rest: Deviation,
+    /// By kind, in the order of [`Kind::FINAL`](super::Kind::FINAL), over those that are, as parts of what is off there.
+    pub(super) parts: [f64; 4],
 }
 
 /// The number of the region of a point.
@@ -299,18 +299,19 @@ fn add<const N: usize>(sum: &mut [f64; N], numbers: [f64; N]) {
 }
 
 impl Sums {
-    /// Of `d − c b` over rays, of differences `d` and the base `b`; where what was told looks too dark, of `d` alone.
+    /// `c` of the residuals `d − c b` of differences `d` from the base `b`: their ratio, and 0 where what was told looks too dark.
     fn factor(&self, difference: f64) -> f64 {
         if self.base[0] > 0.0 { (difference / self.base[0]).max(0.0) } else { 0.0 }
     }
 
+    /// Of these residuals over rays, of sums of `d`, `d²` and `d b`.
     fn variance(&self, [d, dd, db]: [f64; 3]) -> f64 {
         let (n, c) = (f64::from(self.rays), self.factor(d));
         let mean = (d - c * self.base[0]) / n;
         ((dd - 2.0 * c * db + c * c * self.base[1]) / n - mean * mean).max(0.0)
     }
 
-    /// Of what is cached.
+    /// Central moments of the residuals of what is cached.
     fn own(&self) -> Spread {
         let (n, c, variance) = (f64::from(self.rays), self.factor(self.cached[0]), self.variance(self.cached));
         let mean = (self.cached[0] - c * self.base[0]) / n;

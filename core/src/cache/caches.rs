@@ -1,7 +1,7 @@
 //! All caches of a world together.
 
 use super::asked::Asked;
-use super::audit::Findings;
+use super::audit::{Deviation, Findings};
 use super::bias_map::{Apart, BiasMap};
 use super::eye::{CachedRadiance, Caches, Reader, radiance, radiance_beyond};
 use super::kind::Kind;
@@ -273,26 +273,26 @@ impl RadianceCaches<'_> {
         let to_blame = |kind: Kind| findings.of(kind).filter(|found| found.exceeds(most));
         let none_alone = Kind::FINAL.into_iter().all(|kind| to_blame(kind).is_none());
         let together = Some(findings.cached).filter(|found| found.exceeds(most));
-        let apart = map.apart(most);
-        let places = apart.filter(|apart| !apart.rest.exceeds(most)).and_then(|apart| Some((apart, map.worst(most)?)));
-        let mut any = false;
-        for (kind, number) in Kind::FINAL.into_iter().zip(0..) {
-            let found = match places {
-                Some((Apart { parts, .. }, worst)) => Some(worst.cached).filter(|_| parts[number].abs() > BLAMED),
-                None => {
-                    if none_alone {
-                        together
-                    } else {
-                        to_blame(kind)
-                    }
-                }
-            };
-            let Some(found) = found.filter(|_| self.settings.effort(kind).is_some()) else { continue };
-            any = true;
-            match places {
-                Some(_) => self.doubt_seen(kind, |at| map.at(at).is_off(most, map.regions().len() as u32), &ray, world),
-                None => self.forget(kind),
-            }
+        let places = map.apart(most).filter(|apart| !apart.rest.exceeds(most));
+        let found_of = |(kind, number): (Kind, usize)| match places {
+            Some(Apart { worst, parts, .. }) => Some(worst).filter(|_| parts[number].abs() > BLAMED),
+            None if none_alone => together,
+            None => to_blame(kind),
+        };
+        let is_cached = |kind: Kind| self.settings.effort(kind).is_some();
+        let wrong: [Option<Deviation>; 4] = core::array::from_fn(|number| {
+            let kind = Kind::FINAL[number];
+            found_of((kind, number)).filter(|_| is_cached(kind))
+        });
+        let wrong = || Kind::FINAL.into_iter().zip(wrong).filter_map(|(kind, found)| Some((kind, found?)));
+        if places.is_some() {
+            let is_wrong = |at| map.at(at).is_off(most, map.regions().len() as u32);
+            self.drop_seen(|| wrong().map(|(kind, _)| kind), is_wrong, ray, world);
+        } else {
+            wrong().for_each(|(kind, _)| self.forget(kind));
+        }
+        let any = wrong().next().is_some();
+        for (kind, found) in wrong() {
             // What is off everywhere may be so because of what lights it.
             if matches!(kind, Kind::Surface | Kind::Irradiance) && places.is_none() {
                 self.forget(Kind::CoarseIrradiance);
@@ -365,24 +365,28 @@ impl RadianceCaches<'_> {
         self.settled[kind] = 0;
     }
 
-    /// Drops the records of a kind that reach what eye rays at points of the picture that are `wrong` ask for.
-    fn doubt_seen<M: Medium + ?Sized, S: Scene + ?Sized>(
+    /// Drops the records of some kinds that reach what eye rays at points of the picture that are `wrong` ask for.
+    fn drop_seen<M: Medium + ?Sized, S: Scene + ?Sized, K: Iterator<Item = Kind>>(
         &mut self,
-        kind: Kind,
+        kinds: impl Fn() -> K,
         wrong: impl Fn([f32; 2]) -> bool,
         ray: impl Fn([f32; 2]) -> Ray,
         world: &World<'_, M, S>,
     ) {
-        let (settings, slot) = (&self.settings, &mut self.slots[kind]);
+        let (settings, slots) = (&self.settings, &mut self.slots);
         let asked = Asked::View { ray, pixel: 0.0 };
         for number in (0..settings.rays).filter(|number| wrong(Asked::at(*number))) {
             asked.visit(number, world, settings, |place, _| {
-                if place.is_seen && kind.row().places.hold(&place) {
-                    slot.doubt(place.point);
+                if place.is_seen {
+                    kinds()
+                        .filter(|kind| kind.row().places.hold(&place))
+                        .for_each(|kind| slots[kind].doubt(place.point));
                 }
             });
         }
-        self.settled[kind] = slot.drop_doubted(self.settled[kind]);
+        for kind in kinds() {
+            self.settled[kind] = self.slots[kind].drop_doubted(self.settled[kind]);
+        }
     }
 
     /// Brings all records into the indices.

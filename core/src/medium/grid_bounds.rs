@@ -27,8 +27,8 @@ pub(super) enum Joining {
     Loose,
 }
 
-/// Bounds of all densities of a grid, or of its one density: most grids have no other, and asking for a segment is half of the time of
-/// rays through smoke.
+/// Bounds of all densities of a grid, or of its one density: most grids have no other, and asking for segments is a quarter of
+/// the time of rays through smoke.
 trait DensityBounds: Copy + PartialEq {
     fn of(grid: &DensityGrid<'_>, block: Option<usize>) -> Self;
     fn union(&self, other: &Self) -> Self;
