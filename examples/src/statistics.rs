@@ -13,6 +13,8 @@ pub struct Statistics {
     pub bytes: Vec<(String, u64)>,
     /// Records of caches.
     pub records: Vec<(String, u64)>,
+    /// The relative noise that records leave in the picture, where it was measured.
+    pub record_noise: Option<f32>,
 }
 
 impl Statistics {

@@ -3,9 +3,9 @@
 use core::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 use fogbow::cache::{
-    Asked, Effort, Estimate, FilledRecords, Filling, FillingMemory, Guide, Kind, Limits, PhotonCell, PhotonDeposit,
-    PhotonEffort, Place, RadianceCaches, RaySettings, Reading, Record, Room as Lengths, Settings, Slots, Wanted,
-    clearance, places, room_for,
+    Asked, Effort, Estimate, FilledRecords, Filling, FillingMemory, Glance, Guide, Kind, Limits, PhotonCell,
+    PhotonDeposit, PhotonEffort, Place, RadianceCaches, RaySettings, Reading, Record, Room as Lengths, Settings, Slots,
+    Wanted, clearance, places, room_for,
 };
 use fogbow::host::{Gradients, MajorantSegment, Medium, Properties};
 use fogbow::light::{Light, PointLight};
@@ -446,6 +446,7 @@ fn filled_in(room: &Lengths) -> (Vec<u8>, bool, [usize; 5]) {
     let (mut photons, mut deposits) =
         (vec![PhotonCell::default(); room.photons], vec![PhotonDeposit::default(); room.of_job_deposits]);
     let mut photon_moments = vec![Spectrum::ZERO; room.photon_moments];
+    let mut glances = vec![Glance::default(); room.glances];
     let memory = FillingMemory::lent(Slots {
         wanted: &mut wanted,
         open: [&mut open, &mut still_open],
@@ -455,6 +456,7 @@ fn filled_in(room: &Lengths) -> (Vec<u8>, bool, [usize; 5]) {
         guides: guides.each_mut().map(|guides| &mut guides[..]),
         photons: &mut photons,
         photon_moments: &mut photon_moments,
+        glances: &mut glances,
     });
     let mut of_job = vec![Wanted::default(); room.of_job_wanted];
     let mut open_of_job = vec![0; room.of_job_open];

@@ -16,7 +16,7 @@ use core::ops::Range;
 use super::Estimator;
 use super::bias_map::{BiasMap, RegionSums, Sample};
 use super::caches::RadianceCaches;
-use super::eye::{CachedRadiance, Caches, radiance};
+use super::eye::{Caches, radiance};
 use super::kind::Kind;
 use super::slot::ByKind;
 use crate::host::{Medium, Scene};
@@ -25,7 +25,6 @@ use crate::multiple_scatter;
 use crate::path;
 use crate::sampling::uniform::mix;
 use crate::sampling::{even2, independent, uniform2};
-use crate::spectrum::Spectrum;
 use crate::work::Rounds;
 use crate::world::World;
 
@@ -240,11 +239,6 @@ impl<'c, 's, F: Fn([f32; 2]) -> Ray> Audit<'c, 's, F> {
     }
 }
 
-/// Light by the cache that may hold it, in the order of [`Kind::FINAL`].
-fn by_kind(seen: &CachedRadiance) -> [Spectrum; 4] {
-    [seen.medium_single, seen.medium_surface, seen.medium_multiple, seen.surface_indirect]
-}
-
 impl<M, S, F> Rounds<World<'_, M, S>> for Audit<'_, '_, F>
 where
     M: Medium + ?Sized,
@@ -289,7 +283,7 @@ where
             output.all += all - truth;
             let mut parts = [0.0; 4];
             for ((kind, part), (told, known)) in
-                Kind::FINAL.into_iter().zip(&mut parts).zip(by_kind(&told).into_iter().zip(by_kind(&known)))
+                Kind::FINAL.into_iter().zip(&mut parts).zip(told.by_kind().into_iter().zip(known.by_kind()))
             {
                 // Both estimate what is not cached, each with noise of its own.
                 if settings.effort(kind).is_some() {

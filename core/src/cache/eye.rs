@@ -94,6 +94,11 @@ pub struct CachedRadiance {
 }
 
 impl CachedRadiance {
+    /// Light by the cache that may hold it, in the order of [`Kind::FINAL`].
+    pub(super) fn by_kind(&self) -> [Spectrum; 4] {
+        [self.medium_single, self.medium_surface, self.medium_multiple, self.surface_indirect]
+    }
+
     /// All light together.
     ///
     /// ```

@@ -2,7 +2,7 @@
 //!
 //! Eye rays (or points of a box) say where light is asked for. Photons light cells at which random walks end. Where no record reaches, one is computed against the
 //! frozen caches, many in a round; then they are inserted in order, and those left out that an earlier one of the same round
-//! covers. The order of kinds is that of [`STEPS`].
+//! covers. The order of kinds is that of [`TURNS`].
 //!
 //! Places and radii of records come from some samples, values for the most part from others, as many or more, so that
 //! noise in one does not steer the other (decision 13).
@@ -15,9 +15,10 @@ use super::audit::rays_for;
 use super::caches::RadianceCaches;
 use super::eye::Place;
 use super::guide::Guide;
-use super::kind::{Kind, STEPS, Step};
+use super::kind::{Kind, Step, TURNS, Turn};
 use super::lookup::Reading;
 use super::memory::{FilledRecords, FillingMemory};
+use super::noise::{self, Noise};
 use super::photons::PhotonGrid;
 use super::pilots::Pilots;
 use super::presets::noise_goal;
@@ -31,6 +32,7 @@ use crate::work::Rounds;
 use crate::world::World;
 
 mod estimates;
+mod glances;
 mod pilot;
 mod shoot;
 mod smooth;
@@ -39,7 +41,7 @@ mod steps;
 pub(super) use estimates::MOST_PARTS;
 
 /// Eye rays of one job. More: jobs take longer than some milliseconds in dense worlds.
-const RAYS_PER_JOB: u32 = 16;
+pub(super) const RAYS_PER_JOB: u32 = 16;
 
 /// Places that one job looks up.
 pub(super) const PLACES_PER_JOB: u32 = 1024;
@@ -66,6 +68,10 @@ enum Round {
     Make,
     /// What records tell at some places, and estimates there.
     Pilot,
+    /// What eye rays read before records are estimated anew, and after.
+    Glance {
+        is_second: bool,
+    },
     /// Estimates anew for records from a number on.
     Again {
         from: u32,
@@ -97,6 +103,7 @@ enum Round {
 /// }
 /// // What there is by now can be read at any time.
 /// assert!(!filling.is_cut() && filling.audit_rays() >= 4096);
+/// assert!(filling.record_noise().is_none()); // of what no eye looks at
 /// assert_eq!(filling.noise_goal(0.02, 1 << 20), 0.02); // of a large picture, from few records
 /// assert!(filling.computed(Kind::Single) == 0 && filling.caches().reader().single.is_none());
 /// let caches = filling.finish();
@@ -112,7 +119,7 @@ pub struct Filling<'s, F> {
     round: Round,
     jobs: u32,
     taken: u32,
-    /// Which of [`STEPS`].
+    /// Which of [`TURNS`].
     step: usize,
     /// The rays whose places are being covered.
     batch: [u32; 2],
@@ -128,6 +135,13 @@ pub struct Filling<'s, F> {
     /// What pilots have found, and how often radii have shrunk because of them.
     pilots: Pilots,
     shrunk: u32,
+    /// What glances have found: the noise of records, light that is dark, how often each kind is to be estimated once more, and what noise is left then.
+    noise: Noise,
+    dark: f64,
+    more: ByKind<u32>,
+    left: Option<f32>,
+    /// Rounds of more estimates so far.
+    again: u32,
     /// From these records on nothing is final.
     before: ByKind<usize>,
     /// All records computed, by kind.
@@ -204,6 +218,11 @@ impl<'s> RadianceCaches<'s> {
             parts: 1,
             pilots: Pilots::default(),
             shrunk: 0,
+            noise: Noise::default(),
+            dark: 0.0,
+            more: ByKind([0; Kind::COUNT]),
+            left: None,
+            again: 0,
             before,
             all_computed: ByKind([0; Kind::COUNT]),
             photons_before: 0,
@@ -258,6 +277,13 @@ impl<'s, F> Filling<'s, F> {
         noise_goal(error, pixels, self.walks())
     }
 
+    /// The relative noise that records leave in the picture, root of the mean of squares over its pixels, as eye rays have told it that read records
+    /// before and after they were estimated anew; `None` before that, and where no picture is asked for. What all records share, the noise of photons, is not in it.
+    #[must_use]
+    pub fn record_noise(&self) -> Option<f32> {
+        self.left
+    }
+
     /// Walks and directions of all records of this fill.
     fn walks(&self) -> u64 {
         let samples = |kind: Kind| self.settings().effort(kind).map_or(0, |effort| u64::from(effort.samples));
@@ -275,8 +301,10 @@ impl<'s, F> Filling<'s, F> {
 
     /// The step at hand and its effort.
     fn at_hand(&self) -> Option<(Step, Effort)> {
-        let step = *STEPS.get(self.step)?;
-        Some((step, self.settings().effort(step.kind)?))
+        match *TURNS.get(self.step)? {
+            Turn::Of(step) => Some((step, self.settings().effort(step.kind)?)),
+            Turn::Glances => None,
+        }
     }
 
     /// Whether the final caches have all that is asked for at a place.
@@ -405,9 +433,18 @@ impl<'s, F> Filling<'s, F> {
                 }
             }
             Round::Pilot => self.shrink(),
+            Round::Glance { is_second } => {
+                if is_second {
+                    self.plan_more();
+                } else {
+                    self.dark = noise::dark(self.memory.glances.as_slice());
+                }
+                self.begin(self.step + 1);
+            }
             Round::Again { from } => {
                 self.blend(from as usize);
-                self.begin(self.step + 1);
+                let next = if self.take_round() { self.step } else { self.step + 1 };
+                self.begin(next);
             }
             Round::Smooth { from } => {
                 self.take_means(from);
@@ -457,6 +494,7 @@ where
             Round::Look => self.look(job, output),
             Round::Make => self.make(job, world, output),
             Round::Pilot => self.pilot(job, world, output),
+            Round::Glance { .. } => self.glance(job, world, output),
             Round::Again { from } => self.again(from, job, world, output),
             Round::Smooth { from } => self.smooth(from, job, output),
             Round::Done => {}
@@ -477,6 +515,9 @@ where
         if self.round == Round::Look {
             kept = kept.and(memory.still_open.extend_from_slice(output.open.as_slice()));
         }
+        if let Round::Glance { is_second } = self.round {
+            self.take_glances(&output.glances, is_second);
+        }
         if let Some(estimate) = &output.estimate {
             kept = kept.and(self.keep(estimate, output.higher.as_slice()));
         }
@@ -492,8 +533,9 @@ where
             Round::Search => "fill search",
             Round::Shoot | Round::Divide => "fill photons",
             Round::Done => "",
+            Round::Glance { .. } => "fill glances",
             Round::Look | Round::Make | Round::Pilot | Round::Again { .. } | Round::Smooth { .. } => {
-                match STEPS[self.step].kind {
+                match self.at_hand().map_or(Kind::Multiple, |(step, _)| step.kind) {
                     Kind::Single => "fill single",
                     Kind::Surface => "fill surface",
                     Kind::Multiple => "fill multiple",

@@ -111,8 +111,17 @@ pub(super) enum Pass {
     /// All records of this fill estimated anew, with their radii held and random numbers of `stream`; the new estimate
     /// counts by `share`.
     Again { stream: u64, share: f32 },
+    /// As [`Pass::Again`], as often as the noise of the picture asks for.
+    More { stream: u64 },
     /// All records of this fill, on surfaces, averaged with their neighbours.
     Smooth,
+}
+
+/// A step of a fill, or eye rays that read what there is by then.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Turn {
+    Of(Step),
+    Glances,
 }
 
 /// One step of a fill. All steps are lit by photons and by coarse irradiance.
@@ -127,29 +136,37 @@ pub(super) struct Step {
 const SECOND: f32 = 0.67;
 
 /// Steps in their order: first coarse irradiance, by which surfaces light everything else, and once more, from what it was revised to;
-/// then the final kinds, none of which needs another.
-pub(super) const STEPS: [Step; 11] = {
+/// then the final kinds, none of which needs another. What is to be averaged comes last.
+pub(super) const TURNS: [Turn; 16] = {
     use Kind::{CoarseIrradiance, Irradiance, Multiple, Single, Surface};
-    const fn make(kind: Kind) -> Step {
-        Step { kind, pass: Pass::Make }
+    const fn make(kind: Kind) -> Turn {
+        Turn::Of(Step { kind, pass: Pass::Make })
     }
-    const fn smooth(kind: Kind) -> Step {
-        Step { kind, pass: Pass::Smooth }
+    const fn smooth(kind: Kind) -> Turn {
+        Turn::Of(Step { kind, pass: Pass::Smooth })
     }
-    const fn again(kind: Kind, stream: u64, share: f32) -> Step {
-        Step { kind, pass: Pass::Again { stream, share } }
+    const fn again(kind: Kind, stream: u64, share: f32) -> Turn {
+        Turn::Of(Step { kind, pass: Pass::Again { stream, share } })
+    }
+    const fn more(kind: Kind, stream: u64) -> Turn {
+        Turn::Of(Step { kind, pass: Pass::More { stream } })
     }
     [
         make(CoarseIrradiance),
         again(CoarseIrradiance, 0, 1.0),
         smooth(CoarseIrradiance),
         make(Surface),
-        again(Surface, 1, SECOND),
         make(Single),
         make(Multiple),
-        again(Multiple, 100, SECOND),
         make(Irradiance),
+        Turn::Glances,
+        again(Surface, 1, SECOND),
+        again(Multiple, 100, SECOND),
         again(Irradiance, 101, SECOND),
+        Turn::Glances,
+        more(Surface, 200),
+        more(Multiple, 300),
+        more(Irradiance, 400),
         smooth(Irradiance),
     ]
 };

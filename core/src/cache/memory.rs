@@ -2,7 +2,9 @@
 
 use super::asked::Wanted;
 use super::eye::Place;
+use super::fill::RAYS_PER_JOB;
 use super::guide::Guide;
+use super::noise::Glance;
 use super::photons::{PhotonDeposit, PhotonGrid};
 use super::pilots::Pilots;
 use super::radius::Limits;
@@ -61,6 +63,7 @@ pub struct FilledRecords<'o> {
     pub(super) paths: u32,
     pub(super) flights: u64,
     pub(super) pilots: Pilots,
+    pub(super) glances: [Glance; RAYS_PER_JOB as usize],
     pub(super) is_cut: bool,
 }
 
@@ -105,6 +108,7 @@ impl<'o> FilledRecords<'o> {
             paths: 0,
             flights: 0,
             pilots: Pilots::default(),
+            glances: Default::default(),
             is_cut: false,
         }
     }
@@ -124,6 +128,7 @@ pub struct FillingMemory<'s> {
     pub(super) higher: List<'s, Coefficient>,
     /// What the records of this fill have learnt, kind by kind.
     pub(super) guides: ByKind<List<'s, Guide>>,
+    pub(super) glances: List<'s, Glance>,
     pub(super) photons: PhotonGrid<'s>,
 }
 
@@ -132,7 +137,7 @@ impl<'s> FillingMemory<'s> {
     ///
     /// ```
     /// # #[cfg(feature = "alloc")] {
-    /// # use fogbow::cache::{Asked, Estimate, FilledRecords, FillingMemory, Guide, PhotonCell, RadianceCaches, Settings, Slots, Wanted, room_for};
+    /// # use fogbow::cache::{Asked, Estimate, FilledRecords, FillingMemory, Glance, Guide, PhotonCell, RadianceCaches, Settings, Slots, Wanted, room_for};
     /// # use fogbow::sh::Coefficient;
     /// # use fogbow::{host::Empty, math::{Bounds, Ray, Vec3}, medium::Homogeneous, phase::Phase, spectrum::Spectrum};
     /// # use fogbow::{work, world::{Outline, World}};
@@ -147,6 +152,7 @@ impl<'s> FillingMemory<'s> {
     /// let mut chosen = vec![(0, 0.0); room.chosen];
     /// let (mut estimates, mut higher) = (vec![Estimate::default(); room.estimates], vec![Coefficient::ZERO; room.higher]);
     /// let (mut photons, mut photon_moments) = (vec![PhotonCell::default(); room.photons], vec![Spectrum::ZERO; room.photon_moments]);
+    /// let mut glances = vec![Glance::default(); room.glances];
     /// let mut guides = room.guides.map(|count| vec![Guide::default(); count]);
     /// let memory = FillingMemory::lent(Slots {
     ///     wanted: &mut wanted,
@@ -156,6 +162,7 @@ impl<'s> FillingMemory<'s> {
     ///     higher: &mut higher,
     ///     photons: &mut photons,
     ///     photon_moments: &mut photon_moments,
+    ///     glances: &mut glances,
     ///     guides: guides.each_mut().map(|guides| &mut guides[..]),
     /// });
     /// let mut filling = RadianceCaches::new(settings).fill_in(memory, asked());
@@ -175,6 +182,7 @@ impl<'s> FillingMemory<'s> {
             estimates: slots.estimates.into(),
             higher: slots.higher.into(),
             guides: ByKind(slots.guides.map(List::from)),
+            glances: slots.glances.into(),
             photons: PhotonGrid::new(slots.photons.into(), slots.photon_moments.into()),
         }
     }
@@ -186,6 +194,7 @@ impl<'s> FillingMemory<'s> {
         self.chosen.clear();
         self.estimates.clear();
         self.higher.clear();
+        self.glances.clear();
         self.guides.0.iter_mut().for_each(List::clear);
     }
 }

@@ -23,6 +23,7 @@
 //! | `fill` | [`Filling`]: which places get records, rounds of new ones, better estimates for old ones |
 //! | `memory` | [`FillingMemory`], [`FilledRecords`]: what a fill remembers, and what its jobs leave |
 //! | `pilots` | whether records reach too far, measured in this world |
+//! | `noise` | [`Glance`]: how much noise of records a picture would show, and how often it makes kinds be estimated anew |
 //! | `photons` | [`PhotonEffort`]: light in cells, brought by photons, at which walks end |
 //! | `slot` | a cache of either sort, as filling needs it |
 //! | `smooth` | irradiance averaged over neighbouring records |
@@ -62,6 +63,7 @@ mod index;
 mod kind;
 mod lookup;
 mod memory;
+mod noise;
 mod photons;
 mod pilots;
 mod presets;
@@ -89,6 +91,7 @@ pub use index::{Block, Index, IndexNode};
 pub use kind::Kind;
 pub use lookup::{Basis, Reading, TURNING_DEGREE, TurningBasis};
 pub use memory::{Estimate, FilledRecords, FillingMemory};
+pub use noise::Glance;
 pub use photons::{PhotonCell, PhotonDeposit, PhotonEffort, PhotonGrid};
 pub use presets::{ERROR_BOUNDS, MOST_REPAIRS, MOST_SAMPLES, USUAL_ERROR};
 pub use radius::{Limits, clamp_gradient, clearance, log_gradient_radius, neighbour_clamped, valid_radius};

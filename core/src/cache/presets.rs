@@ -95,6 +95,27 @@ const COARSEST: f32 = 1.5;
 /// How often records are made anew because an audit has found them wrong. More: time for what finer records do not mend; fewer: what one finer step leaves stays.
 pub const MOST_REPAIRS: u32 = 2;
 
+/// What is left of the variance between two readings of a picture (before and after records are estimated anew), once they are mixed and averaged with
+/// their neighbours. Larger: estimates that nobody sees; smaller: noise.
+pub(super) const LEFT: f64 = 0.15;
+
+/// Estimates that a record then has, in units of one made anew.
+pub(super) const ESTIMATES: f64 = 1.5;
+
+/// How often records are estimated once more at most. More: time; fewer: noise where light is hard to find.
+pub(super) const MOST_ROUNDS: u32 = 8;
+
+/// Part of the noise of a picture by which it falls at least, over the part by which work grows. Less: long fills for little; more: noise.
+pub(super) const PAYS: f64 = 0.5;
+
+/// Part of the error asked for that noise of records may have in a picture.
+const NOISE: f64 = 0.8;
+
+/// The noise that records may have in a picture, for an error that is asked for.
+pub(super) fn record_noise(error: f32) -> f64 {
+    NOISE * f64::from(error)
+}
+
 /// Part of what is off in regions from which on a kind is to blame. Larger: what several kinds have wrong stays; smaller: records are made anew that are right.
 pub(super) const BLAMED: f64 = 0.25;
 

@@ -1,8 +1,9 @@
 //! Lent memory of caches and of their filling, and how much of it is needed.
 
-use super::fill::{MOST_PARTS, PLACES_OF_JOB, PLACES_PER_JOB};
+use super::fill::{MOST_PARTS, PLACES_OF_JOB, PLACES_PER_JOB, RAYS_PER_JOB};
 use super::guide::Guide;
 use super::kind::Kind;
+use super::noise::{self, Glance};
 use super::photons::{DEPOSITS_OF_JOB, PhotonCell};
 use super::record::MAX_STRIDE;
 use super::settings::Settings;
@@ -37,6 +38,8 @@ pub struct Room {
     pub of_job_deposits: usize,
     /// [`Slots::photons`].
     pub photons: usize,
+    /// [`Slots::glances`].
+    pub glances: usize,
     /// [`Slots::photon_moments`].
     pub photon_moments: usize,
 }
@@ -72,6 +75,9 @@ pub fn room_for(settings: &Settings, places: usize, records: usize) -> Room {
     room.chosen = settings.round as usize;
     room.estimates = room.chosen.max(records);
     room.higher = room.estimates * stride;
+    if settings.error > 0.0 {
+        room.glances = noise::RAYS.min(settings.rays).next_multiple_of(RAYS_PER_JOB) as usize;
+    }
     room.of_job_wanted = places.min(PLACES_OF_JOB);
     room.of_job_open = places.min(PLACES_PER_JOB as usize);
     room.of_job_higher = stride;
@@ -116,4 +122,6 @@ pub struct Slots<'s> {
     pub photons: &'s mut [PhotonCell],
     /// For the light in them.
     pub photon_moments: &'s mut [Spectrum],
+    /// What eye rays read before records are estimated anew.
+    pub glances: &'s mut [Glance],
 }

@@ -251,6 +251,8 @@ pub(super) struct Cached {
     pub(super) filled: Vec<(&'static str, Seconds)>,
     /// Records that were computed.
     pub(super) computed: u64,
+    /// The relative noise that records leave in the picture.
+    pub(super) record_noise: Option<f32>,
     /// Time to read and write them.
     pub(super) files: [Seconds; 2],
     pub(super) render: Outcome,
@@ -285,6 +287,7 @@ impl Filled {
 struct Spent {
     filled: Vec<(&'static str, Seconds)>,
     computed: u64,
+    record_noise: Option<f32>,
 }
 
 /// Adds times to those of the same stages.
@@ -396,6 +399,7 @@ impl<M: Medium + Sync> Stages<'_, '_, M> {
             add_times(&mut spent.filled, ran.stages);
             spent.computed += cache::Kind::ALL.into_iter().map(|kind| filling.computed(kind)).sum::<u64>();
             let audit_rays = job.arguments.audit.unwrap_or_else(|| filling.audit_rays());
+            spent.record_noise = filling.record_noise().or(spent.record_noise);
             noise = noise.min(filling.noise_goal(error, job.film.width() * job.film.height()));
             caches = filling.finish();
             if ran.ending != Ending::Done || audit_rays == 0 || job.paths.max_scatterings == 0 {
@@ -542,7 +546,7 @@ impl WithMedium for CacheJob<'_> {
         let files = [loaded, clock.elapsed()];
         let Level { film, filled: Filled { caches, audited, .. }, render, .. } = level;
         *self.film = film;
-        let Spent { filled, computed } = spent;
-        Ok(Cached { caches, filled, computed, files, render, audited })
+        let Spent { filled, computed, record_noise } = spent;
+        Ok(Cached { caches, filled, computed, record_noise, files, render, audited })
     }
 }

@@ -366,6 +366,7 @@ pub(crate) fn render(arguments: &RenderArguments) -> Result<Rendered, Failure> {
             statistics.records.push((kind.name().to_owned(), cached.caches.records(kind).len() as u64));
         }
         statistics.records.push(("computed".to_owned(), cached.computed));
+        statistics.record_noise = cached.record_noise;
         if let Some(audited) = cached.audited.as_ref().filter(|_| arguments.aov) {
             film = bias_layers::drawn(&film, &audited.map)?;
         }

@@ -219,6 +219,8 @@ impl Report<'_> {
             format!("\"audit\": {{\"made_for\": {made_for}, \"rays\": {rays}, {all}, \"repaired\": [{repaired}], \"regions\": {map}}},\n  ")
         });
         let (bytes, records) = (listed(&self.statistics.bytes), listed(&self.statistics.records));
+        let noise =
+            self.statistics.record_noise.map_or_else(String::new, |noise| format!("\"record_noise\": {noise},\n  "));
         let instead = self.choice.instead.as_ref();
         let instead = instead.map_or_else(String::new, |reason| format!("\"why_path\": {},\n  ", quoted(reason)));
         format!(
@@ -226,7 +228,7 @@ impl Report<'_> {
              \"samples_per_pixel\": {},\n  \"seed\": {},\n  \"ended\": \"{reason}\",\n  \
              \"seconds\": {{{phases}\n  }},\n  \"counts\": {{\"samples\": {}, \"rays\": {}, \"shadow_rays\": {}, \
              \"collisions\": {}, \"medium_lookups\": {}, \"medium_segments\": {}, \"cache_lookups\": {}, \"cache_misses\": {}, \"non_finite\": {}}},\n  \
-             {energy}{findings}\"records\": {{{records}}},\n  \"bytes\": {{{bytes}}}\n}}\n",
+             {energy}{findings}{noise}\"records\": {{{records}}},\n  \"bytes\": {{{bytes}}}\n}}\n",
             quoted(&self.arguments.scene.display().to_string()),
             match self.choice.method {
                 Method::Path => "path",

@@ -4,8 +4,8 @@
 
 use fogbow::beams::{self, Beams};
 use fogbow::cache::{
-    self, Asked, Effort, Estimate, FillingMemory, Guide, Kind, Limits, PhotonCell, PhotonDeposit, PhotonEffort, Place,
-    RadianceCaches, Slots, SurfaceCache, TurningBasis, VolumeCache, Wanted,
+    self, Asked, Effort, Estimate, FillingMemory, Glance, Guide, Kind, Limits, PhotonCell, PhotonDeposit, PhotonEffort,
+    Place, RadianceCaches, Slots, SurfaceCache, TurningBasis, VolumeCache, Wanted,
 };
 use fogbow::host::{Hit, Scene};
 use fogbow::light::{Light, PointLight, SphereLight};
@@ -125,6 +125,7 @@ const PHOTONS: PhotonEffort =
 /// Cells of light, and what the photons of a job leave in them: these are few.
 const CELLS: usize = 64;
 const MOMENTS: usize = 9 * CELLS;
+const GLANCES: usize = 0;
 const DEPOSITS: usize = 2048;
 
 /// Where light is asked for.
@@ -143,7 +144,7 @@ fn filled(world: &Foggy<'_>, read: impl FnOnce(&RadianceCaches<'_>, bool)) {
     let (mut chosen, mut estimates) = ([(0, 0.0); ROUND], [Estimate::default(); RECORDS]);
     let (mut higher, mut of_job) = ([Coefficient::ZERO; STRIDE * RECORDS], [Coefficient::ZERO; STRIDE]);
     let (mut photons, mut deposits) = ([PhotonCell::default(); CELLS], [PhotonDeposit::default(); DEPOSITS]);
-    let mut photon_moments = [Spectrum::ZERO; MOMENTS];
+    let (mut photon_moments, mut glances) = ([Spectrum::ZERO; MOMENTS], [Glance::default(); GLANCES]);
     let mut guides = [[Guide::default(); RECORDS]; Kind::COUNT];
     let ([wanted, found], [open, still_open, looked_up]) = (&mut wanted, &mut open);
     let memory = FillingMemory::lent(Slots {
@@ -155,6 +156,7 @@ fn filled(world: &Foggy<'_>, read: impl FnOnce(&RadianceCaches<'_>, bool)) {
         guides: guides.each_mut().map(|guides| &mut guides[..]),
         photons: &mut photons,
         photon_moments: &mut photon_moments,
+        glances: &mut glances,
     });
     let mut filling = caches.fill_in(memory, ASKED);
     work::finish(&mut filling, world, &mut cache::FilledRecords::lent(found, looked_up, &mut of_job, &mut deposits));
@@ -438,6 +440,6 @@ mod tests {
         assert_eq!((room.chosen, room.estimates, room.higher), (ROUND, RECORDS, STRIDE * RECORDS));
         assert_eq!((room.of_job_higher, room.guides), (STRIDE, [RECORDS; Kind::COUNT]));
         assert!(room.photons <= CELLS && room.photon_moments <= MOMENTS && room.of_job_deposits >= DEPOSITS);
-        assert_eq!(room.chunks, CHUNKS);
+        assert_eq!((room.chunks, room.glances), (CHUNKS, GLANCES));
     }
 }

@@ -153,7 +153,11 @@ impl<F> Filling<'_, F> {
         output: &mut FilledRecords<'_>,
     ) {
         let Some((step, effort)) = self.at_hand() else { return };
-        let Pass::Again { stream, .. } = step.pass else { return };
+        let stream = match step.pass {
+            Pass::Again { stream, .. } => stream,
+            Pass::More { stream } => stream + u64::from(self.again),
+            Pass::Make | Pass::Smooth => return,
+        };
         let open = self.memory.open.as_slice();
         let Some(&offset) = open.get(job as usize) else { return };
         let is_same = |other: &&u32| **other == offset;

@@ -4,8 +4,9 @@ use super::estimates::usual_radius;
 use super::{Filling, PLACES_PER_JOB, Round};
 use crate::cache::Record;
 use crate::cache::asked::Wanted;
-use crate::cache::kind::{Kind, Pass, STEPS};
+use crate::cache::kind::{Kind, Pass, Step, TURNS, Turn};
 use crate::cache::memory::{Estimate, FillingMemory};
+use crate::cache::presets;
 use crate::cache::slot::{Attached, Inserted};
 use crate::sampling::uniform::mix;
 use crate::sh::Coefficient;
@@ -20,8 +21,11 @@ const LAST_BATCH: u32 = 4096;
 impl<F> Filling<'_, F> {
     /// The first step from number `from` on that has something to do.
     pub(super) fn begin(&mut self, from: usize) {
-        for number in from..STEPS.len() {
+        for (number, turn) in TURNS.iter().enumerate().skip(from) {
             self.step = number;
+            if *turn == Turn::Glances && self.begin_glances() {
+                return;
+            }
             let Some((step, effort)) = self.at_hand() else { continue };
             let slot = &self.caches.slots[step.kind];
             if slot.is_off() {
@@ -36,9 +40,11 @@ impl<F> Filling<'_, F> {
                         return;
                     }
                 }
-                Pass::Again { .. } => {
+                Pass::More { .. } if self.more[step.kind] == 0 => {}
+                Pass::Again { .. } | Pass::More { .. } => {
                     let from = self.before[step.kind].min(slot.len());
                     if slot.len() > from {
+                        self.again += u32::from(matches!(step.pass, Pass::More { .. }));
                         self.begin_again((step, effort), from);
                         return;
                     }
@@ -164,16 +170,28 @@ impl<F> Filling<'_, F> {
         added
     }
 
+    /// Counts a round of more estimates; whether others follow.
+    pub(super) fn take_round(&mut self) -> bool {
+        let Some((Step { kind, pass: Pass::More { .. } }, _)) = self.at_hand() else { return false };
+        self.more[kind] = self.more[kind].saturating_sub(1);
+        if self.more[kind] == 0 {
+            self.again = 0;
+        }
+        self.more[kind] > 0
+    }
+
     /// Mixes the estimates of a round into the records from a number on, and adds to what was learnt.
     pub(super) fn blend(&mut self, from: usize) {
         let Some((step, effort)) = self.at_hand() else { return };
-        let Pass::Again { share, .. } = step.pass else { return };
         let slot = &mut self.caches.slots[step.kind];
         let stride = slot.stride();
         for (i, estimate) in self.memory.estimates.as_slice().iter().enumerate() {
             self.all_computed[step.kind] += 1;
-            // More of an estimate that took more samples.
-            let share = 1.0 - (1.0 - share) / estimate.effort;
+            // More of an estimate that took more samples; of one that takes no more than those before it, its part of all.
+            let share = match step.pass {
+                Pass::Again { share, .. } => 1.0 - (1.0 - share) / estimate.effort,
+                _ => 1.0 / (self.again as f32 + presets::ESTIMATES as f32),
+            };
             let attached = attached(step.kind, estimate, self.memory.higher.as_slice(), i, stride);
             // Where memory was too small some jobs have left none.
             let offset = estimate.number as usize;

@@ -1,0 +1,74 @@
+//! Rounds in which eye rays read what there is: how much noise of records a picture would show.
+
+use super::{Filling, RAYS_PER_JOB, Round};
+use crate::cache::asked::Asked;
+use crate::cache::eye::radiance;
+use crate::cache::kind::{Kind, TURNS, Turn};
+use crate::cache::memory::FilledRecords;
+use crate::cache::noise::{self, Glance, rounds_for};
+use crate::cache::presets;
+use crate::host::{Medium, Scene};
+use crate::math::Ray;
+use crate::sampling::independent;
+use crate::sampling::uniform::mix;
+use crate::world::World;
+
+impl<F> Filling<'_, F> {
+    /// Begins a round of glances, if what they tell is of use.
+    pub(super) fn begin_glances(&mut self) -> bool {
+        let Asked::View { .. } = self.asked else { return false };
+        let is_new = |kind: Kind| self.caches.slots[kind].len() > self.before[kind];
+        if !(self.settings().error > 0.0 && Kind::FINAL.into_iter().any(is_new)) {
+            return false;
+        }
+        let is_second = TURNS[..self.step].contains(&Turn::Glances);
+        if is_second && self.memory.glances.is_empty() {
+            return false;
+        }
+        let jobs = noise::RAYS.min(self.settings().rays).div_ceil(RAYS_PER_JOB);
+        self.enter(Round::Glance { is_second }, jobs);
+        true
+    }
+
+    /// What some eye rays read, between those that records were made for.
+    pub(super) fn glance<M: Medium + ?Sized, S: Scene + ?Sized>(
+        &self,
+        job: u32,
+        world: &World<'_, M, S>,
+        output: &mut FilledRecords<'_>,
+    ) where
+        F: Fn([f32; 2]) -> Ray,
+    {
+        let Asked::View { ray, .. } = &self.asked else { return };
+        let (settings, estimator) = (self.settings(), self.estimator(world));
+        let seed = mix(settings.seed ^ 0x9_1a_ce);
+        for (i, glance) in output.glances.iter_mut().enumerate() {
+            let number = job * RAYS_PER_JOB + i as u32;
+            let ray = ray(Asked::at(settings.rays.wrapping_add(number)));
+            let mut rng = independent(seed, u64::from(number), 0);
+            *glance = Glance::new(&radiance(&ray, &estimator, &self.caches.reader(), &settings.eye, &mut rng));
+        }
+    }
+
+    /// Takes the readings of a job.
+    pub(super) fn take_glances(&mut self, glances: &[Glance], is_second: bool) {
+        if is_second {
+            let before = self.memory.glances.as_slice().get((self.taken * RAYS_PER_JOB) as usize..);
+            self.noise.add(before.unwrap_or(&[]), glances, self.dark);
+        } else {
+            self.is_cut |= self.memory.glances.extend_from_slice(glances).is_err();
+        }
+    }
+
+    /// How often each kind is to be estimated once more, for what the glances have told.
+    pub(super) fn plan_more(&mut self) {
+        let most = presets::record_noise(self.settings().error);
+        let costs = Kind::FINAL.map(|kind| {
+            let samples = self.settings().effort(kind).map_or(0, |effort| effort.samples);
+            (self.caches.slots[kind].len() - self.before[kind]) as f64 * f64::from(samples)
+        });
+        let rounds = rounds_for(self.noise.variances(), costs, most * most, self.walks() as f64);
+        Kind::FINAL.into_iter().zip(rounds).for_each(|(kind, rounds)| self.more[kind] = rounds);
+        self.left = Some(libm::sqrt(noise::left(self.noise.variances(), rounds)) as f32);
+    }
+}

@@ -1,0 +1,222 @@
+//! Noise of caches in a picture: measured along eye rays, and the estimates that it asks for.
+//!
+//! The same eye rays read all caches before their records are estimated anew and after. The direct light of both readings has the same random
+//! numbers, so that what differs is the noise of records, mixed and carried as pictures have them, and nothing else. A kind whose noise
+//! weighs much, for its light or for how hard it is to find, is estimated anew more often; one that the picture hardly shows is not.
+
+use super::eye::CachedRadiance;
+use super::kind::Kind;
+use super::presets;
+
+/// Eye rays that are read. Fewer: single dark pixels decide; more: time.
+pub(super) const RAYS: u32 = 1024;
+
+/// Light (of the mean of a picture) that is added to that of each ray, in squares: relative errors of what is black mean nothing.
+const DARK: f64 = 0.1;
+
+/// The kinds that a picture is read from.
+const KINDS: usize = Kind::FINAL.len();
+
+/// What an eye ray reads: light of each kind, in the order of [`Kind::FINAL`], and all light; means of the channels.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Glance {
+    kinds: [f32; KINDS],
+    all: f32,
+}
+
+impl Glance {
+    /// Of light that is no number nothing.
+    pub(super) fn new(seen: &CachedRadiance) -> Self {
+        let kinds = seen.by_kind().map(|light| light.mean());
+        let all = seen.total().mean();
+        if all.is_finite() { Self { kinds, all } } else { Self::default() }
+    }
+}
+
+/// Light below which relative errors of a picture mean nothing.
+pub(super) fn dark(glances: &[Glance]) -> f64 {
+    let sum: f64 = glances.iter().map(|glance| f64::from(glance.all)).sum();
+    if glances.is_empty() { 0.0 } else { DARK * sum / glances.len() as f64 }
+}
+
+/// Squares of what differs from reading to reading, over those of the light of each ray.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(super) struct Noise {
+    squares: [f64; KINDS],
+    rays: f64,
+}
+
+impl Noise {
+    /// Adds rays read `before` and after, in the same order, of a picture as dark as [`dark`] says.
+    pub(super) fn add(&mut self, before: &[Glance], after: &[Glance], dark: f64) {
+        for (before, after) in before.iter().zip(after) {
+            let all = f64::from(after.all);
+            let light = all * all + dark * dark;
+            self.rays += 1.0;
+            for ((sum, a), b) in self.squares.iter_mut().zip(before.kinds).zip(after.kinds) {
+                let difference = f64::from(a - b);
+                // Written so that what is no number counts as nothing.
+                if light > 0.0 && difference.is_finite() {
+                    *sum += difference * difference / light;
+                }
+            }
+        }
+    }
+
+    /// Relative variance that a kind leaves in the picture, in the order of [`Kind::FINAL`].
+    pub(super) fn variances(&self) -> [f64; KINDS] {
+        self.squares.map(|sum| if self.rays > 0.0 { presets::LEFT * sum / self.rays } else { 0.0 })
+    }
+}
+
+/// Of variances, what is left of their sum after so many more estimates.
+pub(super) fn left(variances: [f64; KINDS], rounds: [u32; KINDS]) -> f64 {
+    variances.iter().zip(rounds).map(|(variance, rounds)| left_of(*variance, rounds)).sum()
+}
+
+fn left_of(variance: f64, rounds: u32) -> f64 {
+    variance * presets::ESTIMATES / (presets::ESTIMATES + f64::from(rounds))
+}
+
+/// How often each kind should be estimated once more, so that `variances` sum to `most`: always the one whose noise falls by most for its
+/// cost, as long as noise falls faster than the work that was `spent` grows.
+pub(super) fn rounds_for(variances: [f64; KINDS], costs: [f64; KINDS], most: f64, spent: f64) -> [u32; KINDS] {
+    let (mut rounds, mut work) = ([0; KINDS], spent);
+    loop {
+        let sum = left(variances, rounds);
+        let gain = |k: usize| (left_of(variances[k], rounds[k]) - left_of(variances[k], rounds[k] + 1)) / costs[k];
+        let is_open = |&k: &usize| rounds[k] < presets::MOST_ROUNDS && costs[k] > 0.0;
+        let best = (0..KINDS).filter(is_open).max_by(|&a, &b| gain(a).total_cmp(&gain(b)));
+        match best {
+            Some(k) if sum > most && gain(k) / (sum + most) > presets::PAYS / work => {
+                work += costs[k];
+                rounds[k] += 1;
+            }
+            _ => return rounds,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::spectrum::Spectrum;
+
+    fn glance(multiple: f32, indirect: f32) -> Glance {
+        let light = |value| Spectrum::splat(value);
+        let seen = CachedRadiance {
+            medium_multiple: light(multiple),
+            surface_indirect: light(indirect),
+            ..Default::default()
+        };
+        Glance::new(&seen)
+    }
+
+    #[test]
+    fn noise_is_relative_to_the_light_of_each_ray() {
+        let mut noise = Noise::default();
+        let before = [glance(1.0, 0.0), glance(8.0, 2.0)];
+        assert!((dark(&before) - 0.55).abs() < 1e-6);
+        noise.add(&before, &[glance(1.1, 0.0), glance(8.0, 3.0)], 0.0);
+        let [single, surface, multiple, irradiance] = noise.variances();
+        assert_eq!((single, surface), (0.0, 0.0));
+        let expected = |difference: f64, light: f64| presets::LEFT * (difference / light).powi(2) / 2.0;
+        assert!((multiple / expected(0.1, 1.1) - 1.0).abs() < 1e-5, "{multiple}");
+        assert!((irradiance / expected(1.0, 11.0) - 1.0).abs() < 1e-5, "{irradiance}");
+        // Rays in the dark, and light that is no number, say nothing.
+        let before = noise;
+        noise.add(&[glance(0.0, 0.0)], &[glance(f32::NAN, 0.0)], 0.0);
+        assert_eq!(noise.squares, before.squares);
+        assert_eq!(Noise::default().variances(), [0.0; KINDS]);
+    }
+
+    #[test]
+    fn what_is_noisy_and_cheap_is_estimated_more_often() {
+        let rounds = |variances, costs| rounds_for(variances, costs, 1.0, 10.0);
+        assert_eq!(rounds([0.0, 0.3, 0.3, 0.3], [1.0; 4]), [0; 4], "little noise");
+        assert_eq!(rounds([0.0, 0.1, 0.1, 2.0], [1.0; 4]), [0, 0, 0, 3], "as much as it takes");
+        let shared = rounds([0.0, 2.0, 2.0, 2.0], [1.0, 1.0, 4.0, 1.0]);
+        assert!(shared[1] == shared[3] && shared[2] < shared[1] && shared[0] == 0, "{shared:?}");
+        assert!(left([0.0, 2.0, 2.0, 2.0], shared) < 3.5);
+        assert_eq!(rounds([0.0, 1e9, 0.0, 0.0], [1.0; 4]), [0, presets::MOST_ROUNDS, 0, 0], "but not for ever");
+        assert_eq!(rounds([0.0, 1.2, 0.0, 0.0], [1e6; 4]), [0; 4], "nor where it does not pay");
+        assert_eq!(rounds([0.0, 5.0, 0.0, 0.0], [0.0; 4]), [0; 4], "nor what has no records");
+    }
+}
+
+#[cfg(all(test, feature = "alloc"))]
+mod measured {
+    use super::*;
+    use crate::cache::{Asked, RadianceCaches, Settings};
+    use crate::host::{Hit, Scene};
+    use crate::light::Light;
+    use crate::math::{Bounds, Ray, Vec3};
+    use crate::medium::{Homogeneous, Placed, Region};
+    use crate::phase::Phase;
+    use crate::sampling::Generator;
+    use crate::spectrum::Spectrum;
+    use crate::surface::Surface;
+    use crate::work::finish;
+    use crate::world::{Outline, World};
+
+    /// A black ball around the world, with a window to the sky.
+    struct Shutter;
+
+    impl Scene for Shutter {
+        fn closest_hit(&self, ray: &Ray) -> Option<Hit> {
+            let along = ray.origin.dot(ray.direction);
+            let distance = (along * along + 25.0 - ray.origin.length_squared()).sqrt() - along;
+            let normal = -ray.at(distance).normalize();
+            let is_closed = normal.y > -0.9 && distance < ray.length;
+            is_closed.then_some(Hit { distance, normal, surface: Surface::BLACK, light: None })
+        }
+    }
+
+    const SEEDS: u64 = 4;
+    const READ: u32 = 200;
+
+    fn eye(at: [f32; 2]) -> Ray {
+        Ray::new(3.0 * Vec3::Z, Vec3::new(at[0] - 0.5, at[1] - 0.5, -2.0).normalize())
+    }
+
+    /// Relative noise of light from a window to the sky in a ball of fog, of pictures asked for with such an error: as fills say, and between seeds.
+    fn told_and_seen(error: f32) -> [f64; 2] {
+        let fog = Homogeneous::new(Spectrum::splat(1.8), Spectrum::splat(0.2), Phase::ISOTROPIC).unwrap();
+        let ball = Placed::new(fog, Region::sphere(Vec3::ZERO, 1.0).unwrap());
+        let lights = [Light::Constant(Spectrum::ONE)];
+        let world = World { medium: &ball, scene: &Shutter, lights: (&lights).into() };
+        let bounds = Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE };
+        let settings = Settings::for_outline(&Outline::of(&world, bounds), 0.02).with_walks(128);
+        let (mut told, mut seen) = (0.0, alloc::vec![[0.0; 4]; READ as usize]);
+        for seed in 0..SEEDS {
+            let settings = Settings { seed, rays: 1024, error, ..settings };
+            let mut filling = RadianceCaches::new(settings).fill(Asked::View { ray: eye, pixel: 0.02 });
+            finish(&mut filling, &world, &mut Default::default());
+            told += f64::from(filling.record_noise().unwrap()).powi(2) / SEEDS as f64;
+            let caches = filling.finish();
+            for (number, sums) in seen.iter_mut().enumerate() {
+                let ray = eye(Asked::at(9000 + number as u32));
+                let glance = Glance::new(&caches.radiance(&ray, &world, &mut Generator::new(number as u64)));
+                let [value, all] = [glance.kinds[1], glance.all].map(f64::from);
+                [1.0, value, value * value, all].into_iter().zip(sums).for_each(|(x, sum)| *sum += x);
+            }
+        }
+        let seeds = SEEDS as f64;
+        let dark = DARK * seen.iter().map(|[.., all]| all / seeds).sum::<f64>() / f64::from(READ);
+        let relative = |&[n, sum, squares, all]: &[f64; 4]| {
+            let variance = (squares - sum * sum / n) / (n - 1.0);
+            variance / ((all / n).powi(2) + dark * dark)
+        };
+        let seen = seen.iter().map(relative).sum::<f64>() / f64::from(READ);
+        [told.sqrt(), seen.sqrt()]
+    }
+
+    #[test]
+    fn what_glances_tell_is_the_noise_between_seeds() {
+        let [told, seen] = told_and_seen(0.5);
+        assert!((0.6..1.7).contains(&(told / seen)), "{told} {seen}");
+        // With a smaller error records are estimated more often, and it is told how much that helps.
+        let [less_told, less_seen] = told_and_seen(0.01);
+        assert!(less_told < 0.75 * told && (0.6..1.7).contains(&(less_told / less_seen)), "{less_told} {less_seen}");
+    }
+}
