@@ -42,6 +42,7 @@
 //! | run a method on threads, or a little in every frame | [`work`]; `fogbow_std::threads::run` is a driver for threads |
 //! | know light at a point, with its gradient | [`single_scatter`], [`multiple_scatter`], [`cache`] |
 //! | know light at a point from caches, for any direction (a probe) | `in_scattered_sh` of [`cache::RadianceCaches`] |
+//! | bake light into 3D textures | [`bake`] |
 //! | know how much light gets through | [`transmittance`] |
 //! | know how fast light varies | [`covariance`] |
 //! | follow light from the lights | [`photon`] |
@@ -74,6 +75,7 @@ pub use bytemuck;
 pub use glam;
 pub use rand_core;
 
+pub mod bake;
 pub mod beams;
 pub mod bytes;
 pub mod cache;

@@ -1,5 +1,7 @@
 //! Light scattered at one point of the medium, for methods that choose their points themselves.
 
+use core::cell::Cell;
+
 use glam::{Vec2, Vec3};
 
 use super::{InScattered, Settings, connect, trace};
@@ -46,6 +48,33 @@ fn connected<M: Medium + ?Sized, S: Scene + ?Sized>(
         connect::next_event(&world, point, false, &origin, value, random, rng)
     };
     world.lights.iter().map(of).sum()
+}
+
+/// What the lights alone send to `point`: calls `visit(to_light, irradiance across the light)` (W·m⁻²) for a connection to each, or to one
+/// of them where there are more than a few. The sums over the calls are unbiased.
+pub(crate) fn arriving<M: Medium + ?Sized, S: Scene + ?Sized>(
+    world: &World<'_, M, S>,
+    point: Vec3,
+    rng: &mut Generator,
+    mut visit: impl FnMut(Vec3, Spectrum),
+) {
+    let random = (uniform(rng), uniform2(rng));
+    let mut connect = |lights| {
+        let direction = Cell::new(Vec3::ZERO);
+        let noted = |to_light: Vec3| {
+            direction.set(to_light);
+            (Spectrum::ONE, 0.0)
+        };
+        let light = connect::next_event(&World { lights, ..*world }, point, false, |_| point, noted, random, rng);
+        if !light.is_black() {
+            visit(direction.get(), light);
+        }
+    };
+    if world.lights.len() > FEW {
+        connect(world.lights);
+    } else {
+        world.lights.iter().for_each(|light| connect(core::slice::from_ref(light).into()));
+    }
 }
 
 /// Radiance `∫ p L dω` (W·m⁻²·sr⁻¹) scattered at `point` towards `to_eye` (unit), *without* `σₛ`: an unbiased

@@ -24,8 +24,8 @@ mod connect;
 mod in_scatter;
 pub mod trace;
 
-pub(crate) use in_scatter::direct;
 pub use in_scatter::in_scattered;
+pub(crate) use in_scatter::{arriving, direct};
 pub use trace::{Delegate, radiance, radiance_beyond};
 
 use crate::spectrum::Spectrum;

@@ -1,0 +1,131 @@
+//! The light that arrives at a probe.
+
+use glam::Vec3;
+
+use super::basis::{AXES, MOST_COEFFICIENTS, Parts, ProbeBasis, Projection, Quantity};
+use super::settings::BakeSettings;
+use crate::cache::{Basis, Kind, RadianceCaches, Reader, VolumeCache};
+use crate::host::{Medium, Scene};
+use crate::light::Lights;
+use crate::math::Ray;
+use crate::math::float::{PI, sqrt};
+use crate::path;
+use crate::sampling::{Generator, uniform2, warp};
+use crate::single_scatter::lattice;
+use crate::spectrum::Spectrum;
+use crate::world::World;
+
+/// Points of every light with extent that a pass connects to. More: less noise in half shadows, for more shadow rays.
+const CONNECTIONS: u32 = 4;
+
+/// What knows the light of a probe.
+pub(super) struct Sampler<'a, 'c> {
+    pub(super) settings: &'a BakeSettings,
+    pub(super) caches: Option<&'a RadianceCaches<'c>>,
+}
+
+impl Sampler<'_, '_> {
+    /// The numbers of a probe at `point`: an estimate from one pass, unbiased but for what caches know.
+    pub(super) fn sample<M: Medium + ?Sized, S: Scene + ?Sized>(
+        &self,
+        point: Vec3,
+        world: &World<'_, M, S>,
+        rng: &mut Generator,
+        held: &mut [Spectrum],
+    ) {
+        let BakeSettings { basis, quantity, orders, ref paths, .. } = *self.settings;
+        held.fill(Spectrum::ZERO);
+        if paths.max_scatterings == 0 {
+            return;
+        }
+        let properties = world.medium.properties(point);
+        let phase = if properties.scattering.is_black() { self.settings.phase } else { properties.phase };
+        let projection = Projection::new(basis, quantity, &phase);
+        let mut due = Parts::from(orders);
+        if quantity == Quantity::InScattered || basis == ProbeBasis::Fluence {
+            due.lights = due.lights && !self.read(Kind::Single, point, held);
+            due.surfaces = due.surfaces && !self.read(Kind::Surface, point, held);
+            due.medium = due.medium && !self.read(Kind::Multiple, point, held);
+        }
+        let mut add = |to_light: Vec3, irradiance: Spectrum| projection.add(to_light, irradiance, held);
+        let share = 1.0 / CONNECTIONS as f32;
+        for _ in 0..CONNECTIONS {
+            let mut connected = |lights: Lights<'_>, rng: &mut Generator| {
+                let world = World { lights, ..*world };
+                path::arriving(&world, point, rng, |to_light, light| add(to_light, light * share));
+            };
+            if due.lights {
+                world.lights.but_sky().for_each(|lights| connected(lights, rng));
+            }
+            if due.surfaces {
+                let skies = world.lights.iter().filter(|light| light.is_sky());
+                skies.for_each(|sky| connected(core::slice::from_ref(sky).into(), rng));
+            }
+        }
+        if paths.max_scatterings == 1 || !(due.surfaces || due.medium) {
+            return;
+        }
+        let count = self.settings.directions;
+        let weight = 4.0 * PI / count as f32;
+        let shift = uniform2(rng);
+        for j in 0..count {
+            let to_light = warp::uniform_sphere(lattice(j, count, shift));
+            let [surfaces, medium] = self.scattered(&Ray::new(point, to_light), world, rng);
+            let of = |light: Spectrum, is_due: bool| if is_due { light } else { Spectrum::ZERO };
+            let light = of(surfaces, due.surfaces) + of(medium, due.medium);
+            if !light.is_black() {
+                add(to_light, light * weight);
+            }
+        }
+    }
+
+    /// Radiance (W·m⁻²·sr⁻¹) at the origin of `ray` from surfaces, but for their own emission, and from the medium.
+    fn scattered<M: Medium + ?Sized, S: Scene + ?Sized>(
+        &self,
+        ray: &Ray,
+        world: &World<'_, M, S>,
+        rng: &mut Generator,
+    ) -> [Spectrum; 2] {
+        let gathers = self.settings.quantity == Quantity::Irradiance && self.settings.basis != ProbeBasis::Fluence;
+        if let Some(caches) = self.caches.filter(|_| gathers) {
+            let seen = caches.radiance(ray, world, rng);
+            let medium = seen.medium_single + seen.medium_surface + seen.medium_multiple;
+            return [seen.surface_direct + seen.surface_indirect, medium];
+        }
+        let paths = self.settings.paths;
+        // The probe's own scattering is one of them; what is emitted towards it is left to connections.
+        let before = path::Settings { max_scatterings: paths.max_scatterings - 1, lights_visible: true, ..paths };
+        let seen = path::radiance(ray, world, &before, rng);
+        [seen.surface_direct + seen.surface_indirect, seen.medium_single + seen.medium_multiple]
+    }
+
+    /// Adds what caches know of a kind of light; whether they do.
+    fn read(&self, kind: Kind, point: Vec3, held: &mut [Spectrum]) -> bool {
+        let Some(Reader { cache, reading }) = self.caches.and_then(|caches| caches.volume(kind)) else { return false };
+        let mut part = [Spectrum::ZERO; MOST_COEFFICIENTS];
+        let part = &mut part[..held.len()];
+        let is_known = match self.settings.basis {
+            ProbeBasis::SphericalHarmonics { .. } => cache.expansion(point, &reading, part),
+            ProbeBasis::Fluence => {
+                let is_known = cache.expansion(point, &reading, part);
+                // φ = 4π ⟨L_i⟩, and the mean of an expansion is c₀₀/√(4π).
+                part[0] *= sqrt(4.0 * PI);
+                is_known
+            }
+            ProbeBasis::AmbientCube => cube(cache, |basis| cache.lookup(point, basis, &reading), part),
+        };
+        if is_known {
+            held.iter_mut().zip(part).for_each(|(sum, part)| *sum += *part);
+        }
+        is_known
+    }
+}
+
+/// Looks towards all six directions; whether there was an answer for each.
+fn cube(cache: &VolumeCache<'_>, look: impl Fn(&Basis) -> Option<Spectrum>, part: &mut [Spectrum]) -> bool {
+    AXES.into_iter().zip(part).all(|(axis, slot)| {
+        let known = look(&Basis::new(axis, cache.degree()));
+        *slot = known.unwrap_or_default();
+        known.is_some()
+    })
+}

@@ -1,0 +1,430 @@
+//! Passes over bricks of probes, as work in rounds.
+//!
+//! A job is one pass over one brick. What a pass finds depends on the brick's probes, the number of the pass, and the world; a round gives every
+//! brick that is not good enough one pass more. So bricks may be done in any order, and a grid knows all that is needed to go on.
+
+use core::ops::Range;
+
+use glam::Vec3;
+
+use super::arriving::Sampler;
+use super::basis::MOST_COEFFICIENTS;
+use super::grid::{BakeMemory, Brick, Probe, ProbeGrid};
+use super::places;
+use super::settings::{BakeError, BakeSettings};
+use crate::cache::RadianceCaches;
+use crate::host::{Medium, Scene};
+use crate::math::Bounds;
+use crate::sampling::independent;
+use crate::spectrum::Spectrum;
+use crate::storage::List;
+use crate::work::Rounds;
+use crate::world::World;
+
+/// Sets the random numbers of probes apart from those of pixels.
+const BAKE_KEY: u64 = 0xba4e_0000_0000_0000;
+
+/// Passes before errors are believed. Fewer: bricks end by luck; more: time where little is sampled.
+const LEAST_PASSES: u32 = 8;
+
+/// What a job of a [`Bake`] leaves.
+#[derive(Debug)]
+#[cfg_attr(feature = "alloc", derive(Default))]
+pub struct BakedProbes<'o> {
+    values: List<'o, Spectrum>,
+    probes: List<'o, Probe>,
+    is_cut: bool,
+}
+
+impl<'o> BakedProbes<'o> {
+    /// In lent memory: for 64 probes, and as many times the numbers that one holds. Where there is less, the brick stays as it is and
+    /// [`Bake::is_cut`].
+    ///
+    /// ```
+    /// # use fogbow::{bake::{BakedProbes, Probe, ProbeBasis}, spectrum::Spectrum};
+    /// const NUMBERS: usize = 9; // ProbeBasis::count of degree 2
+    /// let (mut values, mut probes) = ([Spectrum::ZERO; 64 * NUMBERS], [Probe::default(); 64]);
+    /// let output = BakedProbes::lent(&mut values, &mut probes); // for one job after the other
+    /// # assert_eq!(ProbeBasis::SphericalHarmonics { degree: 2 }.count(), NUMBERS);
+    /// # drop(output);
+    /// ```
+    #[must_use]
+    pub fn lent(values: &'o mut [Spectrum], probes: &'o mut [Probe]) -> Self {
+        Self { values: values.into(), probes: probes.into(), is_cut: false }
+    }
+}
+
+/// The bake of a grid, as [`Rounds`] of jobs in a [`World`].
+///
+/// ```
+/// # use fogbow::{host::Empty, light::Light, math::{Bounds, Vec3}, phase::Lobe, medium::{Homogeneous, Placed, Region}};
+/// # use fogbow::{spectrum::Spectrum, work, world::{Outline, World}};
+/// # #[cfg(feature = "alloc")] {
+/// use fogbow::bake::{Bake, BakeSettings, BakedProbes};
+/// // Fog that absorbs nothing, below an even sky: as bright as the sky, from everywhere.
+/// let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::splat(0.5), Lobe::HenyeyGreenstein { g: 0.5 })?;
+/// let ball = Placed::new(fog, Region::sphere(Vec3::ZERO, 1.0)?);
+/// let sky = [Light::Constant(Spectrum::ONE)];
+/// let world = World { medium: &ball, scene: &Empty, lights: (&sky).into() };
+/// let outline = Outline::of(&world, Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE });
+///
+/// let mut bake = Bake::new(BakeSettings { error: 0.05, ..BakeSettings::for_outline(&outline, [4, 4, 4]) })?;
+/// work::finish(&mut bake, &world, &mut BakedProbes::default()); // Or job by job, or on threads: see `work`.
+/// assert!(bake.share() == 1.0 && !bake.is_cut() && bake.error() < 0.05);
+/// assert!(bake.grid().passes(0) >= 8);
+/// let grid = bake.finish();
+/// assert!((grid.value(Vec3::ZERO, Vec3::X)[0] - 1.0).abs() < 0.1);
+/// # }
+/// # Ok::<(), Box<dyn core::error::Error>>(())
+/// ```
+#[derive(Debug)]
+pub struct Bake<'s, 'c> {
+    settings: BakeSettings,
+    grid: ProbeGrid<'s>,
+    caches: Option<&'c RadianceCaches<'c>>,
+    /// The brick whose result is due.
+    next: u32,
+    bricks: u32,
+    /// Relative error of the whole, and the share of the work that is done, after the last round.
+    error: f32,
+    share: f32,
+    is_cut: bool,
+}
+
+#[cfg(feature = "alloc")]
+impl<'c> Bake<'static, 'c> {
+    /// In memory that grows; all light is sampled, without bias.
+    ///
+    /// # Errors
+    /// What cannot be baked.
+    pub fn new(settings: BakeSettings) -> Result<Self, BakeError> {
+        Self::new_in(BakeMemory::default(), settings)
+    }
+}
+
+impl<'s, 'c> Bake<'s, 'c> {
+    /// In lent memory.
+    ///
+    /// # Errors
+    /// What cannot be baked.
+    ///
+    /// ```
+    /// # use fogbow::{host::Empty, light::Light, math::{Bounds, Vec3}, medium::Homogeneous, phase::Phase, spectrum::Spectrum};
+    /// # use fogbow::{work, world::{Outline, World}};
+    /// use fogbow::bake::{Bake, BakeMemory, BakeSettings, BakedProbes, Brick, Probe, ProbeBasis};
+    /// # let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::ONE, Phase::ISOTROPIC)?;
+    /// # let world = World { medium: &fog, scene: &Empty, lights: (&[]).into() };
+    /// # let outline = Outline::of(&world, Bounds { min: Vec3::ZERO, max: Vec3::ONE });
+    /// let settings = BakeSettings { basis: ProbeBasis::Fluence, ..BakeSettings::for_outline(&outline, [4, 4, 4]) };
+    /// let (mut values, mut deviations) = ([Spectrum::ZERO; 64], [0.0; 64]);
+    /// let (mut probes, mut bricks) = ([Probe::default(); 64], [Brick::default(); 1]);
+    /// let memory = BakeMemory {
+    ///     values: (&mut values[..]).into(),
+    ///     deviations: (&mut deviations[..]).into(),
+    ///     probes: (&mut probes[..]).into(),
+    ///     bricks: (&mut bricks[..]).into(),
+    /// };
+    /// let mut bake = Bake::new_in(memory, settings)?;
+    /// let (mut of_job, mut beside) = ([Spectrum::ZERO; 64], [Probe::default(); 64]);
+    /// work::finish(&mut bake, &world, &mut BakedProbes::lent(&mut of_job, &mut beside));
+    /// assert!(!bake.is_cut() && bake.finish().value(Vec3::ONE, Vec3::Z).is_black()); // no lights
+    /// # Ok::<(), Box<dyn core::error::Error>>(())
+    /// ```
+    pub fn new_in(memory: BakeMemory<'s>, settings: BakeSettings) -> Result<Self, BakeError> {
+        Ok(Self::over(ProbeGrid::new(&settings, memory)?, settings))
+    }
+
+    fn over(grid: ProbeGrid<'s>, settings: BakeSettings) -> Self {
+        let bricks = grid.memory.bricks.len() as u32;
+        Self { settings, grid, caches: None, next: 0, bricks, error: f32::INFINITY, share: 0.0, is_cut: false }
+    }
+
+    /// Goes on where an earlier bake was left, whose `grid` was baked by the same settings: the bits of one that was not. A smaller error, or
+    /// more passes, is what may differ.
+    ///
+    /// # Errors
+    /// A grid of other cells or of other light: [`BakeError::Memory`].
+    ///
+    /// ```
+    /// # use fogbow::{host::Empty, light::Light, math::{Bounds, Vec3}, medium::Homogeneous, phase::Phase, spectrum::Spectrum};
+    /// # use fogbow::{work, world::{Outline, World}};
+    /// # use fogbow::bake::{Bake, BakeError, BakeSettings, BakedProbes};
+    /// # #[cfg(feature = "alloc")] {
+    /// # let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::ONE, Phase::ISOTROPIC)?;
+    /// # let sky = [Light::Constant(Spectrum::ONE)];
+    /// # let world = World { medium: &fog, scene: &Empty, lights: (&sky).into() };
+    /// # let bounds = Bounds { min: Vec3::ZERO, max: Vec3::ONE };
+    /// # let mut settings = BakeSettings { most_passes: 3, ..BakeSettings::for_outline(&Outline::of(&world, bounds), [2, 2, 2]) };
+    /// # settings.paths.max_scatterings = 2;
+    /// let mut bake = Bake::new(settings)?;
+    /// work::step(&mut bake, &world, &mut BakedProbes::default()); // one pass
+    /// let mut again = Bake::resume(bake.finish(), settings)?;
+    /// work::finish(&mut again, &world, &mut BakedProbes::default());
+    /// assert!(again.finish().passes(0) >= 2);
+    /// # let other = BakeSettings { counts: [1, 1, 1], ..settings };
+    /// # assert_eq!(Bake::resume(Bake::new(settings)?.finish(), other).err(), Some(BakeError::Memory));
+    /// # }
+    /// # Ok::<(), Box<dyn core::error::Error>>(())
+    /// ```
+    pub fn resume(grid: ProbeGrid<'s>, settings: BakeSettings) -> Result<Self, BakeError> {
+        let held = (settings.basis, settings.quantity, settings.orders);
+        if settings.lattice()? != grid.lattice || held != (grid.basis, grid.quantity, grid.orders) {
+            return Err(BakeError::Memory);
+        }
+        let mut bake = Self::over(grid, settings);
+        match bake.grid.memory.bricks.as_slice().iter().position(|brick| brick.passes < brick.due) {
+            Some(brick) => bake.next = brick as u32,
+            None => bake.plan(),
+        }
+        Ok(bake)
+    }
+
+    /// Takes what radiance caches know from them, where they were filled for the same world and all of the box
+    /// ([`Asked::Box`](crate::cache::Asked::Box)). Only the rest is sampled: light straight from the lights, unless it is cached, and what no
+    /// record reaches. Irradiance is gathered along rays that see what caches know.
+    ///
+    /// What caches have wrong is in the probes, and in no standard error. Light that a medium emits is in none.
+    ///
+    /// ```
+    /// # use fogbow::{host::Empty, light::{Light, PointLight}, math::{Bounds, Vec3}, medium::{Homogeneous, Placed, Region}, phase::Phase};
+    /// # use fogbow::cache::{Asked, FilledRecords, RadianceCaches, Settings};
+    /// # use fogbow::{spectrum::Spectrum, work, world::{Outline, World}};
+    /// # use fogbow::bake::{Bake, BakeSettings, BakedProbes, Orders, ProbeBasis};
+    /// # #[cfg(feature = "alloc")] {
+    /// # let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::splat(0.8), Phase::ISOTROPIC)?;
+    /// # let ball = Placed::new(fog, Region::sphere(Vec3::ZERO, 1.0)?);
+    /// # let lamps = [Light::Point(PointLight::from_flux(0.2 * Vec3::Y, Spectrum::ONE)?)];
+    /// # let world = World { medium: &ball, scene: &Empty, lights: (&lamps).into() };
+    /// # let bounds = Bounds { min: Vec3::splat(-0.5), max: Vec3::splat(0.5) };
+    /// # let outline = Outline::of(&world, Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE });
+    /// # let settings = Settings { rays: 200, ..Settings::for_outline(&outline, 0.02).with_walks(64) };
+    /// let mut filling = RadianceCaches::new(settings).fill(Asked::anywhere_in(bounds));
+    /// work::finish(&mut filling, &world, &mut FilledRecords::default());
+    /// let caches = filling.finish();
+    /// let settings = BakeSettings {
+    ///     bounds,
+    ///     basis: ProbeBasis::Fluence,
+    ///     orders: Orders::Indirect,
+    ///     ..BakeSettings::for_outline(&outline, [4, 4, 4])
+    /// };
+    /// let mut bake = Bake::new(settings)?.with_caches(&caches);
+    /// work::finish(&mut bake, &world, &mut BakedProbes::default());
+    /// let grid = bake.finish();
+    /// let point = grid.lattice().centre(21);
+    /// assert_eq!(grid.held(21)[0], caches.fluence(point).unwrap());
+    /// # }
+    /// # Ok::<(), Box<dyn core::error::Error>>(())
+    /// ```
+    #[must_use]
+    pub fn with_caches(self, caches: &'c RadianceCaches<'c>) -> Self {
+        Self { caches: Some(caches), ..self }
+    }
+
+    /// Bakes the bricks anew that have a part in a box (m), where the world has changed; all others stay as they are. Nothing else changes if
+    /// nothing has changed.
+    ///
+    /// ```
+    /// # use fogbow::{host::Empty, light::Light, math::{Bounds, Vec3}, medium::Homogeneous, phase::Phase, spectrum::Spectrum};
+    /// # use fogbow::{work, world::{Outline, World}};
+    /// # use fogbow::bake::{Bake, BakeSettings, BakedProbes};
+    /// # #[cfg(feature = "alloc")] {
+    /// # let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::ONE, Phase::ISOTROPIC)?;
+    /// # let sky = [Light::Constant(Spectrum::ONE)];
+    /// # let world = World { medium: &fog, scene: &Empty, lights: (&sky).into() };
+    /// # let bounds = Bounds { min: Vec3::ZERO, max: Vec3::ONE };
+    /// # let mut settings = BakeSettings { most_passes: 2, ..BakeSettings::for_outline(&Outline::of(&world, bounds), [8, 1, 1]) };
+    /// # settings.paths.max_scatterings = 1;
+    /// let mut bake = Bake::new(settings)?;
+    /// work::finish(&mut bake, &world, &mut BakedProbes::default());
+    /// bake.bake_anew(Bounds { min: Vec3::ZERO, max: Vec3::splat(0.3) });
+    /// assert_eq!(bake.grid().passes(0), 0); // one of two bricks
+    /// assert_eq!(bake.grid().passes(7), 2);
+    /// # }
+    /// # Ok::<(), Box<dyn core::error::Error>>(())
+    /// ```
+    pub fn bake_anew(&mut self, bounds: Bounds) {
+        let (lattice, half) = (self.grid.lattice, 0.5 * self.grid.lattice.cell());
+        for brick in 0..self.bricks as usize {
+            let touches = |index: usize| {
+                let centre = lattice.centre(index);
+                (centre + half).cmpge(bounds.min).all() && (centre - half).cmple(bounds.max).all()
+            };
+            if self.grid.in_brick(brick).any(touches) {
+                self.grid.memory.bricks.as_mut_slice()[brick] = Brick { passes: 0, due: 1 };
+            }
+        }
+        self.next = 0;
+    }
+
+    /// The grid, as far as it is baked.
+    #[must_use]
+    pub fn grid(&self) -> &ProbeGrid<'s> {
+        &self.grid
+    }
+
+    /// The grid, as far as it is baked.
+    #[must_use]
+    pub fn finish(self) -> ProbeGrid<'s> {
+        self.grid
+    }
+
+    /// Standard error of what was sampled, a root mean square over all valid probes and their numbers in proportion to the mean of the
+    /// grid; infinite before there are two passes.
+    #[must_use]
+    pub fn error(&self) -> f32 {
+        self.error
+    }
+
+    /// About what share of the work is done, in [0, 1].
+    #[must_use]
+    pub fn share(&self) -> f32 {
+        if self.jobs_left() { self.share } else { 1.0 }
+    }
+
+    /// Whether lent memory was too small for what a job found, and a brick was left out.
+    #[must_use]
+    pub fn is_cut(&self) -> bool {
+        self.is_cut
+    }
+
+    fn jobs_left(&self) -> bool {
+        self.next < self.bricks
+    }
+
+    /// Which bricks have one more pass.
+    fn plan(&mut self) {
+        let Self { settings, grid, .. } = self;
+        let (mut level, mut count) = (0.0_f64, 0_u32);
+        for (index, _) in grid.probes().iter().enumerate().filter(|(_, probe)| probe.is_valid()) {
+            level += f64::from(grid.basis.level(grid.held(index)));
+            count += 1;
+        }
+        let level = level / f64::from(count.max(1));
+        let (mut squares, mut due, mut done) = (0.0_f64, 0_u32, 0.0_f32);
+        for brick in 0..self.bricks as usize {
+            let (mut sum, mut numbers) = (0.0_f64, 0_u32);
+            for index in grid.in_brick(brick).filter(|index| grid.probes()[*index].is_valid()) {
+                for number in 0..grid.basis.count() {
+                    let error = f64::from(grid.error(index, number));
+                    sum += error * error;
+                    numbers += 1;
+                }
+            }
+            squares += sum;
+            let relative = libm::sqrt(sum / f64::from(numbers.max(1))) / level;
+            let Brick { passes, .. } = grid.memory.bricks.as_slice()[brick];
+            // Where nothing is random nothing is gained, nor in the dark, where the quotient is no number.
+            let is_known = sum == 0.0 && passes >= 2;
+            let is_good = is_known || passes >= LEAST_PASSES && !(relative > f64::from(settings.error));
+            if numbers == 0 || is_good || passes >= settings.most_passes {
+                done += 1.0;
+                continue;
+            }
+            let whole =
+                f64::from(passes) * (relative / f64::from(settings.error)) * (relative / f64::from(settings.error));
+            let whole = whole.max(f64::from(LEAST_PASSES)).min(f64::from(settings.most_passes));
+            done += (f64::from(passes) / whole).min(1.0) as f32;
+            grid.memory.bricks.as_mut_slice()[brick].due = passes + 1;
+            due += 1;
+        }
+        let numbers = f64::from(count) * grid.basis.count() as f64;
+        let error = libm::sqrt(squares / numbers.max(1.0)) / level;
+        // In the dark there is nothing to be in proportion to.
+        self.error = if error.is_nan() { 0.0 } else { error as f32 };
+        self.share = done / self.bricks.max(1) as f32;
+        self.next = if due > 0 { 0 } else { self.bricks };
+    }
+}
+
+impl<M: Medium + ?Sized, S: Scene + ?Sized> Rounds<World<'_, M, S>> for Bake<'_, '_> {
+    type Output<'o> = BakedProbes<'o>;
+
+    fn jobs(&self) -> Range<u32> {
+        self.next..self.bricks
+    }
+
+    fn run(&self, job: u32, world: &World<'_, M, S>, output: &mut BakedProbes<'_>) {
+        let BakedProbes { values, probes, is_cut } = output;
+        values.clear();
+        probes.clear();
+        *is_cut = false;
+        let (grid, settings) = (&self.grid, &self.settings);
+        let Some(&Brick { passes, due }) = grid.memory.bricks.as_slice().get(job as usize) else { return };
+        if passes >= due {
+            return;
+        }
+        let (cell, each) = (grid.lattice.cell(), grid.basis.count());
+        let sampler = Sampler { settings, caches: self.caches };
+        for index in grid.in_brick(job as usize) {
+            let point = grid.lattice.centre(index);
+            let probe = if passes == 0 { looked_at(point, cell, world, settings) } else { grid.probes()[index] };
+            let mut held = [Spectrum::ZERO; MOST_COEFFICIENTS];
+            let held = &mut held[..each];
+            if probe.is_valid() {
+                let mut rng = independent(settings.seed, BAKE_KEY | index as u64, passes);
+                sampler.sample(point, world, &mut rng, held);
+                // No light is better than no number, which would be in all that is mixed with it.
+                held.iter_mut().filter(|number| !number.is_finite()).for_each(|number| *number = Spectrum::ZERO);
+            }
+            *is_cut |= probes.push(probe).is_err() || values.extend_from_slice(held).is_err();
+        }
+    }
+
+    fn accept(&mut self, output: &BakedProbes<'_>) {
+        if !self.jobs_left() {
+            return;
+        }
+        let brick = self.next as usize;
+        self.next += 1;
+        self.is_cut |= output.is_cut;
+        let each = self.grid.basis.count();
+        let grid = &mut self.grid;
+        let Brick { passes, due } = grid.memory.bricks.as_slice()[brick];
+        if passes < due && !output.is_cut {
+            let found = output.values.as_slice().chunks_exact(each).zip(output.probes.as_slice());
+            for (index, (held, probe)) in grid.in_brick(brick).zip(found) {
+                let BakeMemory { values, deviations, probes, .. } = &mut grid.memory;
+                probes.as_mut_slice()[index] = *probe;
+                let values = &mut values.as_mut_slice()[index * each..][..each];
+                let deviations = &mut deviations.as_mut_slice()[index * each..][..each];
+                for ((mean, deviation), found) in values.iter_mut().zip(deviations).zip(held) {
+                    add(mean, deviation, *found, passes + 1);
+                }
+            }
+        }
+        if passes < due {
+            // A brick that finds no room has its passes, too, or it would be tried for ever.
+            grid.memory.bricks.as_mut_slice()[brick].passes = due;
+        }
+        if self.next == self.bricks {
+            self.plan();
+        }
+    }
+
+    fn stage(&self) -> &'static str {
+        "bake"
+    }
+}
+
+/// Mean and squared deviations with number `n` (Welford 1962), the deviations as a mean over channels.
+fn add(mean: &mut Spectrum, deviation: &mut f32, found: Spectrum, n: u32) {
+    if n == 1 {
+        (*mean, *deviation) = (found, 0.0);
+        return;
+    }
+    let before = found - *mean;
+    *mean += before / n as f32;
+    *deviation += (before * (found - *mean)).mean();
+}
+
+/// A probe of which nothing is known yet.
+fn looked_at<M: Medium + ?Sized, S: Scene + ?Sized>(
+    point: Vec3,
+    cell: Vec3,
+    world: &World<'_, M, S>,
+    settings: &BakeSettings,
+) -> Probe {
+    let extinction = world.medium.mean_extinction(point, 0.5 * cell.min_element());
+    let albedo = world.medium.properties(point).albedo();
+    Probe { extinction, albedo, state: places::state(point, cell, world, settings) as u32 }
+}

@@ -1,0 +1,352 @@
+//! What was baked.
+
+use bytemuck::{Pod, Zeroable};
+use glam::Vec3;
+
+use super::basis::{MOST_COEFFICIENTS, Orders, ProbeBasis, Quantity};
+use super::settings::{BakeError, BakeSettings};
+use crate::covariance::Lattice;
+use crate::math::float::sqrt;
+use crate::spectrum::Spectrum;
+use crate::storage::{Full, List};
+
+/// Probes along each side of a brick, which a job bakes.
+pub(super) const BRICK: u32 = 4;
+
+/// Most rounds of dilation: each goes one probe farther.
+const MOST_ROUNDS: u32 = 1024;
+
+/// What becomes of a probe.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ProbeState {
+    /// Nothing is known of it yet.
+    Unknown,
+    /// It holds light.
+    Valid,
+    /// It stands in a wall: it has no part in look-ups.
+    InWall,
+    /// No medium is near: it has no part in look-ups, and where it stands none is needed.
+    Empty,
+}
+
+/// What lies beside the light of a probe.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Pod, Zeroable)]
+#[repr(C)]
+pub struct Probe {
+    /// Mean extinction (m⁻¹) of the medium within half a cell.
+    pub extinction: Spectrum,
+    /// Single-scattering albedo of the medium at the probe; 0 without a medium.
+    pub albedo: Spectrum,
+    /// A [`ProbeState`] by its number.
+    pub(super) state: u32,
+}
+
+impl Probe {
+    /// What has become of it.
+    ///
+    /// ```
+    /// # use fogbow::bake::{Probe, ProbeState};
+    /// assert_eq!(Probe::default().state(), ProbeState::Unknown);
+    /// ```
+    #[must_use]
+    pub fn state(&self) -> ProbeState {
+        match self.state {
+            1 => ProbeState::Valid,
+            2 => ProbeState::InWall,
+            3 => ProbeState::Empty,
+            _ => ProbeState::Unknown,
+        }
+    }
+
+    pub(super) fn is_valid(&self) -> bool {
+        self.state == ProbeState::Valid as u32
+    }
+}
+
+/// How far a brick of probes is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Pod, Zeroable)]
+#[repr(C)]
+pub struct Brick {
+    /// Passes that are in its probes.
+    pub passes: u32,
+    /// Passes that are to be, by the end of this round.
+    pub(super) due: u32,
+}
+
+/// Memory of a [`Bake`](super::Bake), and of the [`ProbeGrid`] that comes of it.
+#[derive(Debug)]
+#[cfg_attr(feature = "alloc", derive(Default))]
+pub struct BakeMemory<'s> {
+    /// For each probe as many as [`ProbeBasis::count`].
+    pub values: List<'s, Spectrum>,
+    /// As many.
+    pub deviations: List<'s, f32>,
+    /// One for each probe.
+    pub probes: List<'s, Probe>,
+    /// One for 4 × 4 × 4 probes.
+    pub bricks: List<'s, Brick>,
+}
+
+/// Probes in the cells of a box: what a [`Bake`](super::Bake) makes.
+///
+/// ```
+/// # use fogbow::{host::Empty, light::Light, math::{Bounds, Vec3}, phase::Lobe, medium::{Homogeneous, Placed, Region}};
+/// # use fogbow::{spectrum::Spectrum, work, world::{Outline, World}};
+/// # #[cfg(feature = "alloc")] {
+/// use fogbow::bake::{Bake, BakeSettings, BakedProbes, Orders, ProbeBasis, ProbeState, Quantity};
+/// // A ball of fog in one corner of the box, below an even sky.
+/// # let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::splat(0.5), Lobe::HenyeyGreenstein { g: 0.5 })?;
+/// let ball = Placed::new(fog, Region::sphere(Vec3::ZERO, 0.4)?);
+/// # let sky = [Light::Constant(Spectrum::ONE)];
+/// # let world = World { medium: &ball, scene: &Empty, lights: (&sky).into() };
+/// # let outline = Outline::of(&world, Bounds { min: Vec3::ZERO, max: Vec3::ONE });
+/// # let settings = BakeSettings { most_passes: 2, ..BakeSettings::for_outline(&outline, [4, 4, 4]) };
+/// # let mut bake = Bake::new(settings)?;
+/// # work::finish(&mut bake, &world, &mut BakedProbes::default());
+/// let mut grid = bake.finish();
+/// assert_eq!((grid.basis(), grid.quantity()), (ProbeBasis::SphericalHarmonics { degree: 2 }, Quantity::InScattered));
+/// assert_eq!(grid.orders(), Orders::All);
+///
+/// // A probe: its numbers, their errors, what lies beside.
+/// let probe = grid.lattice().index(Vec3::splat(0.1)).unwrap();
+/// assert_eq!((grid.held(probe).len(), grid.passes(probe)), (9, 2));
+/// assert!(grid.error(probe, 0) < 1.0 && grid.probes()[probe].albedo[0] == 1.0);
+///
+/// // Anywhere: all numbers, and what share of the probes around has any; or the light in a direction.
+/// let mut held = [Spectrum::ZERO; 9];
+/// assert!(grid.look_up(Vec3::splat(0.2), &mut held) > 0.999);
+/// assert!((grid.value(Vec3::splat(0.2), Vec3::X)[0] - 1.0).abs() < 0.5);
+///
+/// // Where there is no fog nothing was baked; other probes' light spreads there.
+/// let far = grid.lattice().index(Vec3::splat(0.9)).unwrap();
+/// assert!(grid.probes()[far].state() == ProbeState::Empty && grid.held(far)[0].is_black());
+/// assert!(grid.dilate() > 0 && !grid.held(far)[0].is_black());
+/// assert_eq!(grid.bytes(), 64 * (9 * 16 + 28) + 8);
+/// # }
+/// # Ok::<(), Box<dyn core::error::Error>>(())
+/// ```
+#[derive(Debug)]
+pub struct ProbeGrid<'s> {
+    pub(super) lattice: Lattice,
+    pub(super) basis: ProbeBasis,
+    pub(super) quantity: Quantity,
+    pub(super) orders: Orders,
+    pub(super) memory: BakeMemory<'s>,
+}
+
+impl<'s> ProbeGrid<'s> {
+    /// Of which nothing is known.
+    pub(super) fn new(settings: &BakeSettings, memory: BakeMemory<'s>) -> Result<Self, BakeError> {
+        let lattice = settings.lattice()?;
+        let BakeSettings { basis, quantity, orders, .. } = *settings;
+        let mut grid = Self { lattice, basis, quantity, orders, memory };
+        let (probes, numbers) = (lattice.cell_count(), lattice.cell_count() * settings.basis.count());
+        let bricks = grid.brick_counts().iter().map(|&n| n as usize).product();
+        let BakeMemory { values, deviations, probes: states, bricks: progress } = &mut grid.memory;
+        let mut reset = || {
+            values.reset(numbers, Spectrum::ZERO)?;
+            deviations.reset(numbers, 0.0)?;
+            states.reset(probes, Probe::default())?;
+            progress.reset(bricks, Brick { passes: 0, due: 1 })
+        };
+        reset().map_err(|Full| BakeError::Memory)?;
+        Ok(grid)
+    }
+}
+
+impl ProbeGrid<'_> {
+    /// The cells, with a probe in the centre of each.
+    #[must_use]
+    pub fn lattice(&self) -> &Lattice {
+        &self.lattice
+    }
+
+    /// What a probe holds.
+    #[must_use]
+    pub fn basis(&self) -> ProbeBasis {
+        self.basis
+    }
+
+    /// Which light of a direction that is.
+    #[must_use]
+    pub fn quantity(&self) -> Quantity {
+        self.quantity
+    }
+
+    /// Which light is in it.
+    #[must_use]
+    pub fn orders(&self) -> Orders {
+        self.orders
+    }
+
+    /// The numbers of a probe; those of an invalid one are 0 before [`ProbeGrid::dilate`].
+    ///
+    /// # Panics
+    /// If there is no such probe.
+    #[must_use]
+    pub fn held(&self, index: usize) -> &[Spectrum] {
+        &self.memory.values.as_slice()[self.numbers(index)]
+    }
+
+    /// What lies beside the light of the probes, in the order of the cells.
+    #[must_use]
+    pub fn probes(&self) -> &[Probe] {
+        self.memory.probes.as_slice()
+    }
+
+    /// Standard error of a number of a probe, a root mean square over its channels: of what was sampled, without what caches have wrong.
+    /// Infinite before there are two passes; 0 for a probe that is not valid.
+    ///
+    /// # Panics
+    /// If there is no such probe or number.
+    #[must_use]
+    pub fn error(&self, index: usize, number: usize) -> f32 {
+        if !self.probes()[index].is_valid() {
+            return 0.0;
+        }
+        let n = self.memory.bricks.as_slice()[self.brick_of(index)].passes;
+        if n < 2 {
+            return f32::INFINITY;
+        }
+        let deviation = self.memory.deviations.as_slice()[self.numbers(index)][number];
+        sqrt(deviation / n as f32 / (n - 1) as f32)
+    }
+
+    /// Passes that are in a probe.
+    ///
+    /// # Panics
+    /// If there is no such probe.
+    #[must_use]
+    pub fn passes(&self, index: usize) -> u32 {
+        self.memory.bricks.as_slice()[self.brick_of(index)].passes
+    }
+
+    /// The light at `point`, mixed from the eight probes around it, to `held`; beyond the outermost probes that of the nearest of them.
+    /// What share of the weights valid probes have.
+    ///
+    /// ```text
+    /// Σ w v c / Σ w v      w: trilinear weights, v: 1 where a probe is valid, else 0
+    /// ```
+    ///
+    /// which is what a shader gets that mixes textures of `v c` and `v` by hardware and divides. Where no probe is valid, `Σ w c`: what
+    /// [`ProbeGrid::dilate`] has left there.
+    pub fn look_up(&self, point: Vec3, held: &mut [Spectrum]) -> f32 {
+        let bounds = self.lattice.bounds();
+        let around = self.lattice.around(point.clamp(bounds.min, bounds.max)).unwrap_or_default();
+        let valid = |index: usize| if self.probes()[index].is_valid() { 1.0 } else { 0.0 };
+        let share: f32 = around.iter().map(|&(index, weight)| weight * valid(index)).sum();
+        held.fill(Spectrum::ZERO);
+        for (index, weight) in around {
+            let weight = if share > 0.0 { weight * valid(index) / share } else { weight };
+            if weight > 0.0 {
+                held.iter_mut().zip(self.held(index)).for_each(|(sum, value)| *sum += *value * weight);
+            }
+        }
+        share
+    }
+
+    /// The light at `point` in a direction (unit): in-scattered radiance (W·m⁻²·sr⁻¹, without `σₛ`) towards it, or irradiance (W·m⁻²) of
+    /// a surface with this normal, as was baked. No less than 0, which expansions may go below.
+    #[must_use]
+    pub fn value(&self, point: Vec3, direction: Vec3) -> Spectrum {
+        let mut held = [Spectrum::ZERO; MOST_COEFFICIENTS];
+        let held = &mut held[..self.basis.count()];
+        self.look_up(point, held);
+        self.basis.value(held, direction).max(Spectrum::ZERO)
+    }
+
+    /// Lets the light of valid probes spread into those that are not, the nearer a probe the more of it, round by round: for engines that mix
+    /// all eight probes whatever they are. Look-ups here need it only where no probe around is valid. How many probes it reached.
+    pub fn dilate(&mut self) -> usize {
+        let count = self.lattice.cell_count();
+        let each = self.basis.count();
+        let mut reached = 0;
+        // Of the round in which a probe got its light; a probe gives it on in later ones.
+        let known = |probe: &Probe, round: u32| probe.is_valid() || (probe.state >> 8 != 0 && probe.state >> 8 < round);
+        for round in 1..=MOST_ROUNDS {
+            let before = reached;
+            for index in 0..count {
+                if known(&self.probes()[index], round + 1) {
+                    continue;
+                }
+                let (mut sum, mut total) = ([Spectrum::ZERO; MOST_COEFFICIENTS], 0.0);
+                for_each_neighbour(&self.lattice, index, |neighbour, distance_squared| {
+                    if known(&self.memory.probes.as_slice()[neighbour], round) {
+                        let weight = 1.0 / distance_squared;
+                        let light = &self.memory.values.as_slice()[neighbour * each..][..each];
+                        sum.iter_mut().zip(light).for_each(|(sum, light)| *sum += *light * weight);
+                        total += weight;
+                    }
+                });
+                if total > 0.0 {
+                    let slots = &mut self.memory.values.as_mut_slice()[index * each..][..each];
+                    slots.iter_mut().zip(sum).for_each(|(slot, sum)| *slot = sum / total);
+                    self.memory.probes.as_mut_slice()[index].state |= round << 8;
+                    reached += 1;
+                }
+            }
+            if reached == before {
+                break;
+            }
+        }
+        // Marks of rounds go.
+        self.memory.probes.as_mut_slice().iter_mut().for_each(|probe| probe.state &= 0xff);
+        reached
+    }
+
+    /// Bytes of memory.
+    #[must_use]
+    pub fn bytes(&self) -> usize {
+        let BakeMemory { values, deviations, probes, bricks } = &self.memory;
+        size_of_val(values.as_slice())
+            + size_of_val(deviations.as_slice())
+            + size_of_val(probes.as_slice())
+            + size_of_val(bricks.as_slice())
+    }
+
+    fn numbers(&self, index: usize) -> core::ops::Range<usize> {
+        let each = self.basis.count();
+        index * each..(index + 1) * each
+    }
+
+    pub(super) fn brick_counts(&self) -> [u32; 3] {
+        self.lattice.size().map(|n| n.div_ceil(BRICK))
+    }
+
+    fn brick_of(&self, index: usize) -> usize {
+        let [nx, ny, _] = self.lattice.size().map(|n| n as usize);
+        let [bx, by, _] = self.brick_counts().map(|n| n as usize);
+        let [x, y, z] = [index % nx, index / nx % ny, index / (nx * ny)].map(|i| i / BRICK as usize);
+        x + bx * (y + by * z)
+    }
+
+    /// The probes of a brick, in the order in which jobs leave them.
+    pub(super) fn in_brick(&self, brick: usize) -> impl Iterator<Item = usize> + use<> {
+        let size = self.lattice.size();
+        let [bx, by, _] = self.brick_counts().map(|n| n as usize);
+        let first = [brick % bx, brick / bx % by, brick / (bx * by)].map(|i| i as u32 * BRICK);
+        let end: [u32; 3] = core::array::from_fn(|i| (first[i] + BRICK).min(size[i]));
+        let flat =
+            move |x: u32, y: u32, z: u32| x as usize + size[0] as usize * (y as usize + size[1] as usize * z as usize);
+        (first[2]..end[2])
+            .flat_map(move |z| (first[1]..end[1]).flat_map(move |y| (first[0]..end[0]).map(move |x| flat(x, y, z))))
+    }
+}
+
+/// Calls `visit(index, squared distance)` (m²) for the cells that touch one.
+fn for_each_neighbour(lattice: &Lattice, index: usize, mut visit: impl FnMut(usize, f32)) {
+    let size = lattice.size().map(|n| n as usize);
+    let at = [index % size[0], index / size[0] % size[1], index / (size[0] * size[1])];
+    let range = |axis: usize| at[axis].saturating_sub(1)..=(at[axis] + 1).min(size[axis] - 1);
+    for z in range(2) {
+        for y in range(1) {
+            for x in range(0) {
+                let offset = Vec3::from_array(core::array::from_fn(|i| [x, y, z][i].abs_diff(at[i]) as f32));
+                let neighbour = x + size[0] * (y + size[1] * z);
+                if neighbour != index {
+                    visit(neighbour, (offset * lattice.cell()).length_squared());
+                }
+            }
+        }
+    }
+}
