@@ -6,6 +6,7 @@
 //! | [`mesh`], [`volume`], [`picture`] | the files scenes name |
 //! | [`world`] | the host: surfaces, lights and media, ready for rays |
 //! | [`camera`] | the pinhole camera |
+//! | [`bake`] | files of baked light |
 //! | [`plume`] | an animation of smoke |
 //! | [`figures`] | figures of papers, rebuilt |
 //! | [`derivatives`] | second derivatives of the fluence by differences |
@@ -15,6 +16,7 @@
 
 extern crate alloc;
 
+pub mod bake;
 pub mod camera;
 pub mod cli;
 pub mod compare;

@@ -41,6 +41,9 @@ pub const VERSION: u32 = 1;
 /// Length of the header (bytes).
 pub const HEADER_BYTES: usize = 80;
 
+/// Offset of the tag.
+const TAG_AT: usize = 64;
+
 const AMBIENT_CUBE: u32 = 16;
 const FLUENCE: u32 = 17;
 
@@ -181,6 +184,39 @@ pub fn write<F>(grid: &ProbeGrid<'_>, tag: u64, mut sink: impl FnMut(&[u8]) -> R
     all(memory, &mut sink)
 }
 
+/// What a grid was made for: for hosts that want any.
+///
+/// # Errors
+/// Bytes that do not begin as those of a grid do; no more is looked at.
+///
+/// ```
+/// # use fogbow::bake::bytes::{ProbeBytesError, tag};
+/// assert_eq!(tag(&[0; 99]), Err(ProbeBytesError::Magic));
+/// ```
+pub fn tag(bytes: &[u8]) -> Result<u64, ProbeBytesError> {
+    let header = header(bytes)?;
+    Ok(long(header, TAG_AT))
+}
+
+fn header(bytes: &[u8]) -> Result<&[u8; HEADER_BYTES], ProbeBytesError> {
+    let header = bytes.first_chunk::<HEADER_BYTES>().ok_or(ProbeBytesError::NoHeader { found: bytes.len() })?;
+    if !header.starts_with(&MAGIC) {
+        return Err(ProbeBytesError::Magic);
+    }
+    match word(header, 8) {
+        VERSION => Ok(header),
+        other => Err(ProbeBytesError::Version(other)),
+    }
+}
+
+fn word(header: &[u8; HEADER_BYTES], at: usize) -> u32 {
+    u32::from_le_bytes([header[at], header[at + 1], header[at + 2], header[at + 3]])
+}
+
+fn long(header: &[u8; HEADER_BYTES], at: usize) -> u64 {
+    u64::from(word(header, at)) | u64::from(word(header, at + 4)) << 32
+}
+
 /// Reads what was written as `bytes` with the same `tag`, into `memory`.
 ///
 /// # Errors
@@ -194,15 +230,8 @@ pub fn write<F>(grid: &ProbeGrid<'_>, tag: u64, mut sink: impl FnMut(&[u8]) -> R
 /// # }
 /// ```
 pub fn read<'s>(bytes: &[u8], tag: u64, memory: BakeMemory<'s>) -> Result<ProbeGrid<'s>, ProbeBytesError> {
-    let header = bytes.first_chunk::<HEADER_BYTES>().ok_or(ProbeBytesError::NoHeader { found: bytes.len() })?;
-    if !header.starts_with(&MAGIC) {
-        return Err(ProbeBytesError::Magic);
-    }
-    let word = |at: usize| u32::from_le_bytes([header[at], header[at + 1], header[at + 2], header[at + 3]]);
-    let long = |at: usize| u64::from(word(at)) | u64::from(word(at + 4)) << 32;
-    if word(8) != VERSION {
-        return Err(ProbeBytesError::Version(word(8)));
-    }
+    let header = header(bytes)?;
+    let (word, long) = (|at: usize| word(header, at), |at: usize| long(header, at));
     let counts = [word(12), word(16), word(20)];
     let corner = |at: usize| Vec3::from_array([0, 4, 8].map(|i| f32::from_bits(word(at + i))));
     let basis = match word(48) {
@@ -247,8 +276,8 @@ pub fn read<'s>(bytes: &[u8], tag: u64, memory: BakeMemory<'s>) -> Result<ProbeG
     if crc.value() != long(72) {
         return Err(ProbeBytesError::Checksum);
     }
-    if long(64) != tag {
-        return Err(ProbeBytesError::Tag { found: long(64), due: tag });
+    if long(TAG_AT) != tag {
+        return Err(ProbeBytesError::Tag { found: long(TAG_AT), due: tag });
     }
     let (values, rest) = bytes[HEADER_BYTES..].split_at(sizes[0]);
     let (deviations, rest) = rest.split_at(sizes[1]);

@@ -70,7 +70,7 @@ impl<'o> BakedProbes<'o> {
 ///
 /// let mut bake = Bake::new(BakeSettings { error: 0.05, ..BakeSettings::for_outline(&outline, [4, 4, 4]) })?;
 /// work::finish(&mut bake, &world, &mut BakedProbes::default()); // Or job by job, or on threads: see `work`.
-/// assert!(bake.share() == 1.0 && !bake.is_cut() && bake.error() < 0.05);
+/// assert!(bake.share() == 1.0 && !bake.is_cut() && bake.grid().relative_error() < 0.05);
 /// assert!(bake.grid().passes(0) >= 8);
 /// let grid = bake.finish();
 /// assert!((grid.value(Vec3::ZERO, Vec3::X)[0] - 1.0).abs() < 0.1);
@@ -85,8 +85,7 @@ pub struct Bake<'s, 'c> {
     /// The brick whose result is due.
     next: u32,
     bricks: u32,
-    /// Relative error of the whole, and the share of the work that is done, after the last round.
-    error: f32,
+    /// The share of the work that is done, after the last round.
     share: f32,
     is_cut: bool,
 }
@@ -136,7 +135,7 @@ impl<'s, 'c> Bake<'s, 'c> {
 
     fn over(grid: ProbeGrid<'s>, settings: BakeSettings) -> Self {
         let bricks = grid.memory.bricks.len() as u32;
-        Self { settings, grid, caches: None, next: 0, bricks, error: f32::INFINITY, share: 0.0, is_cut: false }
+        Self { settings, grid, caches: None, next: 0, bricks, share: 0.0, is_cut: false }
     }
 
     /// Goes on where an earlier bake was left, whose `grid` was baked by the same settings: the bits of one that was not. A smaller error, or
@@ -268,13 +267,6 @@ impl<'s, 'c> Bake<'s, 'c> {
         self.grid
     }
 
-    /// Standard error of what was sampled, a root mean square over all valid probes and their numbers in proportion to the mean of the
-    /// grid; infinite before there are two passes.
-    #[must_use]
-    pub fn error(&self) -> f32 {
-        self.error
-    }
-
     /// About what share of the work is done, in [0, 1].
     #[must_use]
     pub fn share(&self) -> f32 {
@@ -294,27 +286,16 @@ impl<'s, 'c> Bake<'s, 'c> {
     /// Which bricks have one more pass.
     fn plan(&mut self) {
         let Self { settings, grid, .. } = self;
-        let (mut level, mut count) = (0.0_f64, 0_u32);
-        for (index, _) in grid.probes().iter().enumerate().filter(|(_, probe)| probe.is_valid()) {
-            level += f64::from(grid.basis.level(grid.held(index)));
-            count += 1;
-        }
-        let level = level / f64::from(count.max(1));
-        let (mut squares, mut due, mut done) = (0.0_f64, 0_u32, 0.0_f32);
+        let level = grid.level();
+        let (mut due, mut done) = (0_u32, 0.0_f32);
         for brick in 0..self.bricks as usize {
-            let (mut sum, mut numbers) = (0.0_f64, 0_u32);
-            for index in grid.in_brick(brick).filter(|index| grid.probes()[*index].is_valid()) {
-                for number in 0..grid.basis.count() {
-                    let error = f64::from(grid.error(index, number));
-                    sum += error * error;
-                    numbers += 1;
-                }
-            }
-            squares += sum;
+            let (sum, numbers) = grid.squared_errors(grid.in_brick(brick));
             let relative = libm::sqrt(sum / f64::from(numbers.max(1))) / level;
             let Brick { passes, .. } = grid.memory.bricks.as_slice()[brick];
-            // Where nothing is random nothing is gained, nor in the dark, where the quotient is no number.
-            let is_known = sum == 0.0 && passes >= 2;
+            // Where nothing is random nothing is gained; but what is black so far may have rare light.
+            let is_lit = || grid.in_brick(brick).any(|index| grid.held(index).iter().any(|number| !number.is_black()));
+            let is_known = sum == 0.0 && passes >= 2 && is_lit();
+            // In the dark the quotient is no number, and all is good.
             let is_good = is_known || passes >= LEAST_PASSES && !(relative > f64::from(settings.error));
             if numbers == 0 || is_good || passes >= settings.most_passes {
                 done += 1.0;
@@ -327,10 +308,6 @@ impl<'s, 'c> Bake<'s, 'c> {
             grid.memory.bricks.as_mut_slice()[brick].due = passes + 1;
             due += 1;
         }
-        let numbers = f64::from(count) * grid.basis.count() as f64;
-        let error = libm::sqrt(squares / numbers.max(1.0)) / level;
-        // In the dark there is nothing to be in proportion to.
-        self.error = if error.is_nan() { 0.0 } else { error as f32 };
         self.share = done / self.bricks.max(1) as f32;
         self.next = if due > 0 { 0 } else { self.bricks };
     }

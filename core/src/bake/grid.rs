@@ -110,7 +110,7 @@ pub struct BakeMemory<'s> {
 /// // A probe: its numbers, their errors, what lies beside.
 /// let probe = grid.lattice().index(Vec3::splat(0.1)).unwrap();
 /// assert_eq!((grid.held(probe).len(), grid.passes(probe)), (9, 2));
-/// assert!(grid.error(probe, 0) < 1.0 && grid.probes()[probe].albedo[0] == 1.0);
+/// assert!(grid.error(probe, 0) < 1.0 && grid.relative_error() < 1.0 && grid.probes()[probe].albedo[0] == 1.0);
 ///
 /// // Anywhere: all numbers, and what share of the probes around has any; or the light in a direction.
 /// let mut held = [Spectrum::ZERO; 9];
@@ -210,6 +210,39 @@ impl ProbeGrid<'_> {
         }
         let deviation = self.memory.deviations.as_slice()[self.numbers(index)][number];
         sqrt(deviation / n as f32 / (n - 1) as f32)
+    }
+
+    /// Standard error of all valid probes and their numbers, a root mean square, in proportion to the mean light of the grid; see
+    /// [`ProbeGrid::error`]. 0 in the dark.
+    #[must_use]
+    pub fn relative_error(&self) -> f32 {
+        let (sum, numbers) = self.squared_errors(0..self.lattice.cell_count());
+        let error = libm::sqrt(sum / f64::from(numbers.max(1))) / self.level();
+        // In the dark there is nothing to be in proportion to.
+        if error.is_nan() { 0.0 } else { error as f32 }
+    }
+
+    /// Mean light of valid probes, whatever the direction.
+    pub(super) fn level(&self) -> f64 {
+        let (mut sum, mut count) = (0.0_f64, 0_u32);
+        for (index, _) in self.probes().iter().enumerate().filter(|(_, probe)| probe.is_valid()) {
+            sum += f64::from(self.basis.level(self.held(index)));
+            count += 1;
+        }
+        sum / f64::from(count.max(1))
+    }
+
+    /// The sum over the numbers of valid probes among those given, and how many there are.
+    pub(super) fn squared_errors(&self, probes: impl Iterator<Item = usize>) -> (f64, u32) {
+        let (mut sum, mut numbers) = (0.0_f64, 0_u32);
+        for index in probes.filter(|index| self.probes()[*index].is_valid()) {
+            for number in 0..self.basis.count() {
+                let error = f64::from(self.error(index, number));
+                sum += error * error;
+                numbers += 1;
+            }
+        }
+        (sum, numbers)
     }
 
     /// Passes that are in a probe.
