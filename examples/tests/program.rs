@@ -1,5 +1,6 @@
 //! The program as users call it: exit codes, files, messages.
 
+mod bake;
 mod radiance_cache;
 mod vpl;
 

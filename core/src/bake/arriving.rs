@@ -42,6 +42,7 @@ impl Sampler<'_, '_> {
         let phase = if properties.scattering.is_black() { self.settings.phase } else { properties.phase };
         let projection = Projection::new(basis, quantity, &phase);
         let mut due = Parts::from(orders);
+        // Records of a medium do not know irradiance.
         if quantity == Quantity::InScattered || basis == ProbeBasis::Fluence {
             due.lights = due.lights && !self.read(Kind::Single, point, held);
             due.surfaces = due.surfaces && !self.read(Kind::Surface, point, held);
@@ -86,12 +87,6 @@ impl Sampler<'_, '_> {
         world: &World<'_, M, S>,
         rng: &mut Generator,
     ) -> [Spectrum; 2] {
-        let gathers = self.settings.quantity == Quantity::Irradiance && self.settings.basis != ProbeBasis::Fluence;
-        if let Some(caches) = self.caches.filter(|_| gathers) {
-            let seen = caches.radiance(ray, world, rng);
-            let medium = seen.medium_single + seen.medium_surface + seen.medium_multiple;
-            return [seen.surface_direct + seen.surface_indirect, medium];
-        }
         let paths = self.settings.paths;
         // The probe's own scattering is one of them; what is emitted towards it is left to connections.
         let before = path::Settings { max_scatterings: paths.max_scatterings - 1, lights_visible: true, ..paths };

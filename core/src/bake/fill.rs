@@ -178,11 +178,11 @@ impl<'s, 'c> Bake<'s, 'c> {
         Ok(bake)
     }
 
-    /// Takes what radiance caches know from them, where they were filled for the same world and all of the box
-    /// ([`Asked::Box`](crate::cache::Asked::Box)). Only the rest is sampled: light straight from the lights, unless it is cached, and what no
-    /// record reaches. Irradiance is gathered along rays that see what caches know.
+    /// Reads what radiance caches know at the probes, where they were filled for the same world and all of the box
+    /// ([`Asked::Box`](crate::cache::Asked::Box)): quick, and as far off as single records are, which in thin fog reach far. Only the rest is sampled: light straight
+    /// from the lights, unless it is cached, what no record reaches, and all irradiance of surfaces, of which records in a medium know nothing.
     ///
-    /// What caches have wrong is in the probes, and in no standard error. Light that a medium emits is in none.
+    /// What caches have wrong is in the probes, and in no standard error; [`ProbeGrid::deviation`] tells it. Light that a medium emits is in none.
     ///
     /// ```
     /// # use fogbow::{host::Empty, light::{Light, PointLight}, math::{Bounds, Vec3}, medium::{Homogeneous, Placed, Region}, phase::Phase};
@@ -217,6 +217,35 @@ impl<'s, 'c> Bake<'s, 'c> {
     #[must_use]
     pub fn with_caches(self, caches: &'c RadianceCaches<'c>) -> Self {
         Self { caches: Some(caches), ..self }
+    }
+
+    /// Bakes those bricks alone that `is_wanted`, by their number; of the probes of all others nothing will be known. For a part of a grid,
+    /// and to tell how far another bake is off by a few unbiased ones: [`ProbeGrid::deviation`]. For bakes that have not begun.
+    ///
+    /// ```
+    /// # use fogbow::{host::Empty, light::Light, math::{Bounds, Vec3}, medium::Homogeneous, phase::Phase, spectrum::Spectrum};
+    /// # use fogbow::{work, world::{Outline, World}};
+    /// # use fogbow::bake::{Bake, BakeSettings, BakedProbes};
+    /// # #[cfg(feature = "alloc")] {
+    /// # let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::ONE, Phase::ISOTROPIC)?;
+    /// # let sky = [Light::Constant(Spectrum::ONE)];
+    /// # let world = World { medium: &fog, scene: &Empty, lights: (&sky).into() };
+    /// # let bounds = Bounds { min: Vec3::ZERO, max: Vec3::ONE };
+    /// # let settings = BakeSettings { most_passes: 2, ..BakeSettings::for_outline(&Outline::of(&world, bounds), [8, 1, 1]) };
+    /// let mut bake = Bake::new(settings)?.only(|brick| brick == 1);
+    /// work::finish(&mut bake, &world, &mut BakedProbes::default());
+    /// assert_eq!([bake.grid().passes(0), bake.grid().passes(7)], [0, 2]);
+    /// # }
+    /// # Ok::<(), Box<dyn core::error::Error>>(())
+    /// ```
+    #[must_use]
+    pub fn only(mut self, is_wanted: impl Fn(usize) -> bool) -> Self {
+        for (number, brick) in self.grid.memory.bricks.as_mut_slice().iter_mut().enumerate() {
+            if !is_wanted(number) {
+                brick.due = brick.passes;
+            }
+        }
+        self
     }
 
     /// Bakes the bricks anew that have a part in a box (m), where the world has changed; all others stay as they are. Nothing else changes if
@@ -297,7 +326,7 @@ impl<'s, 'c> Bake<'s, 'c> {
             let is_known = sum == 0.0 && passes >= 2 && is_lit();
             // In the dark the quotient is no number, and all is good.
             let is_good = is_known || passes >= LEAST_PASSES && !(relative > f64::from(settings.error));
-            if numbers == 0 || is_good || passes >= settings.most_passes {
+            if passes == 0 || numbers == 0 || is_good || passes >= settings.most_passes {
                 done += 1.0;
                 continue;
             }

@@ -87,6 +87,19 @@ pub struct BakeMemory<'s> {
     pub bricks: List<'s, Brick>,
 }
 
+/// How far one grid is from another: see [`ProbeGrid::deviation`].
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct ProbeDeviation {
+    /// Mean difference of light, whatever the direction, in proportion to the mean.
+    pub bias: f32,
+    /// Standard error of that.
+    pub bias_error: f32,
+    /// Root mean square of the differences of all numbers in proportion to the mean light, without what their standard errors explain.
+    pub spread: f32,
+    /// Probes that both grids know.
+    pub probes: u32,
+}
+
 /// Probes in the cells of a box: what a [`Bake`](super::Bake) makes.
 ///
 /// ```
@@ -116,6 +129,7 @@ pub struct BakeMemory<'s> {
 /// let mut held = [Spectrum::ZERO; 9];
 /// assert!(grid.look_up(Vec3::splat(0.2), &mut held) > 0.999);
 /// assert!((grid.value(Vec3::splat(0.2), Vec3::X)[0] - 1.0).abs() < 0.5);
+/// assert_eq!(grid.deviation(&grid).spread, 0.0);
 ///
 /// // Where there is no fog nothing was baked; other probes' light spreads there.
 /// let far = grid.lattice().index(Vec3::splat(0.9)).unwrap();
@@ -286,6 +300,43 @@ impl ProbeGrid<'_> {
         let held = &mut held[..self.basis.count()];
         self.look_up(point, held);
         self.basis.value(held, direction).max(Spectrum::ZERO)
+    }
+
+    /// How far this grid is from an unbiased one with the same cells and numbers, by the probes that are valid in both: what caches have wrong,
+    /// which no standard error tells.
+    ///
+    /// # Panics
+    /// If the other has fewer probes or numbers.
+    #[must_use]
+    pub fn deviation(&self, unbiased: &Self) -> ProbeDeviation {
+        let (mut level, mut bias, mut noise, mut squares) = (0.0_f64, 0.0_f64, 0.0_f64, 0.0_f64);
+        let (mut explained, mut probes) = (0.0_f64, 0_u32);
+        let known = |index: usize| self.probes()[index].is_valid() && unbiased.probes()[index].is_valid();
+        let squared_error = |index: usize, number: usize| {
+            let [a, b] = [self, unbiased].map(|grid| f64::from(grid.error(index, number)));
+            a * a + b * b
+        };
+        for index in (0..self.lattice.cell_count()).filter(|index| known(*index)) {
+            let (held, due) = (self.held(index), unbiased.held(index));
+            level += f64::from(self.basis.level(due));
+            bias += f64::from(self.basis.level(held) - self.basis.level(due));
+            noise += squared_error(index, 0);
+            for (number, (held, due)) in held.iter().zip(due).enumerate() {
+                let off = (*held - *due).map(|off| off * off).mean();
+                squares += f64::from(off);
+                explained += squared_error(index, number);
+            }
+            probes += 1;
+        }
+        // All in proportion to the sum of light; in the dark to nothing.
+        let over = |sum: f64| if level > 0.0 { (sum / level) as f32 } else { 0.0 };
+        let numbers = f64::from(probes) / self.basis.count() as f64;
+        ProbeDeviation {
+            bias: over(bias),
+            bias_error: over(libm::sqrt(noise)),
+            spread: over(libm::sqrt((squares - explained).max(0.0) * numbers)),
+            probes,
+        }
     }
 
     /// Lets the light of valid probes spread into those that are not, the nearer a probe the more of it, round by round: for engines that mix

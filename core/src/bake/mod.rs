@@ -37,5 +37,5 @@ mod tests;
 
 pub use basis::{AXES, MOST_COEFFICIENTS, Orders, ProbeBasis, Quantity};
 pub use fill::{Bake, BakedProbes};
-pub use grid::{BakeMemory, Brick, Probe, ProbeGrid, ProbeState};
+pub use grid::{BakeMemory, Brick, Probe, ProbeDeviation, ProbeGrid, ProbeState};
 pub use settings::{BakeError, BakeSettings, MOST_PROBES};

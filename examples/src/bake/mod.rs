@@ -13,7 +13,7 @@ pub mod raw;
 pub mod sheets;
 pub mod texture;
 
-use fogbow::bake::{Orders, ProbeBasis, ProbeGrid, ProbeState, Quantity};
+use fogbow::bake::{Orders, ProbeBasis, ProbeDeviation, ProbeGrid, ProbeState, Quantity};
 
 /// A grid, dilated into probes that are not valid, and what it does not say of itself.
 #[derive(Debug)]
@@ -24,6 +24,8 @@ pub struct Baked {
     pub method: Option<&'static str>,
     /// Mean cosine of the sharpest phase function, which is in the numbers of in-scattered radiance; `None` where that is not known any more.
     pub mean_cosine: Option<f32>,
+    /// How far it is from path tracing; `None` where it was path traced, or where that is not known any more.
+    pub deviation: Option<ProbeDeviation>,
     /// What all numbers of light were multiplied by.
     pub scale: f32,
 }

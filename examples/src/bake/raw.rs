@@ -76,6 +76,11 @@ pub fn description(baked: &Baked, data_file: Option<&str>) -> String {
     field("mean_cosine", number(baked.mean_cosine));
     field("method", baked.method.map_or("null".to_owned(), string));
     field("relative_error", number(Some(grid.relative_error())));
+    let deviation = baked.deviation.map(|d| {
+        let [bias, error, spread] = [d.bias, d.bias_error, d.spread].map(|value| number(Some(value)));
+        format!("{{\"bias\": {bias}, \"bias_error\": {error}, \"spread\": {spread}, \"probes\": {}}}", d.probes)
+    });
+    field("deviation", deviation.unwrap_or("null".to_owned()));
     field("box", format!("{{\"min\": {}, \"max\": {}}}", vector(lattice.bounds().min), vector(lattice.bounds().max)));
     field("counts", format!("[{nx}, {ny}, {nz}]"));
     field("spacing", vector(lattice.cell()));

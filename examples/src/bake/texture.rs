@@ -223,8 +223,8 @@ mod tests {
             let found = Texel::Rgb9E5.decode(&word);
             let largest = colour.into_iter().fold(0.0, f32::max);
             for (found, due) in found.iter().zip(colour) {
-                // Half of a unit of the largest's mantissa, of at least 256; and the smallest exponent.
-                let most = (largest / 512.0).max(2.0_f32.powi(-25)) * 1.0001;
+                // Half of a unit, of which the largest has 255.5 at least; and the smallest exponent.
+                let most = (largest / 511.0).max(2.0_f32.powi(-25));
                 assert!((found - due).abs() <= most, "{found} for {due} in {colour:?}");
             }
         }

@@ -2,6 +2,7 @@
 //!
 //! Exit codes: 0 done, 1 stopped early, 2 bad input.
 
+mod bake;
 mod bias_layers;
 mod choice;
 mod compare;
@@ -25,6 +26,7 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
+pub use bake::BakeArguments;
 pub use compare::CompareArguments;
 pub use covariance::{CovarianceArguments, MarchArguments, Step};
 pub use figures::{FiguresArguments, Paper};
@@ -51,6 +53,8 @@ pub struct Arguments {
 pub enum Command {
     /// Renders a Mitsuba 3 scene.
     Render(Box<RenderArguments>),
+    /// Bakes light in fog into 3D textures for engines.
+    Bake(Box<BakeArguments>),
     /// Draws where the records of radiance caches lie.
     Records(Box<RecordsArguments>),
     /// Says how far an image is from a reference.
@@ -76,6 +80,7 @@ pub enum Ending {
 pub fn run(arguments: Arguments) -> ExitCode {
     let result = match arguments.command {
         Command::Render(arguments) => render::run(&arguments),
+        Command::Bake(arguments) => bake::run(&arguments),
         Command::Records(arguments) => records::run(&arguments),
         Command::Compare(arguments) => compare::run(&arguments),
         Command::Probe(arguments) => probe::run(&arguments),

@@ -5,7 +5,6 @@ use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
 use fogbow::covariance::{GridView, hessian_bound};
-use fogbow::host::Medium;
 use fogbow::math::{Bounds, Symmetric3, Vec3};
 use fogbow_std::progress::Control;
 
@@ -15,7 +14,7 @@ use super::{Ending, Failure, output};
 use crate::derivatives::{Upper, difference, filtered};
 use crate::scene_file::SceneFile;
 use crate::statistics::Statistics;
-use crate::world::{Storage, WithMedium, World};
+use crate::world::{Storage, World};
 
 /// Most points of one run.
 const MAX_POINTS: u64 = 4_000_000;
@@ -120,7 +119,7 @@ fn hessian(arguments: &HessianArguments) -> Result<Ending, Failure> {
     let scene = SceneFile::read(&arguments.scene)?;
     let mut storage = Storage::new(&scene);
     let world = World::new(&scene, &mut storage)?;
-    if world.media().with(Glows) {
+    if world.media().glow() {
         return Err("glowing media send no photons: the fluence of their light cannot be probed".into());
     }
     let lights = world.lights();
@@ -154,17 +153,6 @@ fn hessian(arguments: &HessianArguments) -> Result<Ending, Failure> {
         eprintln!("{count} point{s}, in a grid of {x} x {y} x {z} cells filled by {} photons", grid.paths());
     }
     Ok(Ending::Done)
-}
-
-/// Whether a medium glows.
-struct Glows;
-
-impl WithMedium for Glows {
-    type Output = bool;
-
-    fn with<M: Medium + Sync>(self, medium: &M) -> bool {
-        medium.is_emissive()
-    }
 }
 
 /// The points asked for, all of them within the grid.

@@ -172,6 +172,17 @@ const VPL_LAYERS: [&str; 12] = {
 /// Set by Ctrl-C.
 static STOP: AtomicBool = AtomicBool::new(false);
 
+/// The flag that Ctrl-C sets from now on; the second time it ends the program.
+pub(super) fn stop_flag() -> &'static AtomicBool {
+    // A handler can be set once per process; without one, Ctrl-C still ends the program.
+    drop(ctrlc::set_handler(|| {
+        if STOP.swap(true, Ordering::Relaxed) {
+            std::process::exit(130);
+        }
+    }));
+    &STOP
+}
+
 /// A finished render.
 #[derive(Debug)]
 pub(crate) struct Rendered {
@@ -258,15 +269,9 @@ pub(crate) fn render(arguments: &RenderArguments) -> Result<Rendered, Failure> {
     statistics.bytes.push(("volumes".to_owned(), scene.media.iter().map(|m| m.bytes() as u64).sum()));
     statistics.bytes.push(("world".to_owned(), world.bytes() as u64));
 
-    // A handler can be set once per process; without one, Ctrl-C still ends the program.
-    drop(ctrlc::set_handler(|| {
-        if STOP.swap(true, Ordering::Relaxed) {
-            std::process::exit(130);
-        }
-    }));
     let bar = Bar::new(arguments.quiet);
     let progress = |progress: &Progress| bar.show(progress, u64::from(width) * u64::from(height));
-    let control = Control { cancel: Some(&STOP), progress: Some(&progress) };
+    let control = Control { cancel: Some(stop_flag()), progress: Some(&progress) };
     let (samples, noise) = arguments.samples(method, scene.sensor.samples);
     let settings = tiles::Settings {
         samples,

@@ -41,6 +41,14 @@ impl Bar {
         bar.set_message(format!("{spp:.1} samples per pixel{left}"));
     }
 
+    /// Shows a share of work that is done after so many seconds.
+    pub(super) fn share(&self, share: f32, elapsed: f64) {
+        let Some(bar) = &self.0 else { return };
+        bar.set_position((f64::from(share) * STEPS as f64) as u64);
+        let left = elapsed * f64::from((1.0 - share) / share);
+        bar.set_message(if left.is_finite() { format!("{} left", clock(left)) } else { String::new() });
+    }
+
     /// Says what is done before there is anything to show.
     pub(super) fn tell(&self, stage: &'static str) {
         if let Some(bar) = &self.0 {

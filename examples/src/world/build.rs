@@ -106,9 +106,14 @@ pub fn bounds_of(geometry: &Geometry) -> Bounds {
 /// The smallest box around all surfaces and containers.
 pub(super) fn scene_bounds(scene: &SceneFile) -> Bounds {
     let surfaces = scene.shapes.iter().map(|s| bounds_of(&s.geometry));
+    surfaces.fold(medium_bounds(scene).unwrap_or(Bounds::EMPTY), Bounds::union)
+}
+
+/// The smallest box around all containers of media.
+pub(super) fn medium_bounds(scene: &SceneFile) -> Option<Bounds> {
     let containers = scene.media.iter().flat_map(|m| &m.places).map(|p| {
         let [min, max] = p.container.bounds();
         Bounds { min: to_vec3(min), max: to_vec3(max) }
     });
-    surfaces.chain(containers).fold(Bounds::EMPTY, Bounds::union)
+    containers.reduce(Bounds::union)
 }

@@ -64,6 +64,17 @@ pub trait WithMedium {
     fn with<M: Medium + Sync>(self, medium: &M) -> Self::Output;
 }
 
+/// Whether a medium emits light.
+struct Glow;
+
+impl WithMedium for Glow {
+    type Output = bool;
+
+    fn with<M: Medium + Sync>(self, medium: &M) -> bool {
+        medium.is_emissive()
+    }
+}
+
 impl<'a> Media<'a> {
     pub(super) fn new(scene: &'a SceneFile, tables: &'a mut [MediumTable]) -> Result<Self, SceneError> {
         let (mut placed, mut all_holes) = (Vec::new(), Vec::new());
@@ -106,6 +117,12 @@ impl<'a> Media<'a> {
             Self::Grid(_) => false,
             Self::Several(media) => media.is_empty(),
         }
+    }
+
+    /// Whether any of them emits light.
+    #[must_use]
+    pub fn glow(&self) -> bool {
+        self.with(Glow)
     }
 
     /// The phase functions there are.

@@ -154,6 +154,12 @@ impl<'a> World<'a> {
         self.bounds
     }
 
+    /// The smallest box around all media (m); `None` if there are none.
+    #[must_use]
+    pub fn medium_bounds(&self) -> Option<Bounds> {
+        build::medium_bounds(self.scene)
+    }
+
     /// Whether any surface is a mirror or glass.
     #[must_use]
     pub fn has_mirrors(&self) -> bool {

@@ -1,0 +1,164 @@
+//! A bake with a medium of any type.
+
+use std::path::Path;
+
+use fogbow::bake::{Bake, BakeSettings, ProbeBasis, ProbeDeviation, ProbeGrid};
+use fogbow::cache::{Asked, ERROR_BOUNDS, Kind, RadianceCaches, Settings, USUAL_ERROR};
+use fogbow::host::Medium;
+use fogbow::light::Lights;
+use fogbow::math::Bounds;
+use fogbow::path;
+use fogbow::work::Rounds;
+use fogbow::world::{Outline, World as LitWorld};
+use fogbow_std::progress::Control;
+use fogbow_std::stats::Stopwatch;
+use fogbow_std::threads::{self, Threads};
+
+use super::super::covariance::Stopped;
+use super::super::render::stop_flag;
+use super::super::report::Bar;
+use super::super::{Ending, Failure};
+use super::{BakeArguments, Source, write};
+use crate::world::{WithMedium, World};
+
+/// Seconds between two writings of what is done: no more than these are lost. More often, and large grids are mostly being written.
+const BETWEEN_WRITINGS: f64 = 30.0;
+
+/// # Errors
+/// Caches of light that they cannot hold.
+pub(super) fn check(method: Source, paths: &path::Settings, world: &World<'_>) -> Result<(), Failure> {
+    if method == Source::Path {
+        return Ok(());
+    }
+    if world.media().glow() {
+        return Err("--method radiance-cache: light that a medium emits is not in caches; take --method path".into());
+    }
+    if paths.max_scatterings != u32::MAX {
+        return Err("--method radiance-cache: caches hold light of paths of any depth, and the scene limits it; \
+                    take --method path"
+            .into());
+    }
+    Ok(())
+}
+
+/// Bricks of 64 probes that are path traced to tell how far caches are off, at least, and at most. More: a surer word, for more time.
+const LEAST_COMPARED: u64 = 4;
+
+/// See [`LEAST_COMPARED`].
+const MOST_COMPARED: u64 = 32;
+
+/// A bake, to be done with a medium of any type.
+pub(super) struct BakeJob<'a> {
+    pub(super) arguments: &'a BakeArguments,
+    pub(super) world: &'a World<'a>,
+    pub(super) lights: Lights<'a>,
+    pub(super) paths: path::Settings,
+    pub(super) bounds: Bounds,
+    pub(super) counts: [u32; 3],
+    pub(super) method: Source,
+    pub(super) tag: u64,
+    /// What was left, to go on with.
+    pub(super) begun: Option<ProbeGrid<'static>>,
+}
+
+impl BakeJob<'_> {
+    fn settings(&self, outline: &Outline) -> BakeSettings {
+        let usual = BakeSettings::for_outline(outline, self.counts);
+        BakeSettings {
+            bounds: self.bounds,
+            basis: self.arguments.basis(),
+            quantity: self.arguments.quantity(),
+            orders: self.arguments.orders(),
+            error: self.arguments.error.unwrap_or(usual.error),
+            most_passes: self.arguments.passes.unwrap_or(usual.most_passes),
+            paths: self.paths,
+            seed: self.arguments.seed,
+            ..usual
+        }
+    }
+
+    fn caches(&self, outline: &Outline) -> RadianceCaches<'static> {
+        let [least, most] = ERROR_BOUNDS;
+        let error = self.arguments.error.unwrap_or(USUAL_ERROR).clamp(least, most);
+        let mut settings = Settings::for_outline(outline, error);
+        if let ProbeBasis::SphericalHarmonics { degree } = self.arguments.basis()
+            && !outline.phase.is_isotropic()
+        {
+            // What probes hold must be there to be read.
+            for kind in [Kind::Surface, Kind::Multiple] {
+                if let Some(effort) = settings.effort_mut(kind) {
+                    effort.degree = effort.degree.max(degree as usize);
+                }
+            }
+        }
+        RadianceCaches::new(Settings { seed: self.arguments.seed, paths: self.paths, ..settings })
+    }
+}
+
+impl WithMedium for BakeJob<'_> {
+    type Output = Result<(ProbeGrid<'static>, f32, Option<ProbeDeviation>, Ending), Failure>;
+
+    fn with<M: Medium + Sync>(mut self, medium: &M) -> Self::Output {
+        let world = LitWorld { medium, scene: self.world, lights: self.lights };
+        let outline = self.world.outline(&world);
+        let pool = Threads::new(self.arguments.threads)?;
+        let control = Control { cancel: Some(stop_flag()), progress: None };
+        let bar = Bar::new(self.arguments.quiet);
+        let mut caches = None;
+        if self.method != Source::Path {
+            let mut filling = self.caches(&outline).fill(Asked::anywhere_in(self.bounds));
+            let tell = |filling: &_| bar.tell(Rounds::<LitWorld<'_, M, World<'_>>>::stage(filling));
+            let ran = threads::run(&mut filling, &world, &pool, &control, None, tell);
+            if ran.ending != threads::Ending::Done {
+                bar.finish();
+                return Err(Stopped("caches").into());
+            }
+            let mut filled = filling.finish();
+            filled.forget_photons();
+            caches = Some(filled);
+        }
+        let settings = self.settings(&outline);
+        let begun = self.begun.take();
+        let bake = match begun {
+            Some(grid) => Bake::resume(grid, settings)
+                .map_err(|_| "--resume: the file is of other probes: of another --box, --counts, --basis, --quantity or --orders")?,
+            None => Bake::new(settings)?,
+        };
+        let mut bake = match &caches {
+            Some(caches) => bake.with_caches(caches),
+            None => bake,
+        };
+        let kept: Option<&Path> = self.arguments.kept()?;
+        let (clock, mut written, mut trouble) = (Stopwatch::start(), 0.0, None);
+        let ran = threads::run(&mut bake, &world, &pool, &control, None, |bake| {
+            let elapsed = clock.elapsed().wall;
+            bar.share(bake.share(), elapsed);
+            if let Some(file) = kept.filter(|_| elapsed - written > BETWEEN_WRITINGS) {
+                written = elapsed;
+                trouble = trouble.take().or(write::keep(file, bake.grid(), self.tag).err());
+            }
+        });
+        let mut deviation = None;
+        if caches.is_some() && ran.ending == threads::Ending::Done {
+            bar.tell("compare");
+            let bricks: Vec<usize> = compared(self.counts).collect();
+            let mut unbiased = Bake::new(settings)?.only(|brick| bricks.contains(&brick));
+            let ran = threads::run(&mut unbiased, &world, &pool, &control, None, |_| ());
+            deviation = (ran.ending == threads::Ending::Done).then(|| bake.grid().deviation(unbiased.grid()));
+        }
+        bar.finish();
+        if let Some(trouble) = trouble {
+            eprintln!("fogbow: {trouble}");
+        }
+        let ending = if ran.ending == threads::Ending::Done { Ending::Done } else { Ending::Stopped };
+        Ok((bake.finish(), outline.phase.mean_cosine().mean(), deviation, ending))
+    }
+}
+
+/// Bricks that are path traced to tell how far caches are off: a sixteenth, within bounds, all over the grid.
+fn compared(counts: [u32; 3]) -> impl Iterator<Item = usize> {
+    let all = counts.map(|n| u64::from(n.div_ceil(4))).iter().product::<u64>();
+    let wanted = (all / 16).clamp(LEAST_COMPARED.min(all), MOST_COMPARED);
+    // The golden ratio spreads them whatever their number.
+    (0..wanted).map(move |i| ((i * 0x9e37_79b9 % (1 << 32) * all) >> 32) as usize)
+}

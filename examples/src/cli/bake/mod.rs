@@ -1,0 +1,450 @@
+//! `fogbow bake`: light in fog as 3D textures.
+
+mod job;
+mod write;
+
+use std::path::{Path, PathBuf};
+
+use clap::{Arg, Args, ValueEnum};
+use fogbow::bake::bytes::{self, ProbeBytesError};
+use fogbow::bake::{BakeMemory, BakeSettings, Orders, ProbeBasis, ProbeGrid, Quantity};
+use fogbow::bytes::Crc;
+use fogbow::math::{Bounds, Vec3};
+
+use super::defaults::{unit_outline, with_default};
+use super::{Ending, Failure, output};
+use crate::bake::texture::Texel;
+use crate::bake::{Baked, Layout};
+use crate::error::read_file;
+use crate::scene_file::{SceneFile, fingerprint};
+use crate::world::{Storage, World, light_tree, view};
+use job::BakeJob;
+use write::Target;
+
+/// Bakes light in fog into 3D textures for engines.
+///
+/// Probes stand in the centres of equal cells of a box. Each holds in-scattered radiance towards a direction (W·m⁻²·sr⁻¹; the phase function is in it,
+/// the scattering coefficient is not), or irradiance of surfaces with that normal (W·m⁻²). Light of probes in walls, and of those far from any medium, comes
+/// from their neighbours.
+#[derive(Debug, Args)]
+#[command(mut_args(told))]
+pub struct BakeArguments {
+    /// The scene file.
+    #[arg(required_unless_present = "from_file")]
+    pub scene: Option<PathBuf>,
+    /// Bakes nothing but writes what is in a .bake file in other formats.
+    #[arg(long, value_name = "FILE.bake", conflicts_with_all = ["scene", "region", "spacing", "counts", "basis", "quantity", "orders", "error", "passes", "resume"])]
+    pub from_file: Option<PathBuf>,
+    /// The box to bake: two corners, the smaller one first [default: around all media].
+    #[arg(long = "box", value_name = "MIN MAX", value_parser = corners, allow_hyphen_values = true)]
+    pub region: Option<Bounds>,
+    /// Size of cells, in the scene's unit of length.
+    #[arg(long, value_name = "LENGTH", value_parser = output::positive, conflicts_with = "counts")]
+    pub spacing: Option<f64>,
+    /// Probes along x, y and z [default: cubic cells, 32 along the longest side].
+    #[arg(long, value_name = "NxNxN", value_parser = counts)]
+    pub counts: Option<[u32; 3]>,
+    /// How a probe holds light by direction [default: sh2; ambient-cube for --layout bevy].
+    #[arg(long, value_enum)]
+    pub basis: Option<Basis>,
+    /// What light is baked for [default: in-scattered; irradiance for --layout bevy and three].
+    #[arg(long, value_enum)]
+    pub quantity: Option<Purpose>,
+    /// Which light is baked [default: all; indirect for --layout bevy and three, which add the light of lamps themselves].
+    #[arg(long, value_enum)]
+    pub orders: Option<Light>,
+    /// How light is found.
+    #[arg(long, value_enum, default_value_t = Source::Path)]
+    pub method: Source,
+    /// Standard error of probes, in proportion to the mean of all, at which bricks of 64 have enough samples; caches are filled for it, too.
+    #[arg(long, value_name = "E", value_parser = error)]
+    pub error: Option<f32>,
+    /// Passes of each brick at most, whatever the error.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..))]
+    pub passes: Option<u32>,
+    /// Goes on where the .bake file that is to be written was left. Without such a file, begins.
+    #[arg(long)]
+    pub resume: bool,
+    /// How numbers lie in .ktx2 files.
+    #[arg(long, value_enum, default_value_t = Packing::Plain)]
+    pub layout: Packing,
+    /// Texels of .ktx2 files.
+    #[arg(long, value_enum, default_value_t = Format::Rgba16f)]
+    pub texel: Format,
+    /// What light is multiplied by in all files but .bake.
+    #[arg(long, value_name = "FACTOR", value_parser = output::positive, default_value_t = 1.0)]
+    pub scale: f64,
+    /// Threads; 0 is one per processor.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub threads: usize,
+    /// Chooses other random numbers.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub seed: u64,
+    /// File to write; may be repeated: .bake (all there is, for --resume and --from-file), .json (with plain numbers in a .bin file beside it), .ktx2 (with a
+    /// .json file beside it; for the plain layout, a file for each number) or .exr (slices side by side).
+    #[arg(short, long, value_name = "FILE", required = true)]
+    pub output: Vec<PathBuf>,
+    /// No progress bar and no summary.
+    #[arg(short, long)]
+    pub quiet: bool,
+}
+
+/// An option with the default of [`BakeSettings::for_outline`].
+fn told(option: Arg) -> Arg {
+    let usual = BakeSettings::for_outline(&unit_outline(), [1, 1, 1]);
+    match option.get_id().as_str() {
+        "error" => with_default(option, usual.error),
+        "passes" => with_default(option, usual.most_passes),
+        _ => option,
+    }
+}
+
+/// How a probe holds light by direction.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Basis {
+    /// The mean over directions.
+    Sh0,
+    /// Spherical harmonics of degree 1: four colours.
+    Sh1,
+    /// Spherical harmonics of degree 2: nine colours.
+    Sh2,
+    /// Spherical harmonics of degree 3: sixteen colours.
+    Sh3,
+    /// Values in the directions of the axes: six colours.
+    AmbientCube,
+    /// Fluence alone, the integral over all directions: a colour.
+    Fluence,
+}
+
+/// What light is baked for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Purpose {
+    /// Radiance scattered towards a direction: for fog.
+    InScattered,
+    /// Irradiance by normal: for surfaces.
+    Irradiance,
+}
+
+/// Which light is baked.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Light {
+    /// All of it.
+    All,
+    /// All but light straight from the lights; that of an even sky is in it.
+    Indirect,
+    /// Light that the medium has scattered before it comes to the probe.
+    Multiple,
+}
+
+/// How light is found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Source {
+    /// What radiance caches know at the probe, connections to the lights: quick where probes are many, and as far off as single records are. That is
+    /// measured by path tracing some of the probes.
+    RadianceCache,
+    /// Path tracing from every probe: unbiased.
+    Path,
+}
+
+/// How numbers lie in textures.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Packing {
+    /// A texture for each number, with validity in alpha, and one of the medium: albedo, with extinction in alpha.
+    Plain,
+    /// One texture as Bevy's irradiance volumes have it, of irradiance over π.
+    Bevy,
+    /// One texture as three.js' LightProbeGrid has it.
+    Three,
+}
+
+/// Texels of textures.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Format {
+    /// Four half floats.
+    Rgba16f,
+    /// Three numbers with a common exponent: for ambient cubes and fluence, which are not below 0.
+    Rgb9e5,
+    /// One float, the mean of the channels.
+    R32f,
+}
+
+impl BakeArguments {
+    fn layout(&self) -> Layout {
+        match self.layout {
+            Packing::Plain => Layout::Plain,
+            Packing::Bevy => Layout::Bevy,
+            Packing::Three => Layout::Three,
+        }
+    }
+
+    fn texel(&self) -> Texel {
+        match self.texel {
+            Format::Rgba16f => Texel::Rgba16F,
+            Format::Rgb9e5 => Texel::Rgb9E5,
+            Format::R32f => Texel::R32F,
+        }
+    }
+
+    fn basis(&self) -> ProbeBasis {
+        let usual = if self.layout == Packing::Bevy { Basis::AmbientCube } else { Basis::Sh2 };
+        match self.basis.unwrap_or(usual) {
+            Basis::Sh0 => ProbeBasis::SphericalHarmonics { degree: 0 },
+            Basis::Sh1 => ProbeBasis::SphericalHarmonics { degree: 1 },
+            Basis::Sh2 => ProbeBasis::SphericalHarmonics { degree: 2 },
+            Basis::Sh3 => ProbeBasis::SphericalHarmonics { degree: 3 },
+            Basis::AmbientCube => ProbeBasis::AmbientCube,
+            Basis::Fluence => ProbeBasis::Fluence,
+        }
+    }
+
+    fn quantity(&self) -> Quantity {
+        let usual = if self.layout == Packing::Plain { Purpose::InScattered } else { Purpose::Irradiance };
+        match self.quantity.unwrap_or(usual) {
+            Purpose::InScattered => Quantity::InScattered,
+            Purpose::Irradiance => Quantity::Irradiance,
+        }
+    }
+
+    fn orders(&self) -> Orders {
+        let usual = if self.layout == Packing::Plain { Light::All } else { Light::Indirect };
+        match self.orders.unwrap_or(usual) {
+            Light::All => Orders::All,
+            Light::Indirect => Orders::Indirect,
+            Light::Multiple => Orders::Multiple,
+        }
+    }
+
+    /// The one .bake file that is written.
+    ///
+    /// # Errors
+    /// None or several, where one is needed.
+    fn kept(&self) -> Result<Option<&Path>, String> {
+        let mut files = self.output.iter().map(PathBuf::as_path).filter(|file| Target::of(file) == Ok(Target::Bake));
+        match (files.next(), files.next()) {
+            (None, _) if self.resume => Err("--resume goes on with a .bake file, but none is to be written".to_owned()),
+            (Some(_), Some(_)) => Err("--output: there may be one .bake file".to_owned()),
+            (file, _) => Ok(file),
+        }
+    }
+
+    /// The cells of a box.
+    ///
+    /// # Errors
+    /// Too many of them.
+    fn cells(&self, bounds: &Bounds) -> Result<[u32; 3], String> {
+        /// Along the longest side.
+        const USUAL: f64 = 32.0;
+        if let Some(counts) = self.counts {
+            return Ok(counts);
+        }
+        let size = bounds.size();
+        let spacing = self.spacing.unwrap_or(f64::from(size.max_element()) / USUAL);
+        let count = |length: f32| (f64::from(length) / spacing - 1e-3).ceil().max(1.0);
+        let counts = size.to_array().map(count);
+        if counts.iter().product::<f64>() > fogbow::bake::MOST_PROBES as f64 {
+            let [x, y, z] = counts;
+            return Err(format!(
+                "--spacing: {spacing} makes {x} x {y} x {z} probes, and there may be at most {}",
+                fogbow::bake::MOST_PROBES
+            ));
+        }
+        Ok(counts.map(|n| n as u32))
+    }
+}
+
+/// `x,y,z x,y,z`: the corners of a box.
+fn corners(text: &str) -> Result<Bounds, String> {
+    let number = |text: &str| text.trim().parse().ok().filter(|v: &f32| v.is_finite());
+    let point =
+        |text: &str| -> Option<[f32; 3]> { text.split(',').map(number).collect::<Option<Vec<_>>>()?.try_into().ok() };
+    let points: Option<Vec<_>> = text.split_whitespace().map(point).collect();
+    let Some(&[min, max]) = points.as_deref() else {
+        return Err("must look like \"-1,0,-1 1,2,1\": the smaller corner, a space, the larger corner".to_owned());
+    };
+    match (0..3).find(|axis| !(min[*axis] < max[*axis])) {
+        Some(axis) => Err(format!(
+            "the box has no extent along {}: {} is not less than {}",
+            ["x", "y", "z"][axis],
+            min[axis],
+            max[axis]
+        )),
+        None => Ok(Bounds { min: Vec3::from(min), max: Vec3::from(max) }),
+    }
+}
+
+/// `NxNxN`.
+fn counts(text: &str) -> Result<[u32; 3], String> {
+    let numbers: Option<Vec<u32>> = text.split('x').map(|n| n.parse().ok()).collect();
+    let most = fogbow::bake::MOST_PROBES;
+    match numbers.as_deref() {
+        Some(&[x, y, z]) if [x, y, z].map(u128::from).iter().product::<u128>() > most as u128 => {
+            Err(format!("there may be at most {most} probes"))
+        }
+        Some(&[x, y, z]) if x.min(y).min(z) == 0 => Err("there must be a probe along every side".to_owned()),
+        Some(&[x, y, z]) if x.max(y).max(z) > 1024 => Err("there may be at most 1024 probes along a side".to_owned()),
+        Some(&[x, y, z]) => Ok([x, y, z]),
+        _ => Err("must look like 32x16x32".to_owned()),
+    }
+}
+
+/// A standard error.
+fn error(text: &str) -> Result<f32, String> {
+    let [least, most] = fogbow::cache::ERROR_BOUNDS;
+    let error = text.parse::<f32>().ok().filter(|error| (least..=most).contains(error));
+    error.ok_or_else(|| format!("must be a number from {least} to {most}"))
+}
+
+pub(super) fn run(arguments: &BakeArguments) -> Result<Ending, Failure> {
+    for file in &arguments.output {
+        Target::of(file)?;
+        output::check_place(file)?;
+    }
+    arguments.kept()?;
+    let (baked, ending) = match (&arguments.from_file, &arguments.scene) {
+        (Some(file), _) => (from_file(file)?, Ending::Done),
+        (None, Some(scene)) => match bake(arguments, scene) {
+            Err(error) if error.is::<super::covariance::Stopped>() => {
+                eprintln!("fogbow: {error}");
+                return Ok(Ending::Stopped);
+            }
+            baked => baked?,
+        },
+        (None, None) => return Err("there is no scene to bake".into()),
+    };
+    // Textures of a bake that is not done would look as if it were.
+    let is_due = |file: &&PathBuf| ending == Ending::Done || Target::of(file) == Ok(Target::Bake);
+    let files: Vec<_> = arguments.output.iter().filter(is_due).collect();
+    let written = write::all(arguments, baked, &files)?;
+    if !arguments.quiet {
+        eprintln!("{written}");
+    }
+    Ok(ending)
+}
+
+/// A bake and what it was made for.
+struct Made {
+    baked: Baked,
+    tag: u64,
+}
+
+fn from_file(file: &Path) -> Result<Made, Failure> {
+    let bytes = read_file(file)?;
+    let grid = bytes::tag(&bytes).and_then(|tag| Ok((bytes::read(&bytes, tag, BakeMemory::default())?, tag)));
+    let (grid, tag) = grid.map_err(|error| format!("{}: {error}", file.display()))?;
+    Ok(Made { baked: Baked { grid, method: None, mean_cosine: None, deviation: None, scale: 1.0 }, tag })
+}
+
+fn bake(arguments: &BakeArguments, file: &Path) -> Result<(Made, Ending), Failure> {
+    let scene = SceneFile::read(file)?;
+    let mut storage = Storage::new(&scene);
+    let world = World::new(&scene, &mut storage)?;
+    let paths = super::render::path_settings(&scene, None);
+    let around = world.medium_bounds();
+    let needs_medium = arguments.quantity() == Quantity::InScattered;
+    let bounds = match (arguments.region, around) {
+        (_, None) if needs_medium => return Err(format!("{}: has no medium to bake light for", file.display()).into()),
+        (Some(region), Some(around)) if needs_medium && !overlap(&region, &around) => {
+            let Bounds { min, max } = around;
+            return Err(format!(
+                "--box: no medium is in it; they reach from {},{},{} to {},{},{}",
+                min.x, min.y, min.z, max.x, max.y, max.z
+            )
+            .into());
+        }
+        (Some(region), _) => region,
+        (None, around) => around.unwrap_or(world.bounds()),
+    };
+    let counts = arguments.cells(&bounds)?;
+    let lights = world.lights();
+    if lights.is_empty() && !world.media().glow() {
+        return Err(format!("{}: has no lights, so there is nothing to bake", file.display()).into());
+    }
+    let tree = light_tree(&lights);
+    let method = arguments.method;
+    job::check(method, &paths, &world)?;
+    let tag = tag(arguments, file, &paths, method)?;
+    let job = BakeJob {
+        arguments,
+        world: &world,
+        lights: view(&lights, tree.as_ref()),
+        paths,
+        bounds,
+        counts,
+        method,
+        tag,
+        begun: begun(arguments, tag)?,
+    };
+    let (grid, mean_cosine, deviation, ending) = world.media().with(job)?;
+    let name = match method {
+        Source::RadianceCache => "radiance-cache",
+        Source::Path => "path",
+    };
+    let baked = Baked { grid, method: Some(name), mean_cosine: Some(mean_cosine), deviation, scale: 1.0 };
+    if baked.counts()[0] == 0 && ending == Ending::Done {
+        let [_, in_wall, empty] = baked.counts();
+        return Err(format!(
+            "no probe holds light: {in_wall} are in walls, {empty} far from any medium; choose another --box or smaller cells"
+        )
+        .into());
+    }
+    Ok((Made { baked, tag }, ending))
+}
+
+fn overlap(a: &Bounds, b: &Bounds) -> bool {
+    a.min.cmplt(b.max).all() && b.min.cmplt(a.max).all()
+}
+
+/// What a grid in a file is for: all that changes the light of a probe, but for what its header says.
+fn tag(
+    arguments: &BakeArguments,
+    scene: &Path,
+    paths: &fogbow::path::Settings,
+    method: Source,
+) -> Result<u64, Failure> {
+    let mut crc = Crc::new();
+    crc.add(&fingerprint(scene)?.to_le_bytes());
+    let of_caches = if method != Source::Path { arguments.error.unwrap_or(0.0).to_bits() } else { 0 };
+    for number in [paths.max_scatterings, paths.roulette_after, method as u32, of_caches] {
+        crc.add(&number.to_le_bytes());
+    }
+    crc.add(&arguments.seed.to_le_bytes());
+    Ok(crc.value())
+}
+
+/// The grid that was left, where one is to be gone on with.
+fn begun(arguments: &BakeArguments, tag: u64) -> Result<Option<ProbeGrid<'static>>, Failure> {
+    let Some(file) = arguments.kept()?.filter(|file| arguments.resume && file.exists()) else { return Ok(None) };
+    let read = bytes::read(&read_file(file)?, tag, BakeMemory::default());
+    let grid = read.map_err(|error| match error {
+        ProbeBytesError::Tag { .. } => {
+            format!("{}: was made for another scene, or with another --method, --seed or --error", file.display())
+        }
+        error => format!("{}: {error}", file.display()),
+    })?;
+    Ok(Some(grid))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn boxes_and_counts_are_read_or_refused_with_the_reason() {
+        let due = Bounds { min: Vec3::new(-1.0, 0.0, 0.5), max: Vec3::new(1.0, 2.5, 1.0) };
+        assert_eq!(corners("-1,0,0.5  1,2.5,1"), Ok(due));
+        for text in ["", "1,2,3", "1,2 3,4", "1,2,3 4,5,nan", "1,2,3 4,5,6 7,8,9"] {
+            assert!(corners(text).unwrap_err().contains("must look like"), "{text}");
+        }
+        assert_eq!(corners("0,5,0 1,2,3").unwrap_err(), "the box has no extent along y: 5 is not less than 2");
+        assert_eq!(counts("3x4x5"), Ok([3, 4, 5]));
+        for (text, reason) in [
+            ("1000x1000x1000", "at most 16777216 probes"),
+            ("4294967295x4294967295x4294967295", "at most 16777216 probes"),
+            ("0x1x1", "along every side"),
+            ("2000x1x1", "at most 1024"),
+            ("3x4", "must look like"),
+        ] {
+            assert!(counts(text).unwrap_err().contains(reason), "{text}");
+        }
+    }
+}

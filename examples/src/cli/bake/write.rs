@@ -1,0 +1,156 @@
+//! The files of a bake.
+
+use std::ffi::OsString;
+use std::path::{Path, PathBuf};
+
+use fogbow::bake::{ProbeGrid, bytes};
+use fogbow_std::image::{Layer, write as write_picture};
+
+use super::{BakeArguments, Made};
+use crate::bake::{Baked, Layout, ktx2, raw, sheets, texture};
+
+/// What a file is, by its extension.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Target {
+    Bake,
+    Json,
+    Ktx2,
+    Exr,
+}
+
+impl Target {
+    /// # Errors
+    /// An extension that is none of these.
+    pub(super) fn of(file: &Path) -> Result<Self, String> {
+        let extension = file.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
+        match extension.as_deref() {
+            Some("bake") => Ok(Self::Bake),
+            Some("json") => Ok(Self::Json),
+            Some("ktx2") => Ok(Self::Ktx2),
+            Some("exr") => Ok(Self::Exr),
+            _ => Err(format!("{}: the extension is none of bake, json, ktx2, exr", file.display())),
+        }
+    }
+}
+
+/// Writes all files, and says what there is.
+///
+/// # Errors
+/// A layout that has no place for what was baked, numbers that texels do not hold, or what the system says.
+pub(super) fn all(arguments: &BakeArguments, made: Made, files: &[&PathBuf]) -> Result<String, String> {
+    let Made { mut baked, tag } = made;
+    let mut written = Vec::new();
+    for file in files.iter().filter(|file| Target::of(file) == Ok(Target::Bake)) {
+        keep(file, &baked.grid, tag)?;
+        written.push((*file).clone());
+    }
+    let [valid, in_wall, empty] = baked.counts();
+    let error = baked.grid.relative_error();
+    baked.grid.dilate();
+    baked.scale = arguments.scale as f32;
+    for file in files {
+        match Target::of(file)? {
+            Target::Bake => {}
+            Target::Json => {
+                let numbers = file.with_extension("bin");
+                save(&numbers, &raw::data(&baked))?;
+                let name = numbers.file_name().unwrap_or_default().to_string_lossy().into_owned();
+                save(file, raw::description(&baked, Some(&name)).as_bytes())?;
+                written.extend([numbers, (*file).clone()]);
+            }
+            Target::Ktx2 => written.extend(textures(arguments, &baked, file)?),
+            Target::Exr => {
+                let sheets = sheets::sheets(&baked).map_err(|error| format!("{}: {error}", file.display()))?;
+                let layers: Vec<_> = sheets.iter().map(|(name, image)| Layer { name, image }).collect();
+                write_picture(file, &layers, 0.0).map_err(|error| error.to_string())?;
+                let beside = file.with_extension("exr.json");
+                save(&beside, raw::description(&baked, None).as_bytes())?;
+                written.extend([(*file).clone(), beside]);
+            }
+        }
+    }
+    let [x, y, z] = baked.grid.lattice().size();
+    let names: Vec<_> = written.iter().map(|file| file.display().to_string()).collect();
+    let apart = baked.deviation.map_or(String::new(), |d| {
+        let [bias, error, spread] = [d.bias, d.bias_error, d.spread].map(|share| 100.0 * share);
+        format!("against path tracing of {} probes: {bias:+.2} % ± {error:.2} %, single numbers off by {spread:.1} % of the mean\n", d.probes)
+    });
+    Ok(format!(
+        "{x} x {y} x {z} probes: {valid} valid, {in_wall} in walls, {empty} far from any medium; standard error of what was sampled {:.2} % of the mean\n{apart}wrote {}",
+        100.0 * error,
+        names.join(", ")
+    ))
+}
+
+/// Writes the textures of a file, and a description beside it; their names.
+fn textures(arguments: &BakeArguments, baked: &Baked, file: &Path) -> Result<Vec<PathBuf>, String> {
+    let fail = |error: String| format!("{}: {error}", file.display());
+    let textures = texture::textures(baked, arguments.layout()).map_err(fail)?;
+    let bounds = baked.grid.lattice().bounds();
+    let corner = |v: fogbow::math::Vec3| format!("{},{},{}", v.x, v.y, v.z);
+    let (quantity, unit) = baked.quantity();
+    let region = format!("{} {}", corner(bounds.min), corner(bounds.max));
+    let (basis, scale) = (baked.basis(), baked.scale.to_string());
+    let about = [
+        ("fogbow.box", region.as_str()),
+        ("fogbow.basis", &basis),
+        ("fogbow.orders", baked.orders()),
+        ("fogbow.quantity", quantity),
+        ("fogbow.scale", &scale),
+        ("fogbow.unit", unit),
+    ];
+    let place = |name: &str| if arguments.layout() == Layout::Plain { named(file, name) } else { file.to_owned() };
+    let encoded = textures.iter().map(|one| {
+        let about = [&about[..], &[("fogbow.texture", one.name.as_str())]].concat();
+        Ok((place(&one.name), ktx2::encode(one, arguments.texel(), &about)?))
+    });
+    // All or none.
+    let encoded: Vec<_> = encoded.collect::<Result<_, String>>().map_err(fail)?;
+    let mut written = Vec::new();
+    for (place, bytes) in encoded {
+        save(&place, &bytes)?;
+        written.push(place);
+    }
+    let beside = file.with_extension("ktx2.json");
+    save(&beside, raw::description(baked, None).as_bytes())?;
+    written.push(beside);
+    Ok(written)
+}
+
+/// `fog.ktx2` and `sh0` make `fog-sh0.ktx2`.
+fn named(file: &Path, name: &str) -> PathBuf {
+    let mut stem = file.file_stem().unwrap_or_default().to_owned();
+    let name = match name.split_at(1) {
+        ("+", axis) => format!("plus-{axis}"),
+        ("-", axis) => format!("minus-{axis}"),
+        _ => name.to_owned(),
+    };
+    stem.push(format!("-{name}.ktx2"));
+    file.with_file_name(stem)
+}
+
+/// Writes a grid, for `--resume` and `--from-file`.
+///
+/// # Errors
+/// What the system says.
+pub(super) fn keep(file: &Path, grid: &ProbeGrid<'_>, tag: u64) -> Result<(), String> {
+    let mut all = Vec::with_capacity(bytes::byte_count(grid));
+    let Ok(()) = bytes::write(grid, tag, |part| {
+        all.extend_from_slice(part);
+        Ok::<(), core::convert::Infallible>(())
+    });
+    save(file, &all)
+}
+
+/// Writes a file beside the old one, which is lost only when the new one is complete.
+fn save(file: &Path, bytes: &[u8]) -> Result<(), String> {
+    let mut beside = OsString::from(file.file_name().unwrap_or_default());
+    beside.push(format!(".{}.new", std::process::id()));
+    let beside = file.with_file_name(beside);
+    let written = std::fs::write(&beside, bytes).and_then(|()| std::fs::rename(&beside, file));
+    written.map_err(|error| {
+        // It may not even be there.
+        drop(std::fs::remove_file(&beside));
+        format!("{}: cannot be written: {error}", file.display())
+    })
+}

@@ -1,0 +1,308 @@
+//! Bakes: files that engines read, threads, interruptions, bad input.
+
+use fogbow::bake::{BakeMemory, ProbeGrid, ProbeState, bytes};
+use fogbow::math::Vec3;
+use fogbow::math::float::PI;
+use fogbow_examples::bake::ktx2;
+use fogbow_examples::bake::texture::{Texel, Texture};
+use fogbow_std::image;
+use serde_json::Value;
+
+use super::{Folder, SCENE, said};
+
+/// Quick, and not good.
+const QUICK: [&str; 4] = ["--passes", "2", "--counts", "6x5x3"];
+
+fn bake(folder: &Folder, options: &[&str]) {
+    let output = folder.run(&[&["bake", SCENE, "-q"], options].concat());
+    assert_eq!(output.status.code(), Some(0), "{options:?}: {}", said(&output));
+    assert!(output.stderr.is_empty(), "{}", said(&output));
+}
+
+fn file(folder: &Folder, name: &str) -> Vec<u8> {
+    std::fs::read(folder.0.join(name)).unwrap_or_else(|error| panic!("{name}: {error}"))
+}
+
+fn grid(folder: &Folder, name: &str) -> ProbeGrid<'static> {
+    let file = file(folder, name);
+    bytes::read(&file, bytes::tag(&file).unwrap(), BakeMemory::default()).unwrap()
+}
+
+fn json(folder: &Folder, name: &str) -> Value {
+    serde_json::from_slice(&file(folder, name)).unwrap()
+}
+
+fn texture(folder: &Folder, name: &str) -> (Texture, Texel) {
+    ktx2::decode(&file(folder, name)).unwrap()
+}
+
+#[test]
+fn every_format_has_the_same_numbers() {
+    let folder = Folder::new("bake-formats");
+    let outputs = ["-o", "a.bake", "-o", "a.json", "-o", "a.exr", "-o", "a.ktx2"];
+    bake(&folder, &[&QUICK[..], &["--basis", "sh1", "--box", "-1,-0.9,-1 0.9,1,1"], &outputs].concat());
+    let kept = grid(&folder, "a.bake");
+    let mut dilated = grid(&folder, "a.bake");
+    let reached = dilated.dilate();
+    assert!(reached > 0, "some probes are in the mirror ball");
+
+    // Plain numbers, where their description says.
+    let about = json(&folder, "a.json");
+    assert_eq!(about["counts"], serde_json::json!([6, 5, 3]));
+    assert_eq!((&about["basis"], &about["quantity"]), (&"sh1".into(), &"in-scattered".into()));
+    assert_eq!((&about["unit"], &about["orders"]), (&"W/(m^2 sr)".into(), &"all".into()));
+    assert_eq!(about["box"]["min"][1].as_f64().unwrap() as f32, -0.9);
+    assert_eq!((about["mean_cosine"].as_f64().unwrap() as f32, &about["deviation"]), (0.6, &Value::Null));
+    assert_eq!(about["in_wall"].as_u64().unwrap() as usize, reached);
+    let data = file(&folder, about["data"].as_str().unwrap());
+    let arrays = about["arrays"].as_array().unwrap();
+    let of = |name: &str| {
+        let array = arrays.iter().find(|array| array["name"] == name).unwrap_or_else(|| panic!("{name}"));
+        let number = |key: &str| array[key].as_u64().unwrap() as usize;
+        (&data[number("offset")..][..number("bytes")], number("components"))
+    };
+    let floats = |name: &str| {
+        let (bytes, components) = of(name);
+        let all: Vec<f32> = bytes.as_chunks::<4>().0.iter().map(|bytes| f32::from_le_bytes(*bytes)).collect();
+        all.chunks(components).map(<[f32]>::to_vec).collect::<Vec<_>>()
+    };
+    let end = arrays.iter().map(|array| array["offset"].as_u64().unwrap() + array["bytes"].as_u64().unwrap()).max();
+    assert_eq!(end, Some(data.len() as u64));
+    for number in 0..4 {
+        let (values, errors) = (floats(&format!("sh{number}")), floats(&format!("error of sh{number}")));
+        for index in 0..90 {
+            assert_eq!(values[index], dilated.held(index)[number].0);
+            assert_eq!(errors[index], [kept.error(index, number)]);
+        }
+    }
+    let (extinction, (states, _)) = (floats("extinction"), of("state"));
+    for (index, probe) in kept.probes().iter().enumerate() {
+        assert_eq!(extinction[index], probe.extinction.0);
+        assert_eq!(states[index] == 1, probe.state() == ProbeState::Valid);
+    }
+
+    // Slices side by side: three of them make two rows of two.
+    let sheet = image::read(folder.0.join("a.exr")).unwrap();
+    assert_eq!((sheet.width, sheet.height), (12, 10));
+    for index in 0..90 {
+        let [x, y, z] = [index % 6, index / 6 % 5, index / 30];
+        let pixel = (x + 6 * (z % 2)) + 12 * (y + 5 * (z / 2));
+        assert_eq!(sheet.pixels[pixel], dilated.held(index)[0]);
+    }
+
+    // Textures of half floats, with validity in alpha.
+    for number in 0..4 {
+        let (texture, texel) = texture(&folder, &format!("a-sh{number}.ktx2"));
+        assert_eq!((texture.size, texel), ([6, 5, 3], Texel::Rgba16F));
+        for (index, texel) in texture.texels.iter().enumerate() {
+            let halves = dilated.held(index)[number].0.map(|value| half::f16::from_f32(value).to_f32());
+            assert_eq!(texel[..3], halves);
+            assert_eq!(texel[3] == 1.0, kept.probes()[index].state() == ProbeState::Valid);
+        }
+    }
+    let (medium, _) = texture(&folder, "a-medium.ktx2");
+    assert!((medium.texels[40][3] / kept.probes()[40].extinction.mean() - 1.0).abs() < 1e-3);
+
+    // From one into others, the same bytes; scaled, others.
+    let output = folder.run(&["bake", "--from-file", "a.bake", "-o", "b.json", "-o", "b.exr", "-o", "b.bake"]);
+    assert_eq!(output.status.code(), Some(0), "{}", said(&output));
+    assert!(said(&output).contains("6 x 5 x 3 probes:"), "{}", said(&output));
+    assert!(file(&folder, "b.bin") == data && file(&folder, "b.bake") == file(&folder, "a.bake"));
+    assert!(file(&folder, "b.exr") == file(&folder, "a.exr"));
+    let output = folder.run(&["bake", "--from-file", "a.bake", "-o", "c.json", "-q", "--scale", "0.5"]);
+    assert_eq!(output.status.code(), Some(0), "{}", said(&output));
+    assert_eq!(json(&folder, "c.json")["scale"], 0.5);
+    let first = |data: &[u8]| f32::from_le_bytes(*data.first_chunk().unwrap());
+    assert_eq!(first(&file(&folder, "c.bin")), 0.5 * first(&data));
+    // Nothing else is left.
+    assert!(folder.names().iter().all(|name| !name.ends_with(".new")), "{:?}", folder.names());
+}
+
+/// What hardware makes of a texture at `uvw`, each in [0, 1].
+fn sampled(texture: &Texture, uvw: Vec3) -> [f32; 4] {
+    let size = texture.size.map(|n| n as i32);
+    let at: [f32; 3] = core::array::from_fn(|i| uvw[i] * size[i] as f32 - 0.5);
+    let mut sum = [0.0; 4];
+    for corner in 0..8 {
+        let (mut weight, mut texel) = (1.0, [0; 3]);
+        for axis in 0..3 {
+            let (low, bit) = (at[axis].floor(), corner >> axis & 1);
+            weight *= if bit == 1 { at[axis] - low } else { 1.0 - (at[axis] - low) };
+            texel[axis] = (low as i32 + bit).clamp(0, size[axis] - 1);
+        }
+        let [x, y, z] = texel;
+        let found = texture.texels[(x + size[0] * (y + size[1] * z)) as usize];
+        sum.iter_mut().zip(found).for_each(|(sum, value)| *sum += weight * value);
+    }
+    sum
+}
+
+/// Points and unit normals in a box.
+fn asked(grid: &ProbeGrid<'_>) -> impl Iterator<Item = (Vec3, Vec3)> + use<> {
+    let bounds = grid.lattice().bounds();
+    (0..200).map(move |i| {
+        let part = |k: u32| (i as f32 * [0.7548, 0.5698, 0.4301, 0.3247, 0.8192][k as usize]).fract();
+        let point = bounds.min + bounds.size() * Vec3::new(part(0), part(1), part(2));
+        let (z, angle) = (2.0 * part(3) - 1.0, 2.0 * PI * part(4));
+        let across = (1.0 - z * z).sqrt();
+        (point, Vec3::new(across * angle.cos(), across * angle.sin(), z))
+    })
+}
+
+/// Half floats, of a few numbers that add up.
+const HALF: f32 = 3e-3;
+
+/// As Bevy's shader reads it (irradiance_volume.wesl, November 2026).
+#[test]
+fn an_irradiance_volume_is_what_bevys_shader_samples() {
+    let folder = Folder::new("bake-bevy");
+    let options = ["--box", "0.1,-0.4,-0.6 0.9,0.9,0.6", "--layout", "bevy", "-o", "a.ktx2", "-o", "a.bake"];
+    bake(&folder, &[&QUICK[..], &options].concat());
+    let (kept, (texture, _)) = (grid(&folder, "a.bake"), texture(&folder, "a.ktx2"));
+    assert_eq!(texture.size, [6, 10, 9]);
+    assert_eq!(json(&folder, "a.ktx2.json")["orders"], "indirect");
+    assert!(kept.probes().iter().all(|probe| probe.state() == ProbeState::Valid));
+    let atlas = Vec3::new(6.0, 10.0, 9.0);
+    let resolution = Vec3::new(6.0, 5.0, 3.0);
+    for (point, normal) in asked(&kept) {
+        // The volume fills a cube around the origin.
+        let unit = (point - kept.lattice().bounds().centre()) / kept.lattice().bounds().size();
+        let stp = ((unit + 0.5) * resolution).clamp(Vec3::splat(0.5), resolution - 0.5);
+        let uvw = stp / atlas;
+        let lower = |axis: usize| if normal[axis] < 0.0 { 0.5 } else { 0.0 };
+        let mut light = 0.0;
+        for axis in 0..3 {
+            let rgb = sampled(&texture, uvw + Vec3::new(0.0, lower(axis), axis as f32 / 3.0));
+            light += rgb[1] * normal[axis] * normal[axis];
+        }
+        let due = kept.value(point, normal)[1] / PI;
+        assert!((light - due).abs() < HALF * due, "{point} {normal}: {light} instead of {due}");
+    }
+}
+
+/// As three.js reads it (LightProbeGridNode.js, November 2026).
+#[test]
+fn an_atlas_is_what_three_js_samples() {
+    let folder = Folder::new("bake-three");
+    let options = ["--box", "0.1,-0.4,-0.6 0.9,0.9,0.6", "--layout", "three", "-o", "a.ktx2", "-o", "a.bake"];
+    bake(&folder, &[&QUICK[..], &options].concat());
+    let (kept, (texture, _)) = (grid(&folder, "a.bake"), texture(&folder, "a.ktx2"));
+    assert_eq!(texture.size, [6, 5, 7 * 5]);
+    let about = json(&folder, "a.ktx2.json");
+    let corner = |name: &str| Vec3::from_array(core::array::from_fn(|i| about[name][i].as_f64().unwrap() as f32));
+    let (min, max, resolution) = (corner("first_probe"), corner("last_probe"), Vec3::new(6.0, 5.0, 3.0));
+    for (point, normal) in asked(&kept) {
+        let inside = ((point - min) / (max - min)).clamp(Vec3::ZERO, Vec3::ONE);
+        let uvw = (inside * (resolution - 1.0) + 0.5) / resolution;
+        let slices = 3.0 + 2.0;
+        let volume =
+            |t: f32| sampled(&texture, Vec3::new(uvw.x, uvw.y, (uvw.z * 3.0 + 1.0 + slices * t) / (7.0 * slices)));
+        let floats: Vec<f32> = (0..7).flat_map(|t| volume(t as f32)).collect();
+        let green = |k: usize| floats[3 * k + 1];
+        let Vec3 { x, y, z } = normal;
+        let light = 0.886227 * green(0)
+            + 2.0 * 0.511664 * (green(1) * y + green(2) * z + green(3) * x)
+            + 2.0 * 0.429043 * (green(4) * x * y + green(5) * y * z + green(7) * x * z)
+            + green(6) * (0.743125 * z * z - 0.247708)
+            + green(8) * 0.429043 * (x * x - y * y);
+        let (due, mean) = (kept.value(point, normal)[1], 0.886227 * green(0));
+        assert!((light.max(0.0) - due).abs() < HALF * mean, "{point} {normal}: {light} instead of {due}");
+    }
+}
+
+#[test]
+fn any_number_of_threads_gives_the_same_bytes() {
+    let folder = Folder::new("bake-threads");
+    for method in ["path", "radiance-cache"] {
+        let mut first = None;
+        for threads in ["1", "2", "7"] {
+            let options =
+                ["--counts", "9x5x6", "--error", "0.1", "--passes", "12", "--basis", "ambient-cube", "-o", "a.bake"];
+            bake(&folder, &[&options[..], &["--method", method, "--threads", threads]].concat());
+            let found = file(&folder, "a.bake");
+            assert!(*first.get_or_insert_with(|| found.clone()) == found, "{method}, {threads} threads");
+        }
+    }
+}
+
+/// What was left goes on as if it had not been.
+#[cfg(unix)]
+#[test]
+fn an_interrupted_bake_is_gone_on_with() {
+    let folder = Folder::new("bake-stop");
+    let options = ["bake", SCENE, "--counts", "9x8x8", "--error", "0.005", "-o", "a.bake", "-o", "a.json"];
+    let child = folder.fogbow().args(options).stderr(std::process::Stdio::piped()).spawn().unwrap();
+    // Until it is under way, however slow the machine.
+    std::thread::sleep(std::time::Duration::from_secs(3));
+    let stop = std::process::Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+    assert!(stop.success());
+    let output = child.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(1), "{}", said(&output));
+    assert_eq!(folder.names(), ["a.bake"], "textures of half a bake would look whole");
+    let left = grid(&folder, "a.bake");
+    let most = (0..left.lattice().cell_count()).map(|index| left.passes(index)).max().unwrap();
+    assert!(most > 0);
+    let passes = (most + 2).to_string();
+    let again = |more: &[&str], name: &str| {
+        let common = ["--counts", "9x8x8", "--error", "0.005", "--passes", &passes, "-o", name];
+        bake(&folder, &[&common[..], more].concat());
+    };
+    again(&["--resume"], "a.bake");
+    again(&[], "b.bake");
+    assert!(file(&folder, "a.bake") == file(&folder, "b.bake"));
+}
+
+/// A floor and a lamp in clear air.
+const BARE: &str = r#"<scene version="3.0.0"><integrator type="volpath"/><shape type="rectangle"><bsdf type="diffuse"/></shape>
+    <emitter type="point"><point name="position" x="0" y="1" z="0"/><rgb name="intensity" value="1 1 1"/></emitter>
+    <sensor type="perspective"><float name="fov" value="36"/><string name="fov_axis" value="x"/>
+    <film type="hdrfilm"><rfilter type="box"/></film></sensor></scene>"#;
+
+#[test]
+fn what_cannot_be_baked_is_told_by_name() {
+    let folder = Folder::new("bake-wrong");
+    bake(&folder, &[&QUICK[..], &["-o", "a.bake"]].concat());
+    let kept = file(&folder, "a.bake");
+    std::fs::write(folder.0.join("cut.bake"), &kept[..999]).unwrap();
+    std::fs::write(folder.0.join("bare.xml"), BARE).unwrap();
+    for (arguments, reason) in [
+        (&[SCENE, "--counts", "0x2x2", "-o", "b.json"][..], "there must be a probe along every side"),
+        (&[SCENE, "--counts", "1000x1000x1000", "-o", "b.json"], "at most 16777216 probes"),
+        (&[SCENE, "--counts", "2x2", "-o", "b.json"], "must look like 32x16x32"),
+        (&[SCENE, "--spacing", "0.0001", "-o", "b.json"], "--spacing: 0.0001 makes 20"),
+        (&[SCENE, "--spacing", "0", "-o", "b.json"], "must be a number greater than 0"),
+        (&[SCENE, "--spacing", "1", "--counts", "2x2x2", "-o", "b.json"], "cannot be used with"),
+        (&[SCENE, "--box", "1,0,0 0,1,1", "-o", "b.json"], "no extent along x: 1 is not less than 0"),
+        (&[SCENE, "--box", "0,0,0 1,1", "-o", "b.json"], "the smaller corner, a space, the larger corner"),
+        (&[SCENE, "--box", "5,5,5 6,6,6", "-o", "b.json"], "--box: no medium is in it; they reach from"),
+        (&[SCENE, "--error", "0", "-o", "b.json"], "must be a number from"),
+        (&[SCENE, "--basis", "sh4", "-o", "b.json"], "possible values: sh0"),
+        (&[SCENE, "-o", "b.png"], "b.png: the extension is none of bake, json, ktx2, exr"),
+        (&[SCENE, "-o", "nowhere/b.json"], "nowhere/b.json: cannot be written"),
+        (&[SCENE], "--output <FILE>"),
+        (&["-o", "b.json"], "<SCENE>"),
+        (&[SCENE, "-o", "b.json", "--resume"], "none is to be written"),
+        (&[SCENE, "-o", "a.bake", "-o", "b.bake"], "there may be one .bake file"),
+        (
+            &[SCENE, "-o", "a.bake", "--resume", "--counts", "6x5x3", "--seed", "7"],
+            "a.bake: was made for another scene",
+        ),
+        (&[SCENE, "-o", "a.bake", "--resume", "--counts", "6x5x4"], "of another --box, --counts, --basis"),
+        (&[SCENE, "-o", "cut.bake", "--resume"], "cut.bake: is cut off"),
+        (&["--from-file", "cut.bake", "-o", "b.json"], "cut.bake: is cut off"),
+        (&["--from-file", "missing.bake", "-o", "b.json"], "missing.bake: cannot be read"),
+        (&["--from-file", "a.bake", "-o", "b.ktx2", "--layout", "bevy"], "takes an ambient cube of irradiance"),
+        (&["--from-file", "a.bake", "-o", "b.ktx2", "--texel", "rgb9e5"], "take rgba16f"),
+        (&["--from-file", "a.bake", "-o", "b.ktx2", "--scale", "1e9"], "more than texels hold"),
+        (&["--from-file", "a.bake", SCENE, "-o", "b.json"], "cannot be used with"),
+        (&["bare.xml", "-o", "b.json"], "bare.xml: has no medium to bake light for"),
+    ] {
+        let output = folder.run(&[&["bake"], arguments].concat());
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}");
+        assert!(said(&output).contains(reason), "{arguments:?}: {}", said(&output));
+        assert!(!said(&output).contains("panicked"), "{}", said(&output));
+    }
+    // Nothing is lost, and nothing is begun.
+    assert!(file(&folder, "a.bake") == kept);
+    assert_eq!(folder.names(), ["a.bake", "bare.xml", "cut.bake"]);
+}
