@@ -103,8 +103,8 @@ pub struct ProbeDeviation {
 /// Probes in the cells of a box: what a [`Bake`](super::Bake) makes.
 ///
 /// ```
-/// # use fogbow::{host::Empty, light::Light, math::{Bounds, Vec3}, phase::Lobe, medium::{Homogeneous, Placed, Region}};
-/// # use fogbow::{spectrum::Spectrum, work, world::{Outline, World}};
+/// # use fogbow::{host::Empty, light::Light, math::{Bounds, Ray, Vec3}, phase::Lobe, medium::{Homogeneous, Placed, Region}};
+/// # use fogbow::{march::eye_ray, spectrum::Spectrum, work, world::{Outline, World}};
 /// # #[cfg(feature = "alloc")] {
 /// use fogbow::bake::{Bake, BakeSettings, BakedProbes, Orders, ProbeBasis, ProbeState, Quantity};
 /// // A ball of fog in one corner of the box, below an even sky.
@@ -130,6 +130,11 @@ pub struct ProbeDeviation {
 /// assert!(grid.look_up(Vec3::splat(0.2), &mut held) > 0.999);
 /// assert!((grid.value(Vec3::splat(0.2), Vec3::X)[0] - 1.0).abs() < 0.5);
 /// assert_eq!(grid.deviation(&grid).spread, 0.0);
+///
+/// // Along an eye ray.
+/// let (ray, of_grid) = (Ray::new(-Vec3::Z, Vec3::Z), |point, to_eye, _: &_| grid.value(point, to_eye));
+/// let seen = eye_ray(&ray, &ball, |_| 0.05, of_grid, 0.5);
+/// assert!((seen.radiance[0] + seen.transmittance[0] - 1.0).abs() < 0.3); // a furnace
 ///
 /// // Where there is no fog nothing was baked; other probes' light spreads there.
 /// let far = grid.lattice().index(Vec3::splat(0.9)).unwrap();

@@ -57,6 +57,10 @@ pub struct MarchArguments {
     /// Shortest step with covariances.
     #[arg(long, value_name = "LENGTH", value_parser = output::positive)]
     pub step_least: Option<f64>,
+    /// Takes the medium's light from a file that `fogbow bake` wrote for the same scene: of all orders, or indirect and then with connections
+    /// to the lights at every step.
+    #[arg(long, value_name = "FILE.bake")]
+    pub bake: Option<PathBuf>,
 }
 
 /// An option with the default of [`Settings::for_outline`].

@@ -1,6 +1,10 @@
 //! `fogbow render --method march`.
 
+use std::path::Path;
+
+use fogbow::bake::{BakeMemory, Orders, ProbeGrid, Quantity, bytes};
 use fogbow::host::Medium;
+use fogbow::light::Light;
 use fogbow::march;
 use fogbow::math::Ray;
 use fogbow::path::{self, InScattered};
@@ -12,15 +16,54 @@ use fogbow_std::stats::{CountingMedium, CountingScene};
 use fogbow_std::tiles::{self, Outcome};
 
 use super::Failure;
+use super::bake::is_made_for;
 use super::covariance::MarchArguments;
 use super::render::{LAYERS, Shot, write_layers};
-use crate::world::WithMedium;
+use crate::error::read_file;
+use crate::world::{WithMedium, World};
 
 /// A render by ray marching, to be done with a medium of any type.
 pub(super) struct MarchJob<'a> {
     pub(super) shot: Shot<'a>,
     pub(super) film: &'a mut Film,
     pub(super) arguments: &'a MarchArguments,
+    /// Baked light of the medium.
+    pub(super) baked: Option<ProbeGrid<'static>>,
+}
+
+/// The light of a bake, if there is to be any.
+///
+/// # Errors
+/// A file that is no bake, or of another scene, or one that lacks light or a part of the medium.
+pub(super) fn baked(
+    arguments: &MarchArguments,
+    scene: &Path,
+    paths: &path::Settings,
+    world: &World<'_>,
+) -> Result<Option<ProbeGrid<'static>>, Failure> {
+    let Some(file) = &arguments.bake else { return Ok(None) };
+    let fail = |reason: &str| format!("{}: {reason}", file.display());
+    let all = read_file(file)?;
+    let tag = bytes::tag(&all).map_err(|error| fail(&error.to_string()))?;
+    let mut grid = bytes::read(&all, tag, BakeMemory::default()).map_err(|error| fail(&error.to_string()))?;
+    if !is_made_for(tag, scene, paths)? {
+        return Err(fail("was made for another scene").into());
+    }
+    if grid.quantity() != Quantity::InScattered {
+        return Err(fail("holds irradiance of surfaces; for fog, bake in-scattered radiance").into());
+    }
+    if grid.orders() == Orders::Multiple {
+        return Err(fail("lacks light that surfaces send into the medium; bake all orders, or indirect").into());
+    }
+    let (held, around) = (grid.lattice().bounds(), world.medium_bounds());
+    let slack = 1e-3 * held.size().max_element();
+    let is_held = around
+        .is_none_or(|around| (held.min - slack).cmple(around.min).all() && (held.max + slack).cmpge(around.max).all());
+    if !is_held {
+        return Err(fail("its box does not hold all of the medium").into());
+    }
+    grid.dilate();
+    Ok(Some(grid))
 }
 
 impl WithMedium for MarchJob<'_> {
@@ -33,6 +76,9 @@ impl WithMedium for MarchJob<'_> {
         let shot = self.shot;
         let (width, height) = (self.film.width(), self.film.height());
         let stride = self.arguments.stride(shot.world.bounds().size().length(), shot.grid);
+        // An even sky is in indirect light.
+        let lamps: Vec<Light<'_>> = shot.lights.iter().filter(|light| !light.is_sky()).copied().collect();
+        let is_whole = self.baked.as_ref().is_some_and(|grid| grid.orders() == Orders::All);
         let outcome = tiles::render(self.film, shot.settings, shot.control, |sample, rng, layers| {
             let world = LitWorld {
                 medium: &CountingMedium { medium, tally: sample.tally },
@@ -52,7 +98,21 @@ impl WithMedium for MarchJob<'_> {
                     march::steps(segment, world.medium, stride.steps(segment), offset, |at, properties, weight| {
                         count += 1;
                         let (point, to_eye) = (segment.at(at), -segment.direction);
-                        let here = path::in_scattered(&world, point, to_eye, &properties.phase, &settings, rng);
+                        let phase = &properties.phase;
+                        let here = match &self.baked {
+                            None => path::in_scattered(&world, point, to_eye, phase, &settings, rng),
+                            Some(grid) if is_whole => {
+                                InScattered { multiple: grid.value(point, to_eye), ..InScattered::default() }
+                            }
+                            Some(grid) => {
+                                let (once, lit) = (
+                                    path::Settings { max_scatterings: 1, ..settings },
+                                    LitWorld { lights: (&lamps).into(), ..world },
+                                );
+                                let single = path::in_scattered(&lit, point, to_eye, phase, &once, rng).single;
+                                InScattered { single, multiple: grid.value(point, to_eye) }
+                            }
+                        };
                         let factor: Spectrum = weight * properties.scattering;
                         light.single += factor * here.single;
                         light.multiple += factor * here.multiple;

@@ -29,7 +29,7 @@ use super::choice::Choice;
 use super::covariance::{CovarianceArguments, GridJob, MarchArguments, Step, Stopped};
 use super::defaults::{with_default, with_remark};
 use super::image_sampling::{self, SamplingArguments, Sight};
-use super::march::MarchJob;
+use super::march::{self, MarchJob};
 use super::photon_beams::{BeamArguments, BeamJob, Kernel};
 use super::radiance_cache::{Audited, CacheArguments, CacheJob};
 use super::report::{Bar, Report};
@@ -248,6 +248,9 @@ pub(crate) fn render(arguments: &RenderArguments) -> Result<Rendered, Failure> {
             "--noise: the noise of photon beams and virtual lights is that of whole passes; use --spp or --time".into(),
         );
     }
+    if arguments.march.bake.is_some() && arguments.method != Some(Method::March) {
+        return Err("--bake: light that was baked is marched: it needs --method march".into());
+    }
     let mut storage = Storage::new(&scene);
     let world = statistics.time("build", || World::new(&scene, &mut storage))?;
     let choice = Choice::of(arguments, &paths, &world)?;
@@ -333,7 +336,10 @@ pub(crate) fn render(arguments: &RenderArguments) -> Result<Rendered, Failure> {
             audit = arguments.is_audited().then(|| Audit::new(&film, settings.bound, &arguments.vpl));
             outcome
         }
-        Method::March => world.media().with(MarchJob { shot, film: &mut film, arguments: &arguments.march })?,
+        Method::March => {
+            let baked = march::baked(&arguments.march, &arguments.scene, &paths, &world)?;
+            world.media().with(MarchJob { shot, film: &mut film, arguments: &arguments.march, baked })?
+        }
         Method::RadianceCache => {
             let done = world.media().with(CacheJob {
                 world: &world,

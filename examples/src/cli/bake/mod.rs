@@ -10,6 +10,7 @@ use fogbow::bake::bytes::{self, ProbeBytesError};
 use fogbow::bake::{BakeMemory, BakeSettings, Orders, ProbeBasis, ProbeGrid, Quantity};
 use fogbow::bytes::Crc;
 use fogbow::math::{Bounds, Vec3};
+use fogbow::path;
 
 use super::defaults::{unit_outline, with_default};
 use super::{Ending, Failure, output};
@@ -394,21 +395,29 @@ fn overlap(a: &Bounds, b: &Bounds) -> bool {
     a.min.cmplt(b.max).all() && b.min.cmplt(a.max).all()
 }
 
-/// What a grid in a file is for: all that changes the light of a probe, but for what its header says.
-fn tag(
-    arguments: &BakeArguments,
-    scene: &Path,
-    paths: &fogbow::path::Settings,
-    method: Source,
-) -> Result<u64, Failure> {
+/// What a grid in a file is for: in the upper half the light of the scene, in the lower one all else that changes a probe but for what the file's
+/// header says.
+fn tag(arguments: &BakeArguments, scene: &Path, paths: &path::Settings, method: Source) -> Result<u64, Failure> {
     let mut crc = Crc::new();
-    crc.add(&fingerprint(scene)?.to_le_bytes());
     let of_caches = if method != Source::Path { arguments.error.unwrap_or(0.0).to_bits() } else { 0 };
-    for number in [paths.max_scatterings, paths.roulette_after, method as u32, of_caches] {
+    for number in [paths.roulette_after, method as u32, of_caches] {
         crc.add(&number.to_le_bytes());
     }
     crc.add(&arguments.seed.to_le_bytes());
-    Ok(crc.value())
+    Ok(u64::from(of_scene(scene, paths)?) << 32 | crc.value() & 0xffff_ffff)
+}
+
+/// A number for the light of a scene.
+fn of_scene(scene: &Path, paths: &path::Settings) -> Result<u32, Failure> {
+    let mut crc = Crc::new();
+    crc.add(&fingerprint(scene)?.to_le_bytes());
+    crc.add(&paths.max_scatterings.to_le_bytes());
+    Ok((crc.value() >> 32) as u32)
+}
+
+/// Whether a grid with a tag has the light of a scene.
+pub(super) fn is_made_for(tag: u64, scene: &Path, paths: &path::Settings) -> Result<bool, Failure> {
+    Ok((tag >> 32) as u32 == of_scene(scene, paths)?)
 }
 
 /// The grid that was left, where one is to be gone on with.
