@@ -130,6 +130,7 @@ pub struct ProbeDeviation {
 /// assert!(grid.look_up(Vec3::splat(0.2), &mut held) > 0.999);
 /// assert!((grid.value(Vec3::splat(0.2), Vec3::X)[0] - 1.0).abs() < 0.5);
 /// assert_eq!(grid.deviation(&grid).spread, 0.0);
+/// assert!(grid.relative_coarseness()[1] < 0.5 && grid.coarseness(probe) < 0.5);
 ///
 /// // Along an eye ray.
 /// let (ray, of_grid) = (Ray::new(-Vec3::Z, Vec3::Z), |point, to_eye, _: &_| grid.value(point, to_eye));
@@ -262,6 +263,50 @@ impl ProbeGrid<'_> {
             }
         }
         (sum, numbers)
+    }
+
+    /// How far look-ups half way from a probe to its neighbours are off because the grid is too coarse for how light varies (in the unit of light),
+    /// a root mean square over numbers: an eighth of the second differences along the axes, added up, without what their standard errors explain. 0 where probes or neighbours
+    /// are not valid, and at the borders of the box.
+    ///
+    /// Exact where light changes quadratically; at the edge of a shadow about right; of what varies between two probes and not at them, nothing is known.
+    ///
+    /// # Panics
+    /// If there is no such probe.
+    #[must_use]
+    pub fn coarseness(&self, index: usize) -> f32 {
+        let size = self.lattice.size().map(|n| n as usize);
+        let at = [index % size[0], index / size[0] % size[1], index / (size[0] * size[1])];
+        let strides = [1, size[0], size[0] * size[1]];
+        let mut sum = 0.0;
+        for axis in (0..3).filter(|axis| at[*axis] > 0 && at[*axis] + 1 < size[*axis]) {
+            let three = [index - strides[axis], index, index + strides[axis]];
+            if !three.iter().all(|probe| self.probes()[*probe].is_valid()) {
+                continue;
+            }
+            let [before, here, after] = three.map(|probe| self.held(probe));
+            let mut squares = 0.0;
+            for number in 0..self.basis.count() {
+                let second = before[number] + after[number] - here[number] * 2.0;
+                let [a, b, c] = three.map(|probe| self.error(probe, number));
+                squares += second.map(|second| second * second).mean() - (a * a + 4.0 * b * b + c * c);
+            }
+            sum += sqrt((squares / self.basis.count() as f32).max(0.0)) / 8.0;
+        }
+        sum
+    }
+
+    /// The root mean square of [`ProbeGrid::coarseness`] and the greatest, in proportion to the mean light of the grid; 0 in the dark.
+    #[must_use]
+    pub fn relative_coarseness(&self) -> [f32; 2] {
+        let (mut squares, mut most, mut count) = (0.0_f64, 0.0_f64, 0_u32);
+        for (index, _) in self.probes().iter().enumerate().filter(|(_, probe)| probe.is_valid()) {
+            let off = f64::from(self.coarseness(index));
+            (squares, most, count) = (squares + off * off, most.max(off), count + 1);
+        }
+        let level = self.level();
+        let over = |off: f64| if level > 0.0 { (off / level) as f32 } else { 0.0 };
+        [over(libm::sqrt(squares / f64::from(count.max(1)))), over(most)]
     }
 
     /// Passes that are in a probe.

@@ -23,6 +23,7 @@
 //! | `places` | which probes are in walls or far from any medium |
 //! | `fill` | [`Bake`]: passes over bricks |
 //! | `grid` | [`ProbeGrid`]: what was baked; look-ups, dilation |
+//! | `one_light` | [`OneLight`]: a layer of light for each lamp |
 //! | [`bytes`] | grids as bytes, to be saved |
 
 mod arriving;
@@ -30,6 +31,7 @@ mod basis;
 pub mod bytes;
 mod fill;
 mod grid;
+mod one_light;
 mod places;
 mod settings;
 #[cfg(all(test, feature = "alloc"))]
@@ -38,4 +40,5 @@ mod tests;
 pub use basis::{AXES, MOST_COEFFICIENTS, Orders, ProbeBasis, Quantity};
 pub use fill::{Bake, BakedProbes};
 pub use grid::{BakeMemory, Brick, Probe, ProbeDeviation, ProbeGrid, ProbeState};
+pub use one_light::OneLight;
 pub use settings::{BakeError, BakeSettings, MOST_PROBES};

@@ -2,7 +2,7 @@
 
 use alloc::vec::Vec;
 
-use glam::Vec3;
+use glam::{Vec3, Vec3Swizzles};
 
 use super::bytes::{self, ProbeBytesError};
 use super::*;
@@ -201,6 +201,43 @@ fn light_of_two_lamps_is_the_sum_of_both() {
     }
 }
 
+/// A lamp on a wall: a disc that shines to one side, as a light and as a surface.
+struct Panel;
+
+impl Scene for Panel {
+    fn closest_hit(&self, ray: &Ray) -> Option<Hit> {
+        let distance = (-0.9 - ray.origin.x) / ray.direction.x;
+        let is_hit = distance > 1e-6 && distance < ray.length && ray.at(distance).yz().abs().max_element() < 0.5;
+        let surface = Surface::Lambert { reflectance: Spectrum::splat(0.5) };
+        let light = (ray.direction.x < 0.0).then_some(1);
+        is_hit.then_some(Hit { distance, normal: Vec3::X, surface, light })
+    }
+}
+
+#[test]
+fn light_of_each_lamp_by_itself_adds_up() {
+    let panel = crate::light::QuadLight::new(Vec3::new(-0.9, -0.5, -0.5), Vec3::Y, Vec3::Z, Spectrum::ONE).unwrap();
+    let lights = [lamp(Vec3::new(1.3, 0.0, 0.3), Spectrum::ONE), Light::Quad(panel)];
+    let ball = Placed::new(haze(0.9, 1.0, 0.2), Region::sphere(Vec3::ZERO, 0.8).unwrap());
+    let all = World { medium: &ball, scene: &Panel, lights: (&lights).into() };
+    let settings = BakeSettings { basis: ProbeBasis::Fluence, ..settings(&all, [3, 3, 3]) };
+    let both = baked(settings, &all);
+    let each = [0, 1].map(|number| {
+        let scene = OneLight { scene: &Panel, number };
+        let lights = core::slice::from_ref(&lights[number as usize]).into();
+        baked(settings, &World { medium: &ball, scene: &scene, lights })
+    });
+    for index in 0..27 {
+        let [all, first, second] = [&both, &each[0], &each[1]].map(|grid| grid.held(index)[0][0]);
+        let error: f32 = [&both, &each[0], &each[1]].map(|grid| grid.error(index, 0).powi(2)).iter().sum();
+        assert!(
+            (all - first - second).abs() <= ERRORS * libm::sqrtf(error) + 1e-5,
+            "{index}: {all}, {first} + {second}"
+        );
+        assert!(second > 0.0 && first > 0.0);
+    }
+}
+
 #[test]
 fn look_ups_are_trilinear_and_end_at_the_outermost_probes() {
     let world = World { medium: &haze(0.5, 1.0, 0.0), scene: &Empty, lights: (&[]).into() };
@@ -227,6 +264,41 @@ fn look_ups_are_trilinear_and_end_at_the_outermost_probes() {
     assert!((at(Vec3::new(9.0, 9.0, 9.0)) - grid.held(23)[0][0]).abs() < 2e-6);
     let mut held = [Spectrum::ONE];
     assert!(grid.look_up(Vec3::NAN, &mut held).is_finite() && held[0].is_finite());
+}
+
+#[test]
+fn coarse_grids_are_told_where_light_bends() {
+    let world = World { medium: &haze(0.5, 1.0, 0.0), scene: &Empty, lights: (&[]).into() };
+    let settings = BakeSettings { basis: ProbeBasis::Fluence, ..settings(&world, [8, 6, 5]) };
+    let mut grid = baked(settings, &world);
+    let light = |point: Vec3| 4.0 + 3.0 * point.x + 2.0 * point.x * point.x - point.y * point.y * point.y;
+    for index in 0..240 {
+        grid.memory.values.as_mut_slice()[index] = Spectrum::splat(light(grid.lattice().centre(index)));
+    }
+    let index = grid.lattice().index(Vec3::new(0.1, 0.2, 0.1)).unwrap();
+    let (centre, cell) = (grid.lattice().centre(index), grid.lattice().cell());
+    // Mixed half way along x and y, and there: both bends miss into directions of their own, so that the sum is a bound.
+    let off = |axis: Vec3| {
+        let point = centre + 0.5 * cell * axis;
+        (grid.value(point, Vec3::X)[0] / INV_FOUR_PI - light(point)).abs()
+    };
+    let (found, [x, y]) = (grid.coarseness(index), [Vec3::X, Vec3::Y].map(off));
+    assert!((x - 2.0 * cell.x * cell.x / 4.0).abs() < 1e-4, "{x}");
+    assert!(found >= x.max(y) && found < 1.6 * (x + y), "{found} for {x} and {y}");
+    grid.memory.values.as_mut_slice().fill(Spectrum::ONE);
+    assert_eq!(grid.relative_coarseness(), [0.0; 2]);
+}
+
+#[test]
+fn noise_is_not_taken_for_bends() {
+    let (fog, sky) = (haze(1.0, 0.7, 0.0), [Light::Constant(Spectrum::ONE)]);
+    let ball = Placed::new(fog, Region::sphere(Vec3::ZERO, 2.0).unwrap());
+    let world = World { medium: &ball, scene: &Empty, lights: (&sky).into() };
+    // A furnace: nothing varies, and errors are a tenth.
+    let grid = baked(BakeSettings { error: 0.1, basis: ProbeBasis::Fluence, ..settings(&world, [8, 8, 8]) }, &world);
+    let [usual, _] = grid.relative_coarseness();
+    // Noise alone would be √6/8 of an error on each of three axes.
+    assert!(usual < 0.6 * 3.0 * 0.306 * grid.relative_error(), "{usual}, with errors of {}", grid.relative_error());
 }
 
 /// A lamp before a wall: behind it all is dark.

@@ -37,6 +37,7 @@ fn arrays(baked: &Baked) -> Vec<Array> {
     for (number, name) in Baked::names(grid.basis()).iter().enumerate() {
         all.push(floats(&format!("error of {name}"), 1, &|index| vec![grid.error(index, number) * baked.scale]));
     }
+    all.push(floats("coarseness", 1, &|index| vec![grid.coarseness(index) * baked.scale]));
     all.push(floats("extinction", 3, &|index| grid.probes()[index].extinction.0.to_vec()));
     all.push(floats("albedo", 3, &|index| grid.probes()[index].albedo.0.to_vec()));
     let state = |probe: &fogbow::bake::Probe| match probe.state() {
@@ -76,6 +77,8 @@ pub fn description(baked: &Baked, data_file: Option<&str>) -> String {
     field("mean_cosine", number(baked.mean_cosine));
     field("method", baked.method.map_or("null".to_owned(), string));
     field("relative_error", number(Some(grid.relative_error())));
+    let [usual, worst] = grid.relative_coarseness();
+    field("relative_coarseness", format!("{{\"root_mean_square\": {usual}, \"greatest\": {worst}}}"));
     let deviation = baked.deviation.map(|d| {
         let [bias, error, spread] = [d.bias, d.bias_error, d.spread].map(|value| number(Some(value)));
         format!("{{\"bias\": {bias}, \"bias_error\": {error}, \"spread\": {spread}, \"probes\": {}}}", d.probes)

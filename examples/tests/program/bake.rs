@@ -252,6 +252,89 @@ fn an_interrupted_bake_is_gone_on_with() {
     assert!(file(&folder, "a.bake") == file(&folder, "b.bake"));
 }
 
+/// Fog in a box that two lamps light, of different colours.
+const TWO: &str = r#"<scene version="3.0.0"><integrator type="volpath"><integer name="max_depth" value="-1"/></integrator>
+    <medium type="homogeneous" id="fog"><float name="sigma_t" value="0.8"/><rgb name="albedo" value="0.9 0.8 0.7"/><phase type="isotropic"/></medium>
+    <shape type="cube"><bsdf type="null"/><ref name="interior" id="fog"/></shape>
+    <shape type="rectangle"><transform name="to_world"><scale value="0.4"/><rotate x="1" angle="90"/><translate y="1.6"/></transform>
+    <bsdf type="diffuse"><rgb name="reflectance" value="0.5 0.5 0.5"/></bsdf><emitter type="area"><rgb name="radiance" value="9 8 7"/></emitter></shape>
+    <emitter type="point"><point name="position" x="0" y="-2" z="0.5"/><rgb name="intensity" value="1 3 6"/></emitter>
+    <sensor type="perspective"><float name="fov" value="36"/><string name="fov_axis" value="x"/>
+    <transform name="to_world"><lookat origin="0, 0, 4" target="0, 0, 0" up="0, 1, 0"/></transform>
+    <film type="hdrfilm"><rfilter type="box"/></film></sensor></scene>"#;
+
+#[test]
+fn layers_of_single_lights_add_up() {
+    let folder = Folder::new("bake-lights");
+    std::fs::write(folder.0.join("two.xml"), TWO).unwrap();
+    let run = |more: &[&str]| {
+        let common = ["bake", "two.xml", "-q", "--counts", "3x3x3", "--basis", "fluence", "-o", "a.bake"];
+        let output = folder.run(&[&common[..], more].concat());
+        assert_eq!(output.status.code(), Some(0), "{}", said(&output));
+    };
+    run(&["--error", "0.03"]);
+    run(&["--error", "0.03", "--per-light"]);
+    assert_eq!(folder.names(), ["a-light0.bake", "a-light1.bake", "a.bake", "two.xml"]);
+    let [all, first, second] = ["a.bake", "a-light0.bake", "a-light1.bake"].map(|name| grid(&folder, name));
+    for index in 0..27 {
+        let error: f32 = [&all, &first, &second].map(|grid| grid.error(index, 0).powi(2)).iter().sum();
+        let [all, first, second] = [&all, &first, &second].map(|grid| grid.held(index)[0]);
+        let off = (all - first - second).map(f32::abs).max_element();
+        // Errors are means over channels, of which the brightest may have twice as much.
+        assert!(off <= 10.0 * error.sqrt(), "{index}: {all:?}, {first:?} + {second:?}");
+        assert!(first[2] < first[0] && second[2] > second[0], "each has its colour");
+    }
+    // One after the other, they may be gone on with.
+    run(&["--per-light", "--resume", "--error", "0.02"]);
+    assert!(grid(&folder, "a-light1.bake").error(0, 0) < second.error(0, 0));
+}
+
+#[test]
+fn pictures_are_marched_from_bakes_of_their_scene() {
+    let folder = Folder::new("bake-march");
+    std::fs::write(folder.0.join("two.xml"), TWO).unwrap();
+    let bake = |name: &str, more: &[&str]| {
+        let common = ["bake", "two.xml", "-q", "--counts", "8x8x8", "--basis", "sh0", "--error", "0.03", "-o", name];
+        let output = folder.run(&[&common[..], more].concat());
+        assert_eq!(output.status.code(), Some(0), "{}", said(&output));
+    };
+    let render = |scene: &str, more: &[&str]| {
+        let common = ["render", scene, "--size", "24x24", "-q", "-o", "a.pfm"];
+        folder.run(&[&common[..], more].concat())
+    };
+    let mean = |more: &[&str]| {
+        let output = render("two.xml", more);
+        assert_eq!(output.status.code(), Some(0), "{}", said(&output));
+        let picture = image::read(folder.0.join("a.pfm")).unwrap();
+        picture.pixels.iter().map(|pixel| pixel.mean()).sum::<f32>() / 576.0
+    };
+    let due = mean(&["--method", "path", "--spp", "400"]);
+    for orders in ["all", "indirect"] {
+        bake("a.bake", &["--orders", orders]);
+        let found = mean(&["--method", "march", "--bake", "a.bake", "--spp", "16"]);
+        // Errors of probes and of both pictures, with many of each.
+        assert!((found / due - 1.0).abs() < 0.02, "{orders}: {found} instead of {due}");
+    }
+    bake("multiple.bake", &["--orders", "multiple"]);
+    bake("half.bake", &["--box", "-1,-1,-1 0,1,1"]);
+    bake("surfaces.bake", &["--quantity", "irradiance", "--passes", "2"]);
+    bake("light.bake", &["--per-light", "--passes", "2"]);
+    for (method, file, reason) in [
+        ("march", "multiple.bake", "multiple.bake: lacks light that surfaces send into the medium"),
+        ("march", "half.bake", "half.bake: its box does not hold all of the medium"),
+        ("march", "surfaces.bake", "surfaces.bake: holds irradiance of surfaces"),
+        ("march", "light-light0.bake", "light-light0.bake: was made for another scene"),
+        ("march", "two.xml", "two.xml: is no grid of probes"),
+        ("path", "a.bake", "--bake: light that was baked is marched"),
+    ] {
+        let output = render("two.xml", &["--method", method, "--bake", file]);
+        assert_eq!(output.status.code(), Some(2), "{file}");
+        assert!(said(&output).contains(reason), "{file}: {}", said(&output));
+    }
+    let output = render(SCENE, &["--method", "march", "--bake", "a.bake"]);
+    assert!(said(&output).contains("a.bake: was made for another scene"), "{}", said(&output));
+}
+
 /// A floor and a lamp in clear air.
 const BARE: &str = r#"<scene version="3.0.0"><integrator type="volpath"/><shape type="rectangle"><bsdf type="diffuse"/></shape>
     <emitter type="point"><point name="position" x="0" y="1" z="0"/><rgb name="intensity" value="1 1 1"/></emitter>
@@ -290,6 +373,8 @@ fn what_cannot_be_baked_is_told_by_name() {
         (&[SCENE, "-o", "a.bake", "--resume", "--counts", "6x5x4"], "of another --box, --counts, --basis"),
         (&[SCENE, "-o", "cut.bake", "--resume"], "cut.bake: is cut off"),
         (&["--from-file", "cut.bake", "-o", "b.json"], "cut.bake: is cut off"),
+        (&["bare.xml", "-o", "b.json", "--per-light"], "bare.xml: has no medium to bake light for"),
+        (&["--from-file", "a.bake", "-o", "b.json", "--per-light"], "cannot be used with"),
         (&["--from-file", "missing.bake", "-o", "b.json"], "missing.bake: cannot be read"),
         (&["--from-file", "a.bake", "-o", "b.ktx2", "--layout", "bevy"], "takes an ambient cube of irradiance"),
         (&["--from-file", "a.bake", "-o", "b.ktx2", "--texel", "rgb9e5"], "take rgba16f"),

@@ -1,15 +1,15 @@
 //! A bake with a medium of any type.
 
-use std::path::Path;
+use std::path::PathBuf;
 
-use fogbow::bake::{Bake, BakeSettings, ProbeBasis, ProbeDeviation, ProbeGrid};
+use fogbow::bake::{Bake, BakeSettings, OneLight, ProbeBasis, ProbeDeviation, ProbeGrid};
 use fogbow::cache::{Asked, ERROR_BOUNDS, Kind, RadianceCaches, Settings, USUAL_ERROR};
-use fogbow::host::Medium;
+use fogbow::host::{Medium, Scene};
 use fogbow::light::Lights;
 use fogbow::math::Bounds;
 use fogbow::path;
 use fogbow::work::Rounds;
-use fogbow::world::{Outline, World as LitWorld};
+use fogbow::world::{LightCounts, Outline, World as LitWorld};
 use fogbow_std::progress::Control;
 use fogbow_std::stats::Stopwatch;
 use fogbow_std::threads::{self, Threads};
@@ -18,7 +18,7 @@ use super::super::covariance::Stopped;
 use super::super::render::stop_flag;
 use super::super::report::Bar;
 use super::super::{Ending, Failure};
-use super::{BakeArguments, Source, write};
+use super::{BakeArguments, Source, begun, write};
 use crate::world::{WithMedium, World};
 
 /// Seconds between two writings of what is done: no more than these are lost. More often, and large grids are mostly being written.
@@ -57,8 +57,10 @@ pub(super) struct BakeJob<'a> {
     pub(super) counts: [u32; 3],
     pub(super) method: Source,
     pub(super) tag: u64,
-    /// What was left, to go on with.
-    pub(super) begun: Option<ProbeGrid<'static>>,
+    /// The one light that shines; `None` for all.
+    pub(super) light: Option<u32>,
+    /// Where the grid is kept, to be gone on with.
+    pub(super) kept: Option<PathBuf>,
 }
 
 impl BakeJob<'_> {
@@ -96,19 +98,37 @@ impl BakeJob<'_> {
 }
 
 impl WithMedium for BakeJob<'_> {
-    type Output = Result<(ProbeGrid<'static>, f32, Option<ProbeDeviation>, Ending), Failure>;
+    type Output = Result<Done, Failure>;
 
-    fn with<M: Medium + Sync>(mut self, medium: &M) -> Self::Output {
-        let world = LitWorld { medium, scene: self.world, lights: self.lights };
-        let outline = self.world.outline(&world);
+    fn with<M: Medium + Sync>(self, medium: &M) -> Self::Output {
+        let all = LitWorld { medium, scene: self.world, lights: self.lights };
+        let outline = self.world.outline(&all);
+        let Some(number) = self.light else { return self.bake(&all, &outline) };
+        let Some(light) = self.lights.get(number as usize) else { return Err("there is no such light".into()) };
+        let scene = OneLight { scene: self.world, number };
+        let one = LitWorld { medium, scene: &scene, lights: core::slice::from_ref(light).into() };
+        let outline = Outline { lights: LightCounts::of(&one.lights), ..outline };
+        self.bake(&one, &outline)
+    }
+}
+
+/// A grid, the mean cosine of the phase function, how far caches are off, and whether all is done.
+type Done = (ProbeGrid<'static>, f32, Option<ProbeDeviation>, Ending);
+
+impl BakeJob<'_> {
+    fn bake<M: Medium + Sync, S: Scene + Sync>(
+        &self,
+        world: &LitWorld<'_, M, S>,
+        outline: &Outline,
+    ) -> Result<Done, Failure> {
         let pool = Threads::new(self.arguments.threads)?;
         let control = Control { cancel: Some(stop_flag()), progress: None };
         let bar = Bar::new(self.arguments.quiet);
         let mut caches = None;
         if self.method != Source::Path {
-            let mut filling = self.caches(&outline).fill(Asked::anywhere_in(self.bounds));
-            let tell = |filling: &_| bar.tell(Rounds::<LitWorld<'_, M, World<'_>>>::stage(filling));
-            let ran = threads::run(&mut filling, &world, &pool, &control, None, tell);
+            let mut filling = self.caches(outline).fill(Asked::anywhere_in(self.bounds));
+            let tell = |filling: &_| bar.tell(Rounds::<LitWorld<'_, M, S>>::stage(filling));
+            let ran = threads::run(&mut filling, world, &pool, &control, None, tell);
             if ran.ending != threads::Ending::Done {
                 bar.finish();
                 return Err(Stopped("caches").into());
@@ -117,8 +137,11 @@ impl WithMedium for BakeJob<'_> {
             filled.forget_photons();
             caches = Some(filled);
         }
-        let settings = self.settings(&outline);
-        let begun = self.begun.take();
+        let settings = self.settings(outline);
+        let begun = match self.kept.as_ref().filter(|_| self.arguments.resume) {
+            Some(file) => begun(file, self.tag)?,
+            None => None,
+        };
         let bake = match begun {
             Some(grid) => Bake::resume(grid, settings)
                 .map_err(|_| "--resume: the file is of other probes: of another --box, --counts, --basis, --quantity or --orders")?,
@@ -128,12 +151,11 @@ impl WithMedium for BakeJob<'_> {
             Some(caches) => bake.with_caches(caches),
             None => bake,
         };
-        let kept: Option<&Path> = self.arguments.kept()?;
         let (clock, mut written, mut trouble) = (Stopwatch::start(), 0.0, None);
-        let ran = threads::run(&mut bake, &world, &pool, &control, None, |bake| {
+        let ran = threads::run(&mut bake, world, &pool, &control, None, |bake| {
             let elapsed = clock.elapsed().wall;
             bar.share(bake.share(), elapsed);
-            if let Some(file) = kept.filter(|_| elapsed - written > BETWEEN_WRITINGS) {
+            if let Some(file) = self.kept.as_ref().filter(|_| elapsed - written > BETWEEN_WRITINGS) {
                 written = elapsed;
                 trouble = trouble.take().or(write::keep(file, bake.grid(), self.tag).err());
             }
@@ -143,7 +165,7 @@ impl WithMedium for BakeJob<'_> {
             bar.tell("compare");
             let bricks: Vec<usize> = compared(self.counts).collect();
             let mut unbiased = Bake::new(settings)?.only(|brick| bricks.contains(&brick));
-            let ran = threads::run(&mut unbiased, &world, &pool, &control, None, |_| ());
+            let ran = threads::run(&mut unbiased, world, &pool, &control, None, |_| ());
             deviation = (ran.ending == threads::Ending::Done).then(|| bake.grid().deviation(unbiased.grid()));
         }
         bar.finish();

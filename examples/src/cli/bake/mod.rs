@@ -34,7 +34,7 @@ pub struct BakeArguments {
     #[arg(required_unless_present = "from_file")]
     pub scene: Option<PathBuf>,
     /// Bakes nothing but writes what is in a .bake file in other formats.
-    #[arg(long, value_name = "FILE.bake", conflicts_with_all = ["scene", "region", "spacing", "counts", "basis", "quantity", "orders", "error", "passes", "resume"])]
+    #[arg(long, value_name = "FILE.bake", conflicts_with_all = ["scene", "region", "spacing", "counts", "basis", "quantity", "orders", "error", "passes", "per_light", "resume"])]
     pub from_file: Option<PathBuf>,
     /// The box to bake: two corners, the smaller one first [default: around all media].
     #[arg(long = "box", value_name = "MIN MAX", value_parser = corners, allow_hyphen_values = true)]
@@ -63,6 +63,10 @@ pub struct BakeArguments {
     /// Passes of each brick at most, whatever the error.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..))]
     pub passes: Option<u32>,
+    /// Bakes each light by itself, into files with -light0, -light1 and so on in their names, so that an engine may colour and dim them; lights are counted in the
+    /// order of the scene.
+    #[arg(long)]
+    pub per_light: bool,
     /// Goes on where the .bake file that is to be written was left. Without such a file, begins.
     #[arg(long)]
     pub resume: bool,
@@ -301,25 +305,70 @@ pub(super) fn run(arguments: &BakeArguments) -> Result<Ending, Failure> {
         output::check_place(file)?;
     }
     arguments.kept()?;
-    let (baked, ending) = match (&arguments.from_file, &arguments.scene) {
-        (Some(file), _) => (from_file(file)?, Ending::Done),
-        (None, Some(scene)) => match bake(arguments, scene) {
+    let Some(scene) = &arguments.scene else {
+        let file = arguments.from_file.as_deref().ok_or("there is no scene to bake")?;
+        return finish(arguments, from_file(file)?, Ending::Done, &arguments.output);
+    };
+    if !arguments.per_light {
+        let (made, ending) = match bake(arguments, scene, None) {
             Err(error) if error.is::<super::covariance::Stopped>() => {
                 eprintln!("fogbow: {error}");
                 return Ok(Ending::Stopped);
             }
-            baked => baked?,
-        },
-        (None, None) => return Err("there is no scene to bake".into()),
-    };
+            made => made?,
+        };
+        return finish(arguments, made, ending, &arguments.output);
+    }
+    for number in 0..light_count(scene)? {
+        let files: Vec<_> = arguments.output.iter().map(|file| of_light(file, number)).collect();
+        for file in &files {
+            output::check_place(file)?;
+        }
+        let (made, ending) = bake(arguments, scene, Some(number))?;
+        if finish(arguments, made, ending, &files)? == Ending::Stopped {
+            return Ok(Ending::Stopped);
+        }
+    }
+    Ok(Ending::Done)
+}
+
+/// Writes the files of a bake.
+fn finish(arguments: &BakeArguments, made: Made, ending: Ending, files: &[PathBuf]) -> Result<Ending, Failure> {
     // Textures of a bake that is not done would look as if it were.
     let is_due = |file: &&PathBuf| ending == Ending::Done || Target::of(file) == Ok(Target::Bake);
-    let files: Vec<_> = arguments.output.iter().filter(is_due).collect();
-    let written = write::all(arguments, baked, &files)?;
+    let files: Vec<_> = files.iter().filter(is_due).collect();
+    let written = write::all(arguments, made, &files)?;
     if !arguments.quiet {
         eprintln!("{written}");
     }
     Ok(ending)
+}
+
+/// Lights of a scene that are baked one by one.
+///
+/// # Errors
+/// None, or more than anybody wants.
+fn light_count(file: &Path) -> Result<u32, Failure> {
+    /// Layers of light in files.
+    const MOST: usize = 64;
+    let scene = SceneFile::read(file)?;
+    let mut storage = Storage::new(&scene);
+    match World::new(&scene, &mut storage)?.lights().len() {
+        0 => Err(format!("{}: has no lights, so there is nothing to bake", file.display()).into()),
+        count if count > MOST => {
+            Err(format!("--per-light: {} has {count} lights; at most {MOST} are baked one by one", file.display())
+                .into())
+        }
+        count => Ok(count as u32),
+    }
+}
+
+/// `fog.json` of light 3 is `fog-light3.json`.
+fn of_light(file: &Path, number: u32) -> PathBuf {
+    let mut name = file.file_stem().unwrap_or_default().to_owned();
+    name.push(format!("-light{number}."));
+    name.push(file.extension().unwrap_or_default());
+    file.with_file_name(name)
 }
 
 /// A bake and what it was made for.
@@ -335,7 +384,8 @@ fn from_file(file: &Path) -> Result<Made, Failure> {
     Ok(Made { baked: Baked { grid, method: None, mean_cosine: None, deviation: None, scale: 1.0 }, tag })
 }
 
-fn bake(arguments: &BakeArguments, file: &Path) -> Result<(Made, Ending), Failure> {
+/// Bakes a scene, by all its lights or by one of them.
+fn bake(arguments: &BakeArguments, file: &Path, light: Option<u32>) -> Result<(Made, Ending), Failure> {
     let scene = SceneFile::read(file)?;
     let mut storage = Storage::new(&scene);
     let world = World::new(&scene, &mut storage)?;
@@ -363,7 +413,7 @@ fn bake(arguments: &BakeArguments, file: &Path) -> Result<(Made, Ending), Failur
     let tree = light_tree(&lights);
     let method = arguments.method;
     job::check(method, &paths, &world)?;
-    let tag = tag(arguments, file, &paths, method)?;
+    let tag = tag(arguments, file, &paths, light)?;
     let job = BakeJob {
         arguments,
         world: &world,
@@ -373,7 +423,8 @@ fn bake(arguments: &BakeArguments, file: &Path) -> Result<(Made, Ending), Failur
         counts,
         method,
         tag,
-        begun: begun(arguments, tag)?,
+        light,
+        kept: arguments.kept()?.map(|file| light.map_or(file.to_owned(), |number| of_light(file, number))),
     };
     let (grid, mean_cosine, deviation, ending) = world.media().with(job)?;
     let name = match method {
@@ -397,14 +448,17 @@ fn overlap(a: &Bounds, b: &Bounds) -> bool {
 
 /// What a grid in a file is for: in the upper half the light of the scene, in the lower one all else that changes a probe but for what the file's
 /// header says.
-fn tag(arguments: &BakeArguments, scene: &Path, paths: &path::Settings, method: Source) -> Result<u64, Failure> {
+fn tag(arguments: &BakeArguments, scene: &Path, paths: &path::Settings, light: Option<u32>) -> Result<u64, Failure> {
     let mut crc = Crc::new();
+    let method = arguments.method;
     let of_caches = if method != Source::Path { arguments.error.unwrap_or(0.0).to_bits() } else { 0 };
-    for number in [paths.roulette_after, method as u32, of_caches] {
+    for number in [paths.roulette_after, method as u32, of_caches, light.map_or(0, |number| number + 1)] {
         crc.add(&number.to_le_bytes());
     }
     crc.add(&arguments.seed.to_le_bytes());
-    Ok(u64::from(of_scene(scene, paths)?) << 32 | crc.value() & 0xffff_ffff)
+    // Light of one lamp is not that of the scene.
+    let scene = of_scene(scene, paths)? ^ light.map_or(0, |number| number + 1);
+    Ok(u64::from(scene) << 32 | crc.value() & 0xffff_ffff)
 }
 
 /// A number for the light of a scene.
@@ -420,9 +474,11 @@ pub(super) fn is_made_for(tag: u64, scene: &Path, paths: &path::Settings) -> Res
     Ok((tag >> 32) as u32 == of_scene(scene, paths)?)
 }
 
-/// The grid that was left, where one is to be gone on with.
-fn begun(arguments: &BakeArguments, tag: u64) -> Result<Option<ProbeGrid<'static>>, Failure> {
-    let Some(file) = arguments.kept()?.filter(|file| arguments.resume && file.exists()) else { return Ok(None) };
+/// The grid that was left in a file, if there is any.
+fn begun(file: &Path, tag: u64) -> Result<Option<ProbeGrid<'static>>, Failure> {
+    if !file.exists() {
+        return Ok(None);
+    }
     let read = bytes::read(&read_file(file)?, tag, BakeMemory::default());
     let grid = read.map_err(|error| match error {
         ProbeBytesError::Tag { .. } => {
