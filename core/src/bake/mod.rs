@@ -23,6 +23,7 @@
 //! | `places` | which probes are in walls or far from any medium |
 //! | `fill` | [`Bake`]: passes over bricks |
 //! | `grid` | [`ProbeGrid`]: what was baked; look-ups, dilation |
+//! | `froxels` | [`Froxels`]: fog before a camera in cells of its frustum, as engines show it |
 //! | `one_light` | [`OneLight`]: a layer of light for each lamp |
 //! | [`bytes`] | grids as bytes, to be saved |
 
@@ -30,6 +31,7 @@ mod arriving;
 mod basis;
 pub mod bytes;
 mod fill;
+mod froxels;
 mod grid;
 mod one_light;
 mod places;
@@ -39,6 +41,7 @@ mod tests;
 
 pub use basis::{AXES, MOST_COEFFICIENTS, Orders, ProbeBasis, Quantity};
 pub use fill::{Bake, BakedProbes};
+pub use froxels::{Froxel, Froxels};
 pub use grid::{BakeMemory, Brick, Probe, ProbeDeviation, ProbeGrid, ProbeState};
 pub use one_light::OneLight;
 pub use settings::{BakeError, BakeSettings, MOST_PROBES};

@@ -17,4 +17,5 @@ mod eye_ray;
 mod points;
 
 pub use eye_ray::{EyeRay, eye_ray, steps};
+pub(crate) use points::attenuated_length;
 pub use points::scattering_points;

@@ -118,7 +118,7 @@ pub fn scattering_points(
 
 /// `∫₀ᵈ e^{−σt} dt = (1 − e^{−σd})/σ` (m).
 #[inline]
-pub(super) fn attenuated_length(extinction: f32, length: f32) -> f32 {
+pub(crate) fn attenuated_length(extinction: f32, length: f32) -> f32 {
     let a = extinction * length;
     if a < 1e-4 { length * (1.0 - 0.5 * a) } else { -float::exp_m1(-a) / extinction }
 }
