@@ -16,7 +16,7 @@
 //! | 72 | 8 | [`Crc`] of bytes 0 to 72 and of all from 80 on |
 //! | 80 | 12 n k | numbers in colour, `k` of each of `n` probes, as `f32` |
 //! | | 4 n k | their sums of squared deviations over passes, a mean over channels, as `f32` |
-//! | | 28 n | extinction and albedo in colour as `f32`, state as `u32` |
+//! | | 28 n | extinction and albedo in colour as `f32`; as `u32` state in bits 0 to 2, surfaces before the next probes in bits 4 to 6 |
 //! | | 8 b | passes, and passes that are due |
 
 use core::fmt;
@@ -24,7 +24,7 @@ use core::fmt;
 use glam::Vec3;
 
 use super::basis::{Orders, ProbeBasis, Quantity};
-use super::grid::{BakeMemory, Brick, Probe, ProbeGrid, ProbeState};
+use super::grid::{BakeMemory, Brick, Probe, ProbeGrid, ProbeState, STATE, WALLS};
 use super::settings::MOST_PROBES;
 use crate::bytes::{Crc, element, elements};
 use crate::covariance::Lattice;
@@ -298,7 +298,8 @@ pub fn read<'s>(bytes: &[u8], tag: u64, memory: BakeMemory<'s>) -> Result<ProbeG
             && deviations.iter().all(|deviation| *deviation >= 0.0 && deviation.is_finite())
             && probe.extinction.is_valid()
             && probe.albedo.is_valid();
-        if !is_number || probe.state > ProbeState::Empty as u32 {
+        let is_known = probe.state & STATE <= ProbeState::Empty as u32 && probe.state & !(STATE | WALLS) == 0;
+        if !is_number || !is_known {
             return Err(ProbeBytesError::Probe(index));
         }
     }

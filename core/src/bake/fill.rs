@@ -9,7 +9,7 @@ use glam::Vec3;
 
 use super::arriving::Sampler;
 use super::basis::MOST_COEFFICIENTS;
-use super::grid::{BakeMemory, Brick, Probe, ProbeGrid};
+use super::grid::{BakeMemory, Brick, Probe, ProbeGrid, WALLS_AT};
 use super::places;
 use super::settings::{BakeError, BakeSettings};
 use crate::cache::RadianceCaches;
@@ -432,5 +432,6 @@ fn looked_at<M: Medium + ?Sized, S: Scene + ?Sized>(
 ) -> Probe {
     let extinction = world.medium.mean_extinction(point, 0.5 * cell.min_element());
     let albedo = world.medium.properties(point).albedo();
-    Probe { extinction, albedo, state: places::state(point, cell, world, settings) as u32 }
+    let state = places::state(point, cell, world, settings);
+    Probe { extinction, albedo, state: state as u32 | places::walls(point, cell, world.scene) << WALLS_AT }
 }

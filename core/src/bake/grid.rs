@@ -37,9 +37,18 @@ pub struct Probe {
     pub extinction: Spectrum,
     /// Single-scattering albedo of the medium at the probe; 0 without a medium.
     pub albedo: Spectrum,
-    /// A [`ProbeState`] by its number.
+    /// A [`ProbeState`] by its number, in [`STATE`]; in [`WALLS`], bits for x, y and z where a surface stands before the next probe. Above that, marks of a dilation
+    /// under way.
     pub(super) state: u32,
 }
+
+/// Bits of a state.
+pub(super) const STATE: u32 = 7;
+
+/// Bits of surfaces towards the next probes.
+pub(super) const WALLS: u32 = 7 << WALLS_AT;
+
+pub(super) const WALLS_AT: u32 = 4;
 
 impl Probe {
     /// What has become of it.
@@ -50,7 +59,7 @@ impl Probe {
     /// ```
     #[must_use]
     pub fn state(&self) -> ProbeState {
-        match self.state {
+        match self.state & STATE {
             1 => ProbeState::Valid,
             2 => ProbeState::InWall,
             3 => ProbeState::Empty,
@@ -58,8 +67,19 @@ impl Probe {
         }
     }
 
+    /// Whether a surface stands between this probe and the next one along x, y and z: there, light is mixed across it.
+    ///
+    /// ```
+    /// # use fogbow::bake::Probe;
+    /// assert_eq!(Probe::default().walls(), [false; 3]);
+    /// ```
+    #[must_use]
+    pub fn walls(&self) -> [bool; 3] {
+        [0, 1, 2].map(|axis| self.state >> (WALLS_AT + axis) & 1 == 1)
+    }
+
     pub(super) fn is_valid(&self) -> bool {
-        self.state == ProbeState::Valid as u32
+        self.state & STATE == ProbeState::Valid as u32
     }
 }
 
@@ -129,7 +149,7 @@ pub struct ProbeDeviation {
 /// let mut held = [Spectrum::ZERO; 9];
 /// assert!(grid.look_up(Vec3::splat(0.2), &mut held) > 0.999);
 /// assert!((grid.value(Vec3::splat(0.2), Vec3::X)[0] - 1.0).abs() < 0.5);
-/// assert_eq!(grid.deviation(&grid).spread, 0.0);
+/// assert_eq!((grid.deviation(&grid).spread, grid.leaks()), (0.0, 0));
 /// assert!(grid.relative_coarseness()[1] < 0.5 && grid.coarseness(probe) < 0.5);
 ///
 /// // Along an eye ray.
@@ -263,6 +283,19 @@ impl ProbeGrid<'_> {
             }
         }
         (sum, numbers)
+    }
+
+    /// Pairs of neighbours, both valid, with a surface between them: where light leaks through walls that hold no probe. Smaller cells have fewer.
+    #[must_use]
+    pub fn leaks(&self) -> usize {
+        let [nx, ny, _] = self.lattice.size().map(|n| n as usize);
+        let next = [1, nx, nx * ny];
+        let valid = |index: usize| self.probes().get(index).is_some_and(Probe::is_valid);
+        let of = |(index, probe): (usize, &Probe)| {
+            let walls = probe.walls();
+            (0..3).filter(|axis| walls[*axis] && probe.is_valid() && valid(index + next[*axis])).count()
+        };
+        self.probes().iter().enumerate().map(of).sum()
     }
 
     /// How far look-ups half way from a probe to its neighbours are off because the grid is too coarse for how light varies (in the unit of light),

@@ -45,6 +45,15 @@ pub(super) fn state<M: Medium + ?Sized, S: Scene + ?Sized>(
     if lights_surfaces || has_medium_near(point, cell, world.medium) { ProbeState::Valid } else { ProbeState::Empty }
 }
 
+/// Bits for x, y and z: whether a surface stands between a probe and the next one.
+pub(super) fn walls(point: Vec3, cell: Vec3, scene: &(impl Scene + ?Sized)) -> u32 {
+    let bit = |axis: usize| {
+        let next = point + Vec3::from_array(core::array::from_fn(|i| if i == axis { cell[i] } else { 0.0 }));
+        u32::from(scene.is_blocked(&Ray::between(point, next))) << axis
+    };
+    bit(0) | bit(1) | bit(2)
+}
+
 /// Whether there may be any medium where the probe has a part in look-ups: up to its neighbours.
 fn has_medium_near(point: Vec3, cell: Vec3, medium: &(impl Medium + ?Sized)) -> bool {
     if !medium.mean_extinction(point, cell.length()).is_black() {

@@ -321,6 +321,7 @@ fn nothing_leaks_through_a_wall_with_probes_in_it() {
         let index = |x: f32| grid.lattice().index(Vec3::new(x, 0.1, 0.1)).unwrap();
         assert_eq!([-0.4, -0.1, 0.1, 0.4].map(|x| grid.probes()[index(x)].state()), states);
         assert!(grid.held(index(0.1))[0].is_black() && grid.error(index(0.1), 0) == 0.0);
+        assert_eq!(grid.leaks(), 0, "all pairs across the wall have a probe in it");
         let before = grid.value(Vec3::new(0.0, 0.1, 0.1), Vec3::X)[0];
         for x in [0.21, 0.3, 0.5, 0.9] {
             assert_eq!(grid.value(Vec3::new(x, 0.1, 0.1), Vec3::X)[0], 0.0, "behind the wall, before it {before}");
@@ -334,6 +335,21 @@ fn nothing_leaks_through_a_wall_with_probes_in_it() {
         assert!(share > 0.1 && share < 0.9, "{share} of the light before the wall is in it");
         let mut held = [Spectrum::ZERO];
         assert!(grid.look_up(Vec3::new(0.21, 0.1, 0.1), &mut held) < 0.7 && held[0].is_black());
+    });
+}
+
+#[test]
+fn walls_between_probes_are_told() {
+    // Between the probes at -0.125 and 0.125.
+    before_a_wall([-0.02, 0.02], |grid| {
+        assert!(grid.probes().iter().all(|probe| probe.state() == ProbeState::Valid));
+        assert_eq!(grid.leaks(), 16, "one for each row of probes");
+        let index = |x: f32| grid.lattice().index(Vec3::new(x, 0.1, 0.1)).unwrap();
+        assert_eq!(grid.probes()[index(-0.1)].walls(), [true, false, false]);
+        assert_eq!(grid.probes()[index(0.1)].walls(), [false; 3]);
+        // Behind the wall there is no light, and some leaks.
+        assert!(grid.value(Vec3::new(0.03, 0.1, 0.1), Vec3::X)[0] > 0.0);
+        assert_eq!(grid.value(Vec3::new(0.13, 0.1, 0.1), Vec3::X)[0], 0.0);
     });
 }
 

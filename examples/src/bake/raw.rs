@@ -94,6 +94,7 @@ pub fn description(baked: &Baked, data_file: Option<&str>) -> String {
     field("valid", valid.to_string());
     field("in_wall", in_wall.to_string());
     field("empty", empty.to_string());
+    field("leaks", grid.leaks().to_string());
     let mut lines = Vec::new();
     if let Some(file) = data_file {
         field("data", string(file));

@@ -71,13 +71,19 @@ pub(super) fn all(arguments: &BakeArguments, made: Made, files: &[&PathBuf]) -> 
     }
     let [x, y, z] = baked.grid.lattice().size();
     let names: Vec<_> = written.iter().map(|file| file.display().to_string()).collect();
+    let leaks = match baked.grid.leaks() {
+        0 => String::new(),
+        pairs => format!(
+            "{pairs} pairs of neighbours have a surface between them, through which light leaks: smaller cells have fewer\n"
+        ),
+    };
     let [usual, worst] = baked.grid.relative_coarseness().map(|share| 100.0 * share);
     let apart = baked.deviation.map_or(String::new(), |d| {
         let [bias, error, spread] = [d.bias, d.bias_error, d.spread].map(|share| 100.0 * share);
         format!("against path tracing of {} probes: {bias:+.2} % ± {error:.2} %, single numbers off by {spread:.1} % of the mean\n", d.probes)
     });
     Ok(format!(
-        "{x} x {y} x {z} probes: {valid} valid, {in_wall} in walls, {empty} far from any medium; standard error of what was sampled {:.2} % of the mean\nbetween probes off by about {usual:.1} % of the mean, {worst:.0} % where light varies most\n{apart}wrote {}",
+        "{x} x {y} x {z} probes: {valid} valid, {in_wall} in walls, {empty} far from any medium; standard error of what was sampled {:.2} % of the mean\nbetween probes off by about {usual:.1} % of the mean, {worst:.0} % where light varies most\n{leaks}{apart}wrote {}",
         100.0 * error,
         names.join(", ")
     ))
