@@ -373,6 +373,10 @@ fn what_cannot_be_baked_is_told_by_name() {
         (&[SCENE, "-o", "a.bake", "--resume", "--counts", "6x5x4"], "of another --box, --counts, --basis"),
         (&[SCENE, "-o", "cut.bake", "--resume"], "cut.bake: is cut off"),
         (&["--from-file", "cut.bake", "-o", "b.json"], "cut.bake: is cut off"),
+        (
+            &[SCENE, "-o", "b.json", "--method", "radiance-cache", "--quantity", "irradiance"],
+            "know nothing of irradiance",
+        ),
         (&["bare.xml", "-o", "b.json", "--per-light"], "bare.xml: has no medium to bake light for"),
         (&["--from-file", "a.bake", "-o", "b.json", "--per-light"], "cannot be used with"),
         (&["--from-file", "missing.bake", "-o", "b.json"], "missing.bake: cannot be read"),

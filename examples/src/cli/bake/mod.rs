@@ -412,6 +412,12 @@ fn bake(arguments: &BakeArguments, file: &Path, light: Option<u32>) -> Result<(M
     }
     let tree = light_tree(&lights);
     let method = arguments.method;
+    if method == Source::RadianceCache
+        && arguments.quantity() == Quantity::Irradiance
+        && arguments.basis() != ProbeBasis::Fluence
+    {
+        return Err("--method radiance-cache: caches in a medium know nothing of irradiance; take --method path".into());
+    }
     job::check(method, &paths, &world)?;
     let tag = tag(arguments, file, &paths, light)?;
     let job = BakeJob {
