@@ -20,7 +20,7 @@ use crate::world::World;
 const FIRST: (u64, u32) = (100, 8);
 
 /// Most samples of an estimate whose samples vary more than usual, as a multiple.
-const MOST_SAMPLES: f32 = 8.0;
+const MOST_SAMPLES: f32 = 16.0;
 
 /// Jobs of an estimate at most.
 pub(in crate::cache) const MOST_PARTS: usize = MOST_SAMPLES as usize;
@@ -118,6 +118,8 @@ impl<F> Filling<'_, F> {
         let around = learnt_near(slot, guides, self.before[step.kind], record.position);
         // What varies as a whole decides how a picture looks where it is dark, what it varies by how far off the picture is.
         let varies = around.relative_variance() / step.kind.row().spread;
+        // More than in proportion: where samples vary most, few records light a whole dark corner, and nothing averages them out.
+        let varies = varies * float::sqrt(varies);
         let brightness = record.value.mean() / self.bright;
         let more = varies.max(brightness * float::sqrt(varies)).clamp(1.0, MOST_SAMPLES);
         let seen = guides.get(offset).map_or(1.0, |guide| guide.seen);
