@@ -139,6 +139,8 @@ pub struct Filling<'s, F> {
     noise: Noise,
     dark: f64,
     more: ByKind<u32>,
+    /// Of second estimates, how many times the usual samples, in sum, and how many there are.
+    efforts: ByKind<[f64; 2]>,
     left: Option<f32>,
     /// Rounds of more estimates so far.
     again: u32,
@@ -221,6 +223,7 @@ impl<'s> RadianceCaches<'s> {
             noise: Noise::default(),
             dark: 0.0,
             more: ByKind([0; Kind::COUNT]),
+            efforts: ByKind([[0.0; 2]; Kind::COUNT]),
             left: None,
             again: 0,
             before,

@@ -133,7 +133,7 @@ pub(super) struct Step {
 
 /// Share of the second estimate in a final record. The first, from which the radius comes, had to draw its samples
 /// blindly: larger, and it is wasted; smaller, and its noise, which has a say in the radius, makes light too dark.
-const SECOND: f32 = 0.67;
+pub(super) const SECOND: f32 = 0.67;
 
 /// Steps in their order: first coarse irradiance, by which surfaces light everything else, and once more, from what it was revised to;
 /// then the final kinds, none of which needs another. What is to be averaged comes last.

@@ -5,7 +5,7 @@
 //! weighs much, for its light or for how hard it is to find, is estimated anew more often; one that the picture hardly shows is not.
 
 use super::eye::CachedRadiance;
-use super::kind::Kind;
+use super::kind::{Kind, SECOND};
 use super::presets;
 
 /// Eye rays that are read. Fewer: single dark pixels decide; more: time.
@@ -39,6 +39,34 @@ pub(super) fn dark(glances: &[Glance]) -> f64 {
     if glances.is_empty() { 0.0 } else { DARK * sum / glances.len() as f64 }
 }
 
+/// The noise of a kind.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Left {
+    /// Relative variance that records leave in the picture as they are.
+    variance: f64,
+    /// In how many estimates, each as good as a second one.
+    estimates: f64,
+}
+
+impl Left {
+    /// Of records whose readings differ by so much in squares, before and after a second estimate of so many times the usual samples.
+    ///
+    /// ```text
+    /// M = (1 − s) B + s X,  s = 1 − (1 − s₁)/e:   V(M)/V(M − B) = ((1 − s)² v + s²)/(s² (v + 1)),  v = V(B)/V(X) = BLIND e
+    /// ```
+    fn between(squares: f64, effort: f64) -> Self {
+        let first = (1.0 - f64::from(SECOND)) / effort;
+        let (second, blind) = (1.0 - first, presets::BLIND * effort);
+        let share = (first * first * blind + second * second) / (second * second * (blind + 1.0));
+        Self { variance: share * squares, estimates: 1.0 + first }
+    }
+
+    /// The variance after so many more estimates.
+    fn after(&self, rounds: u32) -> f64 {
+        self.variance * self.estimates / (self.estimates + f64::from(rounds))
+    }
+}
+
 /// Squares of what differs from reading to reading, over those of the light of each ray.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(super) struct Noise {
@@ -63,28 +91,29 @@ impl Noise {
         }
     }
 
-    /// Relative variance that a kind leaves in the picture, in the order of [`Kind::FINAL`].
-    pub(super) fn variances(&self) -> [f64; KINDS] {
-        self.squares.map(|sum| if self.rays > 0.0 { presets::LEFT * sum / self.rays } else { 0.0 })
+    /// What each kind leaves in the picture, in the order of [`Kind::FINAL`], whose second estimates had so many times the usual samples.
+    pub(super) fn left(&self, efforts: [f64; KINDS]) -> [Left; KINDS] {
+        core::array::from_fn(|k| {
+            let between = if self.rays > 0.0 { self.squares[k] / self.rays } else { 0.0 };
+            let left = Left::between(between, efforts[k].max(1.0));
+            let smoothed = if Kind::FINAL[k].is_on_surfaces() { presets::SMOOTHED } else { 1.0 };
+            Left { variance: smoothed * left.variance, ..left }
+        })
     }
 }
 
-/// Of variances, what is left of their sum after so many more estimates.
-pub(super) fn left(variances: [f64; KINDS], rounds: [u32; KINDS]) -> f64 {
-    variances.iter().zip(rounds).map(|(variance, rounds)| left_of(*variance, rounds)).sum()
+/// The variance of all kinds together, after so many more estimates of each.
+pub(super) fn variance_after(left: &[Left; KINDS], rounds: [u32; KINDS]) -> f64 {
+    left.iter().zip(rounds).map(|(left, rounds)| left.after(rounds)).sum()
 }
 
-fn left_of(variance: f64, rounds: u32) -> f64 {
-    variance * presets::ESTIMATES / (presets::ESTIMATES + f64::from(rounds))
-}
-
-/// How often each kind should be estimated once more, so that `variances` sum to `most`: always the one whose noise falls by most for its
+/// How often each kind should be estimated once more, so that variances sum to `most`: always the one whose noise falls by most for its
 /// cost, as long as noise falls faster than the work that was `spent` grows.
-pub(super) fn rounds_for(variances: [f64; KINDS], costs: [f64; KINDS], most: f64, spent: f64) -> [u32; KINDS] {
+pub(super) fn rounds_for(left: &[Left; KINDS], costs: [f64; KINDS], most: f64, spent: f64) -> [u32; KINDS] {
     let (mut rounds, mut work) = ([0; KINDS], spent);
     loop {
-        let sum = left(variances, rounds);
-        let gain = |k: usize| (left_of(variances[k], rounds[k]) - left_of(variances[k], rounds[k] + 1)) / costs[k];
+        let sum = variance_after(left, rounds);
+        let gain = |k: usize| (left[k].after(rounds[k]) - left[k].after(rounds[k] + 1)) / costs[k];
         let is_open = |&k: &usize| rounds[k] < presets::MOST_ROUNDS && costs[k] > 0.0;
         let best = (0..KINDS).filter(is_open).max_by(|&a, &b| gain(a).total_cmp(&gain(b)));
         match best {
@@ -118,26 +147,39 @@ mod tests {
         let before = [glance(1.0, 0.0), glance(8.0, 2.0)];
         assert!((dark(&before) - 0.55).abs() < 1e-6);
         noise.add(&before, &[glance(1.1, 0.0), glance(8.0, 3.0)], 0.0);
-        let [single, surface, multiple, irradiance] = noise.variances();
+        let [single, surface, multiple, irradiance] = noise.left([1.0; KINDS]).map(|left| left.variance);
         assert_eq!((single, surface), (0.0, 0.0));
-        let expected = |difference: f64, light: f64| presets::LEFT * (difference / light).powi(2) / 2.0;
+        let expected = |difference: f64, light: f64| Left::between((difference / light).powi(2) / 2.0, 1.0).variance;
         assert!((multiple / expected(0.1, 1.1) - 1.0).abs() < 1e-5, "{multiple}");
+        let irradiance = irradiance / presets::SMOOTHED;
         assert!((irradiance / expected(1.0, 11.0) - 1.0).abs() < 1e-5, "{irradiance}");
         // Rays in the dark, and light that is no number, say nothing.
         let before = noise;
         noise.add(&[glance(0.0, 0.0)], &[glance(f32::NAN, 0.0)], 0.0);
         assert_eq!(noise.squares, before.squares);
-        assert_eq!(Noise::default().variances(), [0.0; KINDS]);
+        assert_eq!(Noise::default().left([1.0; KINDS]).map(|left| left.variance), [0.0; KINDS]);
+    }
+
+    #[test]
+    fn a_mixed_estimate_has_the_variance_of_its_parts() {
+        for effort in [1.0, 4.0] {
+            // A second estimate with a variance of 1, a blind one with twice that for as many samples.
+            let (s, blind) = (1.0 - (1.0 - f64::from(SECOND)) / effort, 2.0 * effort);
+            let (mixed, between) = ((1.0 - s) * (1.0 - s) * blind + s * s, s * s * (1.0 + blind));
+            let left = Left::between(between, effort);
+            assert!((left.variance - mixed).abs() < 1e-9, "{left:?}");
+        }
     }
 
     #[test]
     fn what_is_noisy_and_cheap_is_estimated_more_often() {
-        let rounds = |variances, costs| rounds_for(variances, costs, 1.0, 10.0);
+        let of = |variances: [f64; KINDS]| variances.map(|variance| Left { variance, estimates: 1.5 });
+        let rounds = |variances, costs| rounds_for(&of(variances), costs, 1.0, 10.0);
         assert_eq!(rounds([0.0, 0.3, 0.3, 0.3], [1.0; 4]), [0; 4], "little noise");
         assert_eq!(rounds([0.0, 0.1, 0.1, 2.0], [1.0; 4]), [0, 0, 0, 3], "as much as it takes");
         let shared = rounds([0.0, 2.0, 2.0, 2.0], [1.0, 1.0, 4.0, 1.0]);
         assert!(shared[1] == shared[3] && shared[2] < shared[1] && shared[0] == 0, "{shared:?}");
-        assert!(left([0.0, 2.0, 2.0, 2.0], shared) < 3.5);
+        assert!(variance_after(&of([0.0, 2.0, 2.0, 2.0]), shared) < 3.5);
         assert_eq!(rounds([0.0, 1e9, 0.0, 0.0], [1.0; 4]), [0, presets::MOST_ROUNDS, 0, 0], "but not for ever");
         assert_eq!(rounds([0.0, 1.2, 0.0, 0.0], [1e6; 4]), [0; 4], "nor where it does not pay");
         assert_eq!(rounds([0.0, 5.0, 0.0, 0.0], [0.0; 4]), [0; 4], "nor what has no records");

@@ -95,12 +95,12 @@ const COARSEST: f32 = 1.5;
 /// How often records are made anew because an audit has found them wrong. More: time for what finer records do not mend; fewer: what one finer step leaves stays.
 pub const MOST_REPAIRS: u32 = 2;
 
-/// What is left of the variance between two readings of a picture (before and after records are estimated anew), once they are mixed and averaged with
-/// their neighbours. Larger: estimates that nobody sees; smaller: noise.
-pub(super) const LEFT: f64 = 0.15;
+/// Variance of a blind estimate over that of one that knows where light comes from, of as many samples. Larger: noise is taken for less than it is;
+/// smaller: for more, and estimates are made that nobody sees.
+pub(super) const BLIND: f64 = 2.0;
 
-/// Estimates that a record then has, in units of one made anew.
-pub(super) const ESTIMATES: f64 = 1.5;
+/// What is left of the variance of records on surfaces once they are averaged with their neighbours. As [`BLIND`].
+pub(super) const SMOOTHED: f64 = 0.7;
 
 /// How often records are estimated once more at most. More: time; fewer: noise where light is hard to find.
 pub(super) const MOST_ROUNDS: u32 = 8;

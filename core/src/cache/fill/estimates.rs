@@ -20,7 +20,7 @@ use crate::world::World;
 const FIRST: (u64, u32) = (100, 8);
 
 /// Most samples of an estimate whose samples vary more than usual, as a multiple.
-const MOST_SAMPLES: f32 = 16.0;
+const MOST_SAMPLES: f32 = 8.0;
 
 /// Jobs of an estimate at most.
 pub(in crate::cache) const MOST_PARTS: usize = MOST_SAMPLES as usize;

@@ -63,12 +63,15 @@ impl<F> Filling<'_, F> {
     /// How often each kind is to be estimated once more, for what the glances have told.
     pub(super) fn plan_more(&mut self) {
         let most = presets::record_noise(self.settings().error);
+        let efforts = Kind::FINAL.map(|kind| self.efforts[kind][0] / self.efforts[kind][1]);
         let costs = Kind::FINAL.map(|kind| {
             let samples = self.settings().effort(kind).map_or(0, |effort| effort.samples);
-            (self.caches.slots[kind].len() - self.before[kind]) as f64 * f64::from(samples)
+            self.efforts[kind][0] * f64::from(samples)
         });
-        let rounds = rounds_for(self.noise.variances(), costs, most * most, self.walks() as f64);
+        let left = self.noise.left(efforts);
+        let spent = self.walks() as f64 + costs.iter().sum::<f64>();
+        let rounds = rounds_for(&left, costs, most * most, spent);
         Kind::FINAL.into_iter().zip(rounds).for_each(|(kind, rounds)| self.more[kind] = rounds);
-        self.left = Some(libm::sqrt(noise::left(self.noise.variances(), rounds)) as f32);
+        self.left = Some(libm::sqrt(noise::variance_after(&left, rounds)) as f32);
     }
 }

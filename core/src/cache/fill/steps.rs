@@ -4,9 +4,8 @@ use super::estimates::usual_radius;
 use super::{Filling, PLACES_PER_JOB, Round};
 use crate::cache::Record;
 use crate::cache::asked::Wanted;
-use crate::cache::kind::{Kind, Pass, Step, TURNS, Turn};
+use crate::cache::kind::{Kind, Pass, SECOND, Step, TURNS, Turn};
 use crate::cache::memory::{Estimate, FillingMemory};
-use crate::cache::presets;
 use crate::cache::slot::{Attached, Inserted};
 use crate::sampling::uniform::mix;
 use crate::sh::Coefficient;
@@ -190,11 +189,16 @@ impl<F> Filling<'_, F> {
             // More of an estimate that took more samples; of one that takes no more than those before it, its part of all.
             let share = match step.pass {
                 Pass::Again { share, .. } => 1.0 - (1.0 - share) / estimate.effort,
-                _ => 1.0 / (self.again as f32 + presets::ESTIMATES as f32),
+                _ => 1.0 / (self.again as f32 + 1.0 + (1.0 - SECOND) / estimate.effort),
             };
             let attached = attached(step.kind, estimate, self.memory.higher.as_slice(), i, stride);
             // Where memory was too small some jobs have left none.
             let offset = estimate.number as usize;
+            if let Pass::Again { .. } = step.pass {
+                let effort = f64::from(estimate.effort);
+                let [sum, count] = &mut self.efforts[step.kind];
+                (*sum, *count) = (*sum + effort, *count + 1.0);
+            }
             slot.blend(from + offset, effort.tolerance, &estimate.sums, attached, share);
             if let Some(guide) = self.memory.guides[step.kind].as_mut_slice().get_mut(offset) {
                 guide.merge(&estimate.learnt, 1.0);
