@@ -1,0 +1,170 @@
+//! `examples/shaders/fog.wgsl` against the core: light at random points and along random rays.
+//!
+//!     cargo run --manifest-path tests/shaders/Cargo.toml
+//!
+//! Needs a Vulkan driver; Debian's mesa-vulkan-drivers has one in software.
+
+mod gpu;
+
+use fogbow::bake::{Bake, BakeSettings, BakedProbes, ProbeBasis, ProbeGrid, ProbeState};
+use fogbow::host::{Hit, Scene};
+use fogbow::light::{Light, PointLight};
+use fogbow::math::{Bounds, Ray, Vec3};
+use fogbow::medium::{Homogeneous, Placed, Region};
+use fogbow::phase::Lobe;
+use fogbow::sampling::{Generator, uniform, uniform2, warp};
+use fogbow::sh;
+use fogbow::spectrum::Spectrum;
+use fogbow::surface::Surface;
+use fogbow::work;
+use fogbow::world::{Outline, World};
+use gpu::Question;
+
+const QUESTIONS: usize = 100_000;
+
+/// Steps of a ray through the fog.
+pub const STEPS: u32 = 24;
+
+/// A closed block, whose probes are in a wall.
+struct Block;
+
+impl Scene for Block {
+    fn closest_hit(&self, ray: &Ray) -> Option<Hit> {
+        let (half, inverse) = (Vec3::new(0.35, 0.3, 0.4), 1.0 / ray.direction);
+        let [a, b] = [(-half - ray.origin) * inverse, (half - ray.origin) * inverse];
+        let (near, far) = (a.min(b).max_element(), a.max(b).min_element());
+        let distance = if near > 1e-5 { near } else { far };
+        let is_hit = near <= far && distance > 1e-5 && distance < ray.length;
+        let at = ray.at(distance) / half;
+        let axis = at.abs().cmpge(Vec3::splat(at.abs().max_element()));
+        let normal = Vec3::select(axis, at.signum(), Vec3::ZERO).normalize();
+        let surface = Surface::Lambert { reflectance: Spectrum::splat(0.5) };
+        is_hit.then_some(Hit { distance, normal, surface, light: None })
+    }
+}
+
+/// A lamp and a sky in fog around a block.
+fn baked(degree: u32) -> Result<ProbeGrid<'static>, Box<dyn std::error::Error>> {
+    let fog = Homogeneous::new(
+        Spectrum::new(0.2, 0.3, 0.5),
+        Spectrum::new(1.0, 0.8, 0.6),
+        Lobe::HenyeyGreenstein { g: 0.6 },
+    )?;
+    let ball = Placed::new(fog, Region::sphere(Vec3::ZERO, 1.2)?);
+    let lights = [
+        Light::Point(PointLight::new(Vec3::new(0.2, 0.9, 0.1), Spectrum::new(2.0, 1.5, 1.0))?),
+        Light::Constant(Spectrum::splat(0.3)),
+    ];
+    let world = World { medium: &ball, scene: &Block, lights: (&lights).into() };
+    let outline = Outline::of(&world, Bounds { min: Vec3::new(-1.0, -1.1, -0.9), max: Vec3::new(1.0, 1.0, 1.2) });
+    let basis = ProbeBasis::SphericalHarmonics { degree };
+    let settings = BakeSettings { basis, most_passes: 4, ..BakeSettings::for_outline(&outline, [9, 7, 8]) };
+    let mut bake = Bake::new(settings)?;
+    work::finish(&mut bake, &world, &mut BakedProbes::default());
+    let mut grid = bake.finish();
+    grid.dilate();
+    Ok(grid)
+}
+
+/// The sum of the sizes of what makes up light in a direction: what half floats round.
+fn sizes(grid: &ProbeGrid<'_>, point: Vec3, direction: Vec3, degree: u32) -> f32 {
+    let mut held = [Spectrum::ZERO; 16];
+    let held = &mut held[..grid.basis().count()];
+    let mut values = [0.0; 16];
+    sh::evaluate(direction, degree as usize, &mut values[..held.len()]);
+    let bounds = grid.lattice().bounds();
+    let around = grid.lattice().around(point.clamp(bounds.min, bounds.max)).unwrap_or_default();
+    let size = |index: usize| -> f32 {
+        grid.held(index).iter().zip(&values).map(|(c, y)| c.map(f32::abs).max_element() * y.abs()).sum()
+    };
+    around.iter().map(|&(index, _)| size(index)).fold(0.0, f32::max)
+}
+
+/// Albedo and extinction, mixed as the shader does.
+fn matter(grid: &ProbeGrid<'_>, point: Vec3) -> (Spectrum, f32) {
+    let bounds = grid.lattice().bounds();
+    let around = grid.lattice().around(point.clamp(bounds.min, bounds.max)).unwrap_or_default();
+    let mut sum = (Spectrum::ZERO, 0.0);
+    for (index, weight) in around {
+        let probe = &grid.probes()[index];
+        sum.0 += probe.albedo * weight;
+        sum.1 += probe.extinction.mean() * weight;
+    }
+    sum
+}
+
+/// Valid probes with less weight than this may have none by rounding: then light jumps to what dilation has left.
+const LEAST_SHARE: f32 = 1e-5;
+
+fn jumps(grid: &ProbeGrid<'_>, point: Vec3) -> bool {
+    let mut held = [Spectrum::ZERO; 16];
+    grid.look_up(point, &mut held[..grid.basis().count()]) < LEAST_SHARE
+}
+
+/// Light scattered towards the eye, and transmittance; `None` where light jumps.
+fn fog(grid: &ProbeGrid<'_>, question: &Question) -> Option<(Spectrum, f32)> {
+    let [eye, direction] = [question.point, question.direction].map(Vec3::from);
+    let bounds = grid.lattice().bounds();
+    let [low, high] = [bounds.min, bounds.max].map(|corner| (corner - eye) / direction);
+    let begin = low.min(high).max_element().max(0.0);
+    let end = low.max(high).min_element().min(question.depth);
+    let (mut light, mut through) = (Spectrum::ZERO, 1.0);
+    if end > begin {
+        let step = (end - begin) / STEPS as f32;
+        for i in 0..STEPS {
+            let point = eye + (begin + (i as f32 + 0.5) * step) * direction;
+            if jumps(grid, point) {
+                return None;
+            }
+            let (albedo, extinction) = matter(grid, point);
+            let passed = (-extinction * step).exp();
+            light += albedo * grid.value(point, -direction) * (through * (1.0 - passed));
+            through *= passed;
+        }
+    }
+    Some((light, through))
+}
+
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    for degree in [0, 1, 2] {
+        let grid = baked(degree)?;
+        let walls = grid.probes().iter().filter(|probe| probe.state() == ProbeState::InWall).count();
+        let rng = &mut Generator::new(u64::from(degree) + 1);
+        let questions: Vec<Question> = (0..QUESTIONS)
+            .map(|_| {
+                let at = Vec3::new(uniform(rng), uniform(rng), uniform(rng));
+                let direction = warp::uniform_sphere(uniform2(rng)).to_array();
+                Question { point: (at * 3.0 - 1.5).to_array(), depth: 4.0 * uniform(rng), direction, padding: 0.0 }
+            })
+            .collect();
+        let answers = gpu::answers(&grid, &questions)?;
+        let (mut worst, mut lit, mut compared) = ([0.0_f32; 2], 0, 0);
+        for (question, answer) in questions.iter().zip(answers.chunks_exact(2)) {
+            let [point, direction] = [question.point, question.direction].map(Vec3::from);
+            // Half a unit in the eleventh digit of every number, and single precision beside.
+            let rounding = sizes(&grid, point, direction, degree) * (0.5 / 1024.0) + 1e-6;
+            let value = grid.value(point, direction);
+            lit += usize::from(!value.is_black());
+            for channel in (0..3).filter(|_| !jumps(&grid, point)) {
+                worst[0] = worst[0].max((answer[0][channel] - value[channel]).abs() / rounding);
+            }
+            let Some((light, through)) = fog(&grid, question) else { continue };
+            compared += 1;
+            // Four free paths, whose extinction is rounded, too.
+            let rounding = 4.0 / 1024.0;
+            for channel in 0..3 {
+                worst[1] =
+                    worst[1].max((answer[1][channel] - light[channel]).abs() / (rounding * (light[channel] + 0.1)));
+            }
+            worst[1] = worst[1].max((answer[1][3] - through).abs() / rounding);
+        }
+        println!(
+            "degree {degree}: {QUESTIONS} points, {compared} rays, {walls} probes in walls: at most {:.2} and {:.2} of the rounding of half floats",
+            worst[0], worst[1]
+        );
+        if walls == 0 || lit.min(compared) < QUESTIONS / 2 || worst.iter().any(|worst| !(*worst <= 1.0)) {
+            return Err("fog.wgsl is not what the core says".into());
+        }
+    }
+    Ok(())
+}
