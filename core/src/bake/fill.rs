@@ -142,7 +142,7 @@ impl<'s, 'c> Bake<'s, 'c> {
     /// more passes, is what may differ.
     ///
     /// # Errors
-    /// A grid of other cells or of other light: [`BakeError::Memory`].
+    /// A grid of other cells or of other light: [`BakeError::Grid`].
     ///
     /// ```
     /// # use fogbow::{host::Empty, light::Light, math::{Bounds, Vec3}, medium::Homogeneous, phase::Phase, spectrum::Spectrum};
@@ -161,14 +161,14 @@ impl<'s, 'c> Bake<'s, 'c> {
     /// work::finish(&mut again, &world, &mut BakedProbes::default());
     /// assert!(again.finish().passes(0) >= 2);
     /// # let other = BakeSettings { counts: [1, 1, 1], ..settings };
-    /// # assert_eq!(Bake::resume(Bake::new(settings)?.finish(), other).err(), Some(BakeError::Memory));
+    /// # assert_eq!(Bake::resume(Bake::new(settings)?.finish(), other).err(), Some(BakeError::Grid));
     /// # }
     /// # Ok::<(), Box<dyn core::error::Error>>(())
     /// ```
     pub fn resume(grid: ProbeGrid<'s>, settings: BakeSettings) -> Result<Self, BakeError> {
         let held = (settings.basis, settings.quantity, settings.orders);
         if settings.lattice()? != grid.lattice || held != (grid.basis, grid.quantity, grid.orders) {
-            return Err(BakeError::Memory);
+            return Err(BakeError::Grid);
         }
         let mut bake = Self::over(grid, settings);
         match bake.grid.memory.bricks.as_slice().iter().position(|brick| brick.passes < brick.due) {

@@ -56,12 +56,13 @@ pub struct Froxels {
 }
 
 impl Froxels {
-    /// So many columns along both sides of the picture, so many slices, from `near` to `far` (m). `None` without cells, or where distances do not grow
-    /// from above 0.
+    /// So many columns along both sides of the picture, so many slices, from `near` to `far` (m). `None` without cells or with 2³² and more, or where distances do not
+    /// grow from above 0.
     #[must_use]
     pub fn new(counts: [u32; 3], near: f32, far: f32) -> Option<Self> {
         let grows = near > 0.0 && far > near && far.is_finite();
-        (grows && counts.iter().all(|count| *count > 0)).then_some(Self { counts, near, far })
+        let cells = counts.iter().try_fold(1_u32, |product, count| product.checked_mul(*count));
+        (grows && cells.is_some_and(|cells| cells > 0)).then_some(Self { counts, near, far })
     }
 
     /// Cells of a slice, and columns.
@@ -179,6 +180,7 @@ mod tests {
         for (counts, near, far) in [
             ([0, 1, 1], 1.0, 2.0),
             ([1, 1, 0], 1.0, 2.0),
+            ([1 << 16, 1 << 16, 1], 1.0, 2.0),
             ([1, 1, 1], 0.0, 2.0),
             ([1, 1, 1], 2.0, 2.0),
             ([1, 1, 1], f32::NAN, 2.0),

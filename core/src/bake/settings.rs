@@ -58,6 +58,8 @@ pub enum BakeError {
     Degree(u32),
     /// No directions, fewer than two passes, or an error that is not above 0.
     Effort,
+    /// A grid that was begun is of other cells or of other light.
+    Grid,
     /// The memory does not have one element for each number of a probe, each probe and each brick.
     Memory,
 }
@@ -69,6 +71,7 @@ impl core::fmt::Display for BakeError {
             Self::Probes(count) => write!(f, "{count} probes are too many: there may be at most {MOST_PROBES}"),
             Self::Degree(degree) => write!(f, "degree {degree} is none from 0 to 3"),
             Self::Effort => f.write_str("a bake needs directions, two passes and an error above 0"),
+            Self::Grid => f.write_str("the grid was begun for other cells or for other light"),
             Self::Memory => f.write_str("there is no memory for the probes"),
         }
     }

@@ -306,7 +306,7 @@ impl<'s, F> Filling<'s, F> {
     fn at_hand(&self) -> Option<(Step, Effort)> {
         match *TURNS.get(self.step)? {
             Turn::Of(step) => Some((step, self.settings().effort(step.kind)?)),
-            Turn::Glances => None,
+            Turn::Glances { .. } => None,
         }
     }
 

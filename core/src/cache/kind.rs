@@ -121,7 +121,10 @@ pub(super) enum Pass {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Turn {
     Of(Step),
-    Glances,
+    Glances {
+        /// After records have been estimated anew.
+        is_second: bool,
+    },
 }
 
 /// One step of a fill. All steps are lit by photons and by coarse irradiance.
@@ -159,11 +162,11 @@ pub(super) const TURNS: [Turn; 16] = {
         make(Single),
         make(Multiple),
         make(Irradiance),
-        Turn::Glances,
+        Turn::Glances { is_second: false },
         again(Surface, 1, SECOND),
         again(Multiple, 100, SECOND),
         again(Irradiance, 101, SECOND),
-        Turn::Glances,
+        Turn::Glances { is_second: true },
         more(Surface, 200),
         more(Multiple, 300),
         more(Irradiance, 400),

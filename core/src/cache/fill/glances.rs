@@ -3,7 +3,7 @@
 use super::{Filling, RAYS_PER_JOB, Round};
 use crate::cache::asked::Asked;
 use crate::cache::eye::radiance;
-use crate::cache::kind::{Kind, TURNS, Turn};
+use crate::cache::kind::Kind;
 use crate::cache::memory::FilledRecords;
 use crate::cache::noise::{self, Glance, rounds_for};
 use crate::cache::presets;
@@ -15,13 +15,12 @@ use crate::world::World;
 
 impl<F> Filling<'_, F> {
     /// Begins a round of glances, if what they tell is of use.
-    pub(super) fn begin_glances(&mut self) -> bool {
+    pub(super) fn begin_glances(&mut self, is_second: bool) -> bool {
         let Asked::View { .. } = self.asked else { return false };
         let is_new = |kind: Kind| self.caches.slots[kind].len() > self.before[kind];
         if !(self.settings().error > 0.0 && Kind::FINAL.into_iter().any(is_new)) {
             return false;
         }
-        let is_second = TURNS[..self.step].contains(&Turn::Glances);
         if is_second && self.memory.glances.is_empty() {
             return false;
         }
@@ -69,6 +68,7 @@ impl<F> Filling<'_, F> {
             self.efforts[kind][0] * f64::from(samples)
         });
         let left = self.noise.left(efforts);
+        // Blind estimates, and second ones with all their samples; about, for nothing hangs on it but where it stops to pay.
         let spent = self.walks() as f64 + costs.iter().sum::<f64>();
         let rounds = rounds_for(&left, costs, most * most, spent);
         Kind::FINAL.into_iter().zip(rounds).for_each(|(kind, rounds)| self.more[kind] = rounds);

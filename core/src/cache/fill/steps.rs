@@ -22,7 +22,9 @@ impl<F> Filling<'_, F> {
     pub(super) fn begin(&mut self, from: usize) {
         for (number, turn) in TURNS.iter().enumerate().skip(from) {
             self.step = number;
-            if *turn == Turn::Glances && self.begin_glances() {
+            if let Turn::Glances { is_second } = *turn
+                && self.begin_glances(is_second)
+            {
                 return;
             }
             let Some((step, effort)) = self.at_hand() else { continue };
