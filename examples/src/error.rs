@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 /// Something in a scene file, or in a file it names, that cannot be used.
 ///
 /// Reads as `box.xml:12: <float name="g">: attribute "value": anisotropy 1 is outside (-1, 1)`.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct SceneError {
     /// The scene file.
     pub file: PathBuf,

@@ -40,6 +40,13 @@ pub struct Integrator {
     pub hide_emitters: bool,
 }
 
+impl Default for Integrator {
+    /// Mitsuba's `path` as it stands where a scene names no integrator.
+    fn default() -> Self {
+        Self { max_depth: None, rr_depth: 5, hide_emitters: false }
+    }
+}
+
 /// Which way across the film the field of view is measured.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FovAxis {

@@ -1,69 +1,105 @@
 //! Elements of the file: attributes, values, and errors that say where.
 
-use std::collections::{BTreeMap, HashMap};
 use std::path::PathBuf;
 
 use fogbow::spectrum::Spectrum;
-use roxmltree::{Node, NodeId};
 
+use super::notes::{NoteKind, Sink};
+use super::preprocess::error_at;
+use super::tree::{Node, Tree};
 use crate::error::{DataError, SceneError};
 
-/// What every element of a file shares.
+/// What every element of a scene shares.
 #[derive(Debug)]
 pub(super) struct Context {
-    /// The scene file.
-    pub(super) file: PathBuf,
-    /// Values of `$name`.
-    pub(super) defaults: BTreeMap<String, String>,
-    /// Elements by id.
-    pub(super) ids: HashMap<String, NodeId>,
+    /// All elements.
+    pub(super) tree: Tree,
+    /// Where notes and errors go.
+    pub(super) sink: Sink,
 }
 
-impl Context {
-    /// A path as the file names it, relative to the file.
-    pub(super) fn resolve(&self, name: &str) -> PathBuf {
-        self.file.parent().map_or_else(|| PathBuf::from(name), |folder| folder.join(name))
-    }
-}
-
-/// An element with its context.
+/// An element with its context. One that stands in a scene by reference is the element meant, with the name that the
+/// reference gives it.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Element<'a> {
-    pub(super) node: Node<'a, 'a>,
+    pub(super) node: &'a Node,
     pub(super) context: &'a Context,
+    /// The `<ref>` that led here.
+    reference: Option<&'a Node>,
 }
 
 impl<'a> Element<'a> {
-    /// The tag: `float`, `shape`.
-    pub(super) fn tag(&self) -> &'a str {
-        self.node.tag_name().name()
+    /// The outermost element.
+    pub(super) fn root(context: &'a Context) -> Self {
+        Self { node: context.tree.root(), context, reference: None }
     }
 
-    /// The element as errors show it.
-    fn label(&self) -> String {
-        let mut label = format!("<{}", self.tag());
-        for key in ["type", "name", "id"] {
-            if let Some(value) = self.node.attribute(key) {
-                label.push_str(&format!(" {key}=\"{value}\""));
-            }
-        }
-        label.push('>');
-        label
+    /// The tag: `float`, `shape`.
+    pub(super) fn tag(&self) -> &'a str {
+        &self.node.tag
+    }
+
+    /// Its name as a property: that of the reference where it stands by one.
+    pub(super) fn name(&self) -> Option<&'a str> {
+        self.reference.unwrap_or(self.node).attribute("name")
     }
 
     pub(super) fn line(&self) -> u32 {
-        self.node.document().text_pos_at(self.node.range().start).row
+        self.node.line
+    }
+
+    /// A path as the file names it, relative to the file or to the folders of `<path>`.
+    pub(super) fn resolve(&self, name: &str) -> PathBuf {
+        self.context.tree.resolve(self.node, name)
     }
 
     /// An error of the whole element.
     pub(super) fn error(&self, reason: impl core::fmt::Display) -> SceneError {
-        SceneError {
-            file: self.context.file.clone(),
-            line: Some(self.line()),
-            element: self.label(),
-            attribute: None,
-            reason: reason.to_string(),
+        error_at(&self.context.tree, self.node, reason)
+    }
+
+    /// An error of an element as a child of another: of the reference, where it stands there by one.
+    pub(super) fn error_of_use(&self, reason: impl core::fmt::Display) -> SceneError {
+        error_at(&self.context.tree, self.reference.unwrap_or(self.node), reason)
+    }
+
+    /// The error of an element that is not what is due, at the reference that says so if there is one.
+    pub(super) fn wrong_tag(&self, due: &str) -> SceneError {
+        match self.reference {
+            Some(reference) => {
+                let id = reference.attribute("id").unwrap_or_default();
+                let reason = format!("\"{id}\" is a <{}> where a <{due}> is due", self.tag());
+                SceneError { attribute: Some("id".to_owned()), ..error_at(&self.context.tree, reference, reason) }
+            }
+            None => self.error(format!("a <{due}> is due here")),
         }
+    }
+
+    /// Notes that something has no effect here.
+    pub(super) fn ignored(&self, reason: impl core::fmt::Display) {
+        self.context.sink.note(NoteKind::Ignored, self.error(reason));
+    }
+
+    /// Notes what looks like a mistake.
+    pub(super) fn suspicious(&self, reason: impl core::fmt::Display) {
+        self.context.sink.note(NoteKind::Suspicious, self.error(reason));
+    }
+
+    /// For something that is missing here: the error, or where the user allows it (`--lenient`) the nearest there is and a note
+    /// that names it,
+    /// as in "a pinhole instead" or "ignored".
+    pub(super) fn instead<T>(
+        &self,
+        error: SceneError,
+        name: &str,
+        nearest: impl FnOnce() -> T,
+    ) -> Result<T, SceneError> {
+        self.context.sink.instead(error, name, nearest)
+    }
+
+    /// The value; or nothing, and the error is kept, so that reading may go on and find further ones.
+    pub(super) fn keep<T>(&self, result: Result<T, SceneError>) -> Option<T> {
+        self.context.sink.keep(result)
     }
 
     /// An error of one attribute.
@@ -76,21 +112,24 @@ impl<'a> Element<'a> {
         self.attribute_error("value", error)
     }
 
-    /// Children that are elements.
+    /// Children that are elements, references followed. Those that lead nowhere have been told and are left out.
     ///
     /// # Errors
     /// Text between them.
     pub(super) fn children(&self) -> Result<Vec<Self>, SceneError> {
-        let mut children = Vec::new();
-        for node in self.node.children() {
-            if node.is_element() {
-                children.push(Self { node, context: self.context });
-            } else if node.is_text() && !node.text().unwrap_or_default().trim().is_empty() {
-                let text: String = node.text().unwrap_or_default().trim().chars().take(20).collect();
-                return Err(self.error(format!("unexpected text \"{text}\"")));
-            }
+        if let Some(text) = &self.node.text {
+            return Err(self.error(format!("unexpected text \"{text}\"")));
         }
-        Ok(children)
+        let tree = &self.context.tree;
+        let children = self.node.children.iter().filter_map(|id| {
+            let (mut node, mut reference) = (tree.node(*id), None);
+            if node.tag == "ref" {
+                reference = Some(node);
+                node = tree.node(*tree.ids.get(node.attribute("id")?)?);
+            }
+            Some(Self { node, context: self.context, reference })
+        });
+        Ok(children.collect())
     }
 
     /// # Errors
@@ -106,34 +145,19 @@ impl<'a> Element<'a> {
     /// A child where there should be none.
     pub(super) fn no_children(&self) -> Result<(), SceneError> {
         match self.children()?.first() {
-            Some(child) => Err(child.error(format!("is not expected inside {}", self.label()))),
+            Some(child) => Err(child.error(format!("is not expected inside <{}>", self.tag()))),
             None => Ok(()),
         }
     }
 
-    /// An attribute with `$name` replaced.
-    ///
-    /// # Errors
-    /// A `$name` that has no `<default>`.
-    pub(super) fn optional(&self, attribute: &str) -> Result<Option<String>, SceneError> {
-        let Some(written) = self.node.attribute(attribute) else { return Ok(None) };
-        let mut pieces = written.split('$');
-        let mut value = pieces.next().unwrap_or_default().to_owned();
-        for piece in pieces {
-            let end = piece.find(|c: char| !(c.is_alphanumeric() || c == '_')).unwrap_or(piece.len());
-            let (name, rest) = piece.split_at(end);
-            let Some(replacement) = self.context.defaults.get(name) else {
-                return Err(self.attribute_error(attribute, format!("${name} has no <default>")));
-            };
-            value.push_str(replacement);
-            value.push_str(rest);
-        }
-        Ok(Some(value))
+    /// An attribute, if it is there.
+    pub(super) fn optional(&self, attribute: &str) -> Option<String> {
+        self.node.attribute(attribute).map(str::to_owned)
     }
 
     /// An attribute that must be there.
     pub(super) fn required(&self, attribute: &str) -> Result<String, SceneError> {
-        self.optional(attribute)?.ok_or_else(|| self.attribute_error(attribute, "is missing"))
+        self.optional(attribute).ok_or_else(|| self.attribute_error(attribute, "is missing"))
     }
 
     fn parse_number(&self, attribute: &str, text: &str) -> Result<f64, SceneError> {
@@ -171,7 +195,7 @@ impl<'a> Element<'a> {
     /// `may_repeat`). What is missing is `fill`.
     pub(super) fn xyz(&self, fill: f64, may_repeat: bool) -> Result<[f64; 3], SceneError> {
         if self.node.has_attribute("value") {
-            if let Some(extra) = ["x", "y", "z"].into_iter().find(|a| self.node.has_attribute(*a)) {
+            if let Some(extra) = ["x", "y", "z"].into_iter().find(|a| self.node.has_attribute(a)) {
                 return Err(self.attribute_error(extra, "cannot stand beside \"value\""));
             }
             if may_repeat && let [one] = self.numbers("value")?[..] {

@@ -1,12 +1,13 @@
 //! A number for what a scene is, without who looks at it.
 
-use std::collections::{BTreeMap, HashMap};
 use std::path::Path;
 
 use fogbow::bytes::Crc;
 
 use super::element::{Context, Element};
-use super::{collect, document, file_error};
+use super::notes::Sink;
+use super::tree::Node;
+use super::{ReadOptions, preprocess};
 use crate::error::{SceneError, read_file};
 
 /// The same number for two scenes whose light is the same everywhere: it depends on all elements in their order
@@ -15,42 +16,52 @@ use crate::error::{SceneError, read_file};
 /// # Errors
 /// A file that cannot be read.
 pub fn fingerprint(file: &Path) -> Result<u64, SceneError> {
-    let whole = |reason: String| file_error(file, None, reason);
-    let bytes = read_file(file).map_err(|e| whole(e.reason))?;
-    let text = String::from_utf8(bytes).map_err(|e| whole(format!("is not UTF-8 text: {e}")))?;
-    let document = document(file, &text)?;
-    let mut context = Context { file: file.to_owned(), defaults: BTreeMap::new(), ids: HashMap::new() };
-    collect(&document, &mut context)?;
+    fingerprint_with(file, &ReadOptions::default())
+}
+
+/// [`fingerprint`] of a scene that is read with options.
+///
+/// # Errors
+/// A file that cannot be read.
+pub fn fingerprint_with(file: &Path, options: &ReadOptions) -> Result<u64, SceneError> {
+    let sink = Sink::new(options.is_lenient);
+    let tree = preprocess::read(file, &preprocess::text_of(file)?, &options.parameters, &sink)?;
+    let context = Context { tree, sink };
     let mut crc = Crc::new();
-    for child in (Element { node: document.root_element(), context: &context }).children()? {
-        match child.tag() {
-            // Values of defaults count where they are used.
-            "sensor" | "integrator" | "default" => {}
-            _ => add(&child, &mut crc)?,
+    let root = Element::root(&context);
+    for child in &root.node.children {
+        let child = context.tree.node(*child);
+        // Values of parameters count where they are used.
+        if child.tag != "sensor" && child.tag != "integrator" {
+            add(child, &context, &mut crc)?;
         }
     }
     Ok(crc.value())
 }
 
-fn add(element: &Element<'_>, crc: &mut Crc) -> Result<(), SceneError> {
+fn add(node: &Node, context: &Context, crc: &mut Crc) -> Result<(), SceneError> {
     // Zero bytes keep neighbours apart: they do not occur in XML.
     let mut text = |text: &str| {
         crc.add(text.as_bytes());
         crc.add(&[0]);
     };
-    text(element.tag());
-    for attribute in element.node.attributes() {
+    text(&node.tag);
+    for attribute in node.attributes() {
         text(attribute.name());
-        text(&element.optional(attribute.name())?.unwrap_or_default());
+        text(attribute.value());
     }
-    if element.node.attribute("name") == Some("filename") {
-        let path = element.context.resolve(&element.required("value")?);
-        let bytes = read_file(&path).map_err(|e| element.data_error(&e))?;
+    let named = match node.attribute("name") {
+        Some("filename") => node.attribute("value"),
+        _ => node.attribute("filename"),
+    };
+    if let Some(name) = named {
+        let bytes =
+            read_file(&context.tree.resolve(node, name)).map_err(|e| preprocess::error_at(&context.tree, node, e))?;
         crc.add(&(bytes.len() as u64).to_le_bytes());
         crc.add(&bytes);
     }
-    for child in element.children()? {
-        add(&child, crc)?;
+    for child in &node.children {
+        add(context.tree.node(*child), context, crc)?;
     }
     crc.add(&[1]);
     Ok(())

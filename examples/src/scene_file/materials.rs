@@ -5,7 +5,6 @@ use fogbow::surface::Surface;
 
 use super::description::Material;
 use super::element::Element;
-use super::lookup;
 use super::plugin::Plugin;
 use crate::error::SceneError;
 
@@ -21,13 +20,7 @@ pub(super) fn default_material(is_emitter: bool) -> Material {
 pub(super) fn read(element: &Element<'_>) -> Result<Material, SceneError> {
     let plugin = Plugin::new(*element)?;
     let material = if plugin.kind == "twosided" {
-        let inner = match plugin.nested("bsdf") {
-            Some(inner) => inner,
-            None => match plugin.nested("ref") {
-                Some(reference) => lookup(&reference, "bsdf")?,
-                None => return Err(element.error("a <bsdf> is missing inside")),
-            },
-        };
+        let inner = plugin.nested("bsdf").ok_or_else(|| element.error("a <bsdf> is missing inside"))?;
         let inner_plugin = Plugin::new(inner)?;
         let surface = read_one(&inner_plugin)?;
         inner_plugin.finish()?;

@@ -7,7 +7,6 @@ use fogbow::spectrum::Spectrum;
 
 use super::description::Matter;
 use super::element::Element;
-use super::lookup;
 use super::plugin::{Plugin, is_share};
 use crate::error::SceneError;
 use crate::transform::Transform;
@@ -134,10 +133,7 @@ fn read_phase(element: &Element<'_>, depth: u32) -> Result<Phase, SceneError> {
             let weight = plugin.number_in("weight", 0.5, 0.0..=1.0)? as f32;
             let part = || match plugin.nested("phase") {
                 Some(phase) => read_phase(&phase, depth + 1),
-                None => match plugin.nested("ref") {
-                    Some(reference) => read_phase(&lookup(&reference, "phase")?, depth + 1),
-                    None => Err(element.error("a blend needs two <phase> inside")),
-                },
+                None => Err(element.error("a blend needs two <phase> inside")),
             };
             let parts = [(Spectrum::splat(1.0 - weight), part()?), (Spectrum::splat(weight), part()?)];
             Phase::mix(parts).map_err(|e| element.error(e))?

@@ -12,9 +12,9 @@
 //! | `bsdf` | `diffuse`, `twosided`, `null`, `conductor` with material `none`, `dielectric`; and `phong`, which Mitsuba 3 does not know |
 //! | `emitter` | `point`, `spot`, `area`, `directional`, `constant`, `envmap` |
 //!
-//! `<default name value>` with `$name`, `id` and `<ref>`, and all transforms are understood. A
-//! medium fills the cube or sphere whose `interior` it is. Anything else is a [`SceneError`]:
-//! nothing is skipped.
+//! `<include>`, `<path>`, `<default>` with `$name`, `<alias>`, `<ref>` to anything, and all transforms are understood; files of
+//! version 0.6 are upgraded. A medium fills the cube or sphere whose `interior` it is. What has no effect here is a
+//! [`Note`]; anything else is a [`SceneError`]: nothing is skipped in silence.
 
 mod description;
 mod element;
@@ -22,28 +22,52 @@ mod emitters;
 mod fingerprint;
 mod materials;
 mod media;
+mod notes;
 mod places;
 mod plugin;
+mod preprocess;
 mod sensor;
 mod shapes;
 mod transforms;
+mod tree;
+mod upgrade;
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::HashSet;
 use std::path::Path;
 
 pub use description::{
     Container, Emitter, FovAxis, Geometry, Integrator, Material, Matter, MediumDescription, Place, SceneFile, Sensor,
     Shape,
 };
-pub use fingerprint::fingerprint;
+pub use fingerprint::{fingerprint, fingerprint_with};
+pub use notes::{Note, NoteKind};
 pub use sensor::MAX_PIXELS;
 
-use crate::error::{SceneError, read_file};
+use crate::error::SceneError;
 use element::{Context, Element};
+use notes::Sink;
 
-/// Most elements and attributes of a file: far more than any scene written by hand or exported
-/// with its meshes beside it.
-const MAX_NODES: u32 = 2_000_000;
+/// How a scene file is to be read.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct ReadOptions {
+    /// Values of parameters (`$name`), before those of `<default>`.
+    pub parameters: Vec<(String, String)>,
+    /// Which of several sensors, counted from 0.
+    pub sensor: usize,
+    /// Whether what is missing here may be replaced by the nearest there is.
+    pub is_lenient: bool,
+}
+
+/// What was found in a scene file.
+#[derive(Debug)]
+pub struct Findings {
+    /// The scene, if nothing is wrong with it.
+    pub scene: Option<SceneFile>,
+    /// All that keeps it from being used.
+    pub errors: Vec<SceneError>,
+    /// What a user should know of it all the same.
+    pub notes: Vec<Note>,
+}
 
 impl SceneFile {
     /// Reads a scene file and all files it names.
@@ -51,10 +75,7 @@ impl SceneFile {
     /// # Errors
     /// The first thing that cannot be read or used.
     pub fn read(file: &Path) -> Result<Self, SceneError> {
-        let whole = |reason: String| file_error(file, None, reason);
-        let bytes = read_file(file).map_err(|e| whole(e.reason))?;
-        let text = String::from_utf8(bytes).map_err(|e| whole(format!("is not UTF-8 text: {e}")))?;
-        Self::parse(file, &text)
+        Self::read_with(file, &ReadOptions::default()).into_scene()
     }
 
     /// Reads a scene from the text of `file`.
@@ -62,101 +83,109 @@ impl SceneFile {
     /// # Errors
     /// As [`SceneFile::read`].
     pub fn parse(file: &Path, text: &str) -> Result<Self, SceneError> {
-        let document = document(file, text)?;
-        let mut context = Context { file: file.to_owned(), defaults: BTreeMap::new(), ids: HashMap::new() };
-        collect(&document, &mut context)?;
-        read_scene(Element { node: document.root_element(), context: &context })
+        Self::parse_with(file, text, &ReadOptions::default()).into_scene()
     }
-}
 
-fn document<'a>(file: &Path, text: &'a str) -> Result<roxmltree::Document<'a>, SceneError> {
-    let options = roxmltree::ParsingOptions { nodes_limit: MAX_NODES, ..Default::default() };
-    roxmltree::Document::parse_with_options(text, options)
-        .map_err(|e| file_error(file, Some(e.pos().row), format!("is not well-formed XML: {e}")))
-}
-
-fn file_error(file: &Path, line: Option<u32>, reason: String) -> SceneError {
-    SceneError { file: file.to_owned(), line, element: String::new(), attribute: None, reason }
-}
-
-/// Fills in ids and defaults, so that references may point forwards.
-fn collect<'a>(document: &'a roxmltree::Document<'a>, context: &mut Context) -> Result<(), SceneError> {
-    for node in document.descendants().filter(roxmltree::Node::is_element) {
-        let element = |context| Element { node, context };
-        if let Some(namespace) = node.tag_name().namespace() {
-            return Err(element(context).error(format!("unknown namespace \"{namespace}\"")));
+    /// Reads a scene file and all files it names, and goes on after errors to find them all.
+    #[must_use]
+    pub fn read_with(file: &Path, options: &ReadOptions) -> Findings {
+        match preprocess::text_of(file) {
+            Ok(text) => Self::parse_with(file, &text, options),
+            Err(error) => Findings { scene: None, errors: vec![error], notes: Vec::new() },
         }
-        if node.has_tag_name("ref") {
-            continue;
-        }
-        if let Some(id) = node.attribute("id") {
-            if context.ids.contains_key(id) {
-                return Err(element(context).attribute_error("id", format!("\"{id}\" is used twice")));
+    }
+
+    /// Reads a scene from the text of `file`, as [`SceneFile::read_with`].
+    #[must_use]
+    pub fn parse_with(file: &Path, text: &str, options: &ReadOptions) -> Findings {
+        let sink = Sink::new(options.is_lenient);
+        let (scene, sink) = match preprocess::read(file, text, &options.parameters, &sink) {
+            Ok(tree) => {
+                let context = Context { tree, sink };
+                let scene = context.sink.keep(read_scene(&Element::root(&context), options));
+                (scene, context.sink)
             }
-            context.ids.insert(id.to_owned(), node.id());
-        }
+            Err(error) => {
+                sink.error(error);
+                (None, sink)
+            }
+        };
+        let (notes, errors) = sink.into_parts();
+        Findings { scene: scene.filter(|_| errors.is_empty()), errors, notes }
     }
-    for node in document.root_element().children().filter(|n| n.has_tag_name("default")) {
-        let element = Element { node, context };
-        element.allow(&["name", "value"])?;
-        element.no_children()?;
-        let (name, value) = (element.required("name")?, element.required("value")?);
-        if context.defaults.contains_key(&name) {
-            return Err(element.attribute_error("name", format!("\"{name}\" is given twice")));
-        }
-        context.defaults.insert(name, value);
-    }
-    Ok(())
 }
 
-/// The element a `<ref>` points to, which must have the given tag.
-fn lookup<'a>(reference: &Element<'a>, tag: &str) -> Result<Element<'a>, SceneError> {
-    reference.allow(&["name", "id"])?;
-    reference.no_children()?;
-    let id = reference.required("id")?;
-    let context = reference.context;
-    let node = context.ids.get(&id).and_then(|id| reference.node.document().get_node(*id));
-    let Some(node) = node else {
-        return Err(reference.attribute_error("id", format!("nothing has the id \"{id}\"")));
-    };
-    if !node.has_tag_name(tag) {
-        let found = node.tag_name().name();
-        return Err(reference.attribute_error("id", format!("\"{id}\" is a <{found}> where a <{tag}> is due")));
+impl Findings {
+    /// # Errors
+    /// The first thing that is wrong.
+    pub fn into_scene(self) -> Result<SceneFile, SceneError> {
+        match (self.scene, self.errors.into_iter().next()) {
+            (Some(scene), _) => Ok(scene),
+            (None, Some(error)) => Err(error),
+            // Readers that return nothing leave an error behind.
+            (None, None) => Err(SceneError { reason: "the scene was not read".to_owned(), ..SceneError::default() }),
+        }
     }
-    Ok(Element { node, context })
 }
 
-fn read_scene(scene: Element<'_>) -> Result<SceneFile, SceneError> {
-    if scene.tag() != "scene" {
-        return Err(scene.error("the outermost element must be <scene>"));
-    }
-    scene.allow(&["version"])?;
-    let version = scene.required("version")?;
-    if !(version.starts_with("3.") || version.starts_with("2.")) {
-        return Err(scene.attribute_error("version", format!("\"{version}\" is not known; 3.0.0 is")));
-    }
-    let (mut integrator, mut sensor) = (None, None);
+/// Elements inside `<scene>`, as far as they mean something there.
+const TOP_LEVEL: [&str; 9] =
+    ["integrator", "sensor", "medium", "shape", "bsdf", "emitter", "texture", "volume", "phase"];
+
+fn read_scene(scene: &Element<'_>, options: &ReadOptions) -> Result<SceneFile, SceneError> {
+    scene.keep(scene.allow(&["version", "type", "id", "name"]));
+    let is_referred_to = referred_to(scene);
+    let (mut integrators, mut sensors) = (Vec::new(), Vec::new());
     let (mut shapes, mut emitters, mut media) = (Vec::new(), Vec::new(), Vec::new());
     for child in scene.children()? {
         match child.tag() {
-            "default" => {}
-            "integrator" if integrator.is_none() => integrator = Some(sensor::read_integrator(&child)?),
-            "sensor" if sensor.is_none() => sensor = Some((child, sensor::read(&child)?)),
-            "integrator" | "sensor" => return Err(child.error("only one is supported")),
+            "integrator" => integrators.push(child),
+            "sensor" => sensors.push(child),
             "medium" => media.push(child),
-            "shape" => shapes.push(shapes::read(&child)?),
-            "bsdf" => drop(materials::read(&child)?),
-            "emitter" => emitters.push(read_emitter(&child, &emitters)?),
-            _ => return Err(child.error("unknown element inside <scene>")),
+            "shape" => shapes.extend(child.keep(shapes::read(&child))),
+            // Those that are used are read where they are used.
+            "bsdf" if !is_referred_to.contains(&child.node.id()) => {
+                if let Err(error) = materials::read(&child) {
+                    child.suspicious(format!("no shape uses it, and it could not be read: {}", error.reason));
+                }
+            }
+            "emitter" if !is_referred_to.contains(&child.node.id()) => {
+                emitters.extend(child.keep(read_emitter(&child, &emitters)));
+            }
+            "bsdf" | "emitter" | "texture" | "volume" | "phase" | "sampler" | "film" | "rfilter" | "spectrum" => {}
+            other => {
+                let near = plugin::suggestion(other, TOP_LEVEL.into_iter());
+                child.context.sink.error(child.error(format!("unknown element inside <scene>{near}")));
+            }
         }
     }
-    let integrator = integrator.ok_or_else(|| scene.error("an <integrator> is missing"))?;
-    let (sensor_element, (sensor, sensor_medium)) = sensor.ok_or_else(|| scene.error("a <sensor> is missing"))?;
+    for further in integrators.iter().skip(1) {
+        further.ignored("is one more: the first counts");
+    }
+    let integrator = match integrators.first() {
+        Some(element) => element.keep(sensor::read_integrator(element)),
+        None => Some(Integrator::default()),
+    };
+    let sensor_element = match (sensors.get(options.sensor), sensors.len()) {
+        (Some(sensor), _) => *sensor,
+        (None, 0) => return Err(scene.error("a <sensor> is missing")),
+        (None, count) => return Err(scene.error(format!("sensor {} of {count}, counted from 0", options.sensor))),
+    };
+    let (sensor, sensor_medium) = sensor::read(&sensor_element)?;
     let media = places::read(&media, &shapes, &sensor, &sensor_element, sensor_medium)?;
     let shapes = shapes.into_iter().filter_map(|s| s.shape).collect();
-    let scene_file = SceneFile { file: scene.context.file.clone(), integrator, sensor, media, shapes, emitters };
+    let file = scene.context.tree.file(scene.node).to_owned();
+    let integrator = integrator.unwrap_or_default();
+    let scene_file = SceneFile { file, integrator, sensor, media, shapes, emitters };
     places::check_far_plane(&scene_file, &sensor_element)?;
     Ok(scene_file)
+}
+
+/// Elements that a `<ref>` leads to.
+fn referred_to(scene: &Element<'_>) -> HashSet<tree::NodeId> {
+    let tree = &scene.context.tree;
+    let references = tree.nodes.iter().filter(|n| n.tag == "ref");
+    references.filter_map(|n| tree.ids.get(n.attribute("id")?).copied()).collect()
 }
 
 fn read_emitter(element: &Element<'_>, others: &[Emitter]) -> Result<Emitter, SceneError> {

@@ -10,6 +10,7 @@ use super::description::{Container, Matter, MediumDescription, Place, SceneFile,
 use super::element::Element;
 use super::media;
 use super::shapes::ShapeElement;
+use super::tree::NodeId;
 use crate::error::SceneError;
 use crate::transform::{Transform, to_array};
 use crate::world::bounds_of;
@@ -105,7 +106,7 @@ impl core::ops::DerefMut for Medium<'_> {
 
 struct Found<'a> {
     media: Vec<Medium<'a>>,
-    index: HashMap<roxmltree::NodeId, usize>,
+    index: HashMap<NodeId, usize>,
 }
 
 impl<'a> Found<'a> {
@@ -114,7 +115,7 @@ impl<'a> Found<'a> {
             return Ok(*index);
         }
         let matter = media::read(element)?;
-        let id = element.optional("id")?.unwrap_or_else(|| format!("medium at line {}", element.line()));
+        let id = element.optional("id").unwrap_or_else(|| format!("medium at line {}", element.line()));
         let index = self.media.len();
         let description = MediumDescription { id, matter, places: Vec::new() };
         self.media.push(Medium { description, element: *element });

@@ -1,7 +1,8 @@
 //! Elements with a type and properties: `<shape type="sphere">`. Every property is asked for by
 //! name; what nobody asked for is an error.
 
-use core::cell::Cell;
+use core::cell::{Cell, RefCell};
+use std::collections::BTreeSet;
 use std::path::PathBuf;
 
 use fogbow::spectrum::Spectrum;
@@ -14,13 +15,25 @@ use crate::transform::Transform;
 /// Tags that hold one value.
 const VALUES: [&str; 9] = ["float", "integer", "boolean", "string", "rgb", "spectrum", "point", "vector", "transform"];
 /// Tags of nested objects.
-const OBJECTS: [&str; 10] =
-    ["bsdf", "emitter", "medium", "phase", "volume", "film", "rfilter", "sampler", "ref", "shape"];
+const OBJECTS: [&str; 12] = [
+    "bsdf",
+    "emitter",
+    "medium",
+    "phase",
+    "volume",
+    "film",
+    "rfilter",
+    "sampler",
+    "shape",
+    "texture",
+    "integrator",
+    "sensor",
+];
 
 #[derive(Debug)]
 struct Child<'a> {
     element: Element<'a>,
-    name: Option<String>,
+    name: Option<&'a str>,
     is_used: Cell<bool>,
 }
 
@@ -30,6 +43,8 @@ pub(super) struct Plugin<'a> {
     pub(super) element: Element<'a>,
     pub(super) kind: String,
     children: Vec<Child<'a>>,
+    /// Names that were asked for, for suggestions.
+    asked: RefCell<BTreeSet<String>>,
 }
 
 impl<'a> Plugin<'a> {
@@ -40,35 +55,73 @@ impl<'a> Plugin<'a> {
         for child in element.children()? {
             let is_value = VALUES.contains(&child.tag());
             if !is_value && !OBJECTS.contains(&child.tag()) {
-                return Err(child.error(format!("unknown element inside <{}>", element.tag())));
+                let near = suggestion(child.tag(), VALUES.into_iter().chain(OBJECTS));
+                return Err(child.error(format!("unknown element inside <{}>{near}", element.tag())));
             }
-            let name = if is_value { Some(child.required("name")?) } else { child.optional("name")? };
+            let name = child.name();
+            if is_value && name.is_none() {
+                return Err(child.attribute_error("name", "is missing"));
+            }
             if name.is_some() && children.iter().any(|c| c.name == name) {
                 return Err(child.attribute_error("name", "is given twice"));
             }
             children.push(Child { element: child, name, is_used: Cell::new(false) });
         }
-        Ok(Self { element, kind, children })
+        Ok(Self { element, kind, children, asked: RefCell::default() })
     }
 
     pub(super) fn unknown_type(&self, known: &str) -> SceneError {
-        self.element.attribute_error("type", format!("unknown type \"{}\"; known here: {known}", self.kind))
+        let near = suggestion(&self.kind, known.split([',', ';', ' ']).filter(|word| !word.is_empty()));
+        let reason = format!("unknown type \"{}\"{near}; known here: {known}", self.kind);
+        self.element.attribute_error("type", reason)
     }
 
     /// # Errors
-    /// A child nobody asked for.
+    /// A child nobody asked for; all of them are kept, the last is returned.
     pub(super) fn finish(&self) -> Result<(), SceneError> {
-        let Some(child) = self.children.iter().find(|c| !c.is_used.get()) else { return Ok(()) };
         let owner = format!("<{} type=\"{}\">", self.element.tag(), self.kind);
-        Err(match &child.name {
-            Some(name) => child.element.attribute_error("name", format!("{owner} has no property \"{name}\"")),
-            None => child.element.error(format!("is not expected, or not once more, inside {owner}")),
-        })
+        let mut last = Ok(());
+        for child in self.children.iter().filter(|c| !c.is_used.get()) {
+            let error = match child.name {
+                Some(name) => {
+                    let asked = self.asked.borrow();
+                    let near = suggestion(name, asked.iter().map(String::as_str));
+                    let error = child.element.error_of_use(format!("{owner} has no property \"{name}\"{near}"));
+                    SceneError { attribute: Some("name".to_owned()), ..error }
+                }
+                None => child.element.error_of_use(format!("is not expected, or not once more, inside {owner}")),
+            };
+            if let Err(error) = self.element.instead(error, "ignored", || ()) {
+                self.element.context.sink.error(error.clone());
+                last = Err(error);
+            }
+        }
+        last
+    }
+
+    /// Properties that Mitsuba knows and that have no effect here; what is given of them becomes a note with the reason.
+    pub(super) fn ignore(&self, names: &[&str], reason: &str) {
+        for name in names {
+            if let Some(element) = self.get(name) {
+                element.ignored(format!("has no effect here: {reason}"));
+            }
+        }
+    }
+
+    /// Properties that change nothing in the picture meant, in Mitsuba either: nothing is said of them.
+    pub(super) fn skip(&self, names: &[&str]) {
+        for name in names {
+            self.get(name);
+        }
     }
 
     /// The named child.
     pub(super) fn get(&self, name: &str) -> Option<Element<'a>> {
-        let child = self.children.iter().find(|c| c.name.as_deref() == Some(name))?;
+        let child = self.children.iter().find(|c| c.name == Some(name));
+        if child.is_none() && !self.asked.borrow().contains(name) {
+            self.asked.borrow_mut().insert(name.to_owned());
+        }
+        let child = child?;
         child.is_used.set(true);
         Some(child.element)
     }
@@ -135,8 +188,8 @@ impl<'a> Plugin<'a> {
     pub(super) fn boolean(&self, name: &str, default: bool) -> Result<bool, SceneError> {
         let Some(element) = self.value(name, &["boolean"], &["name", "value"])? else { return Ok(default) };
         match element.required("value")?.trim() {
-            "true" => Ok(true),
-            "false" => Ok(false),
+            yes if yes.eq_ignore_ascii_case("true") => Ok(true),
+            no if no.eq_ignore_ascii_case("false") => Ok(false),
             other => Err(element.attribute_error("value", format!("\"{other}\" is neither true nor false"))),
         }
     }
@@ -149,18 +202,17 @@ impl<'a> Plugin<'a> {
     pub(super) fn word(&self, name: &str, known: &[&'static str]) -> Result<&'static str, SceneError> {
         let first = known.first().copied().unwrap_or_default();
         let Some((value, element)) = self.string(name)? else { return Ok(first) };
-        known
-            .iter()
-            .copied()
-            .find(|w| *w == value)
-            .ok_or_else(|| element.attribute_error("value", format!("\"{value}\" is none of: {}", known.join(", "))))
+        known.iter().copied().find(|w| *w == value).ok_or_else(|| {
+            let near = suggestion(&value, known.iter().copied());
+            element.attribute_error("value", format!("\"{value}\"{near} is none of: {}", known.join(", ")))
+        })
     }
 
     /// The path in a string, relative to the scene file, and the element that holds it.
     pub(super) fn path(&self, name: &str) -> Result<(PathBuf, Element<'a>), SceneError> {
         let (value, element) =
             self.string(name)?.ok_or_else(|| self.element.error(format!("<string name=\"{name}\"> is missing")))?;
-        Ok((element.context.resolve(&value), element))
+        Ok((element.resolve(&value), element))
     }
 
     /// A colour or number that is not negative, and the element that holds it.
@@ -189,7 +241,7 @@ impl<'a> Plugin<'a> {
         let Some(element) = self.value(name, &["point", "vector"], &["name", "value", "x", "y", "z"])? else {
             return Ok(None);
         };
-        element.xyz(0.0, false).map(Some)
+        element.xyz(0.0, true).map(Some)
     }
 
     /// A point or vector, if given.
@@ -208,16 +260,19 @@ impl<'a> Plugin<'a> {
 
     /// The next nested object with the tag. Names that Mitsuba leaves to the author
     /// (`<phase name="first">`, `<ref name="bsdf">`) do not matter; those with a meaning
-    /// (`interior`) are asked for by name.
+    /// (`interior`) are asked for by name before.
     pub(super) fn nested(&self, tag: &str) -> Option<Element<'a>> {
-        let is_free = |name: &Option<String>| match tag {
-            "ref" => name.as_deref().is_none_or(|n| n == "bsdf"),
-            _ => true,
-        };
-        let child = self.children.iter().find(|c| !c.is_used.get() && c.element.tag() == tag && is_free(&c.name))?;
+        let child = self.children.iter().find(|c| !c.is_used.get() && c.element.tag() == tag)?;
         child.is_used.set(true);
         Some(child.element)
     }
+}
+
+/// " (is \"width\" meant?)", if a known name is near to what is written.
+pub(super) fn suggestion<'n>(written: &str, known: impl Iterator<Item = &'n str>) -> String {
+    let near = |name: &str| strsim::jaro_winkler(written, name);
+    let best = known.map(|name| (near(name), name)).max_by(|a, b| a.0.total_cmp(&b.0));
+    best.filter(|(near, _)| *near > 0.85).map_or_else(String::new, |(_, name)| format!(" (is \"{name}\" meant?)"))
 }
 
 /// # Errors

@@ -2,7 +2,6 @@
 
 use super::description::{FovAxis, Integrator, Sensor};
 use super::element::Element;
-use super::lookup;
 use super::plugin::Plugin;
 use crate::error::SceneError;
 use crate::transform::Transform;
@@ -23,6 +22,7 @@ pub(super) fn read_integrator(element: &Element<'_>) -> Result<Integrator, Scene
     }
     let rr_depth = plugin.integer("rr_depth", 5, 1..=1_000_000)?;
     let hide_emitters = plugin.boolean("hide_emitters", false)?;
+    plugin.skip(&["block_size", "samples_per_pass", "timeout"]);
     plugin.finish()?;
     Ok(Integrator {
         max_depth: u32::try_from(max_depth).ok(),
@@ -59,13 +59,12 @@ pub(super) fn read<'a>(element: &Element<'a>) -> Result<(Sensor, Option<Element<
         None => Transform::IDENTITY,
     };
     let medium = match plugin.get("medium") {
-        Some(reference) if reference.tag() == "ref" => Some(lookup(&reference, "medium")?),
-        Some(medium) if medium.tag() == "medium" => {
-            return Err(medium.error("give the medium an id outside, and a <ref> here"));
-        }
-        Some(other) => return Err(other.error("\"medium\" must be a <ref> to a medium")),
+        Some(medium) if medium.tag() == "medium" => Some(medium),
+        Some(other) => return Err(other.wrong_tag("medium")),
         None => None,
     };
+    // A pinhole has everything in focus, and nothing here moves.
+    plugin.skip(&["focus_distance", "shutter_open", "shutter_close"]);
     let film = plugin.nested("film").ok_or_else(|| element.error("a <film> is missing"))?;
     let (width, height) = read_film(&film)?;
     let samples = match plugin.nested("sampler") {
@@ -89,9 +88,9 @@ fn read_film(element: &Element<'_>) -> Result<(u32, u32), SceneError> {
     plugin.word("file_format", &["openexr", "exr", "pfm"])?;
     plugin.word("pixel_format", &["rgb", "rgba"])?;
     plugin.word("component_format", &["float16", "float32"])?;
-    if plugin.boolean("sample_border", false)? {
-        return Err(element.error("sample_border is not supported"));
-    }
+    plugin.skip(&["banner", "attach_log", "high_quality_edges", "sample_border", "compensate"]);
+    plugin
+        .ignore(&["exposure", "gamma", "tonemap_method"], "pictures are written linear, PNG as sRGB (see --exposure)");
     let Some(filter) = plugin.nested("rfilter") else {
         return Err(element.error(
             "<rfilter type=\"box\"/> is missing: no other filter is supported, and Mitsuba's default is another",

@@ -5,8 +5,8 @@ use fogbow::surface::Surface;
 
 use super::description::{Container, Geometry, Material, Shape};
 use super::element::Element;
+use super::materials;
 use super::plugin::Plugin;
-use super::{lookup, materials};
 use crate::error::SceneError;
 use crate::mesh::Mesh;
 use crate::transform::Transform;
@@ -31,12 +31,11 @@ pub(super) fn read<'a>(element: &Element<'a>) -> Result<ShapeElement<'a>, SceneE
     let interior = side(&plugin, "interior")?;
     let exterior = side(&plugin, "exterior")?;
     let material = match plugin.nested("bsdf") {
-        Some(bsdf) => materials::read(&bsdf)?,
-        None => match plugin.nested("ref") {
-            Some(reference) => materials::read(&lookup(&reference, "bsdf")?)?,
-            None => materials::default_material(radiance.is_some()),
-        },
+        // A shape whose material is not known still tells what else is wrong with it.
+        Some(bsdf) => bsdf.keep(materials::read(&bsdf)),
+        None => None,
     };
+    let material = material.unwrap_or_else(|| materials::default_material(radiance.is_some()));
     let geometry = read_geometry(&plugin)?;
     plugin.finish()?;
     let container = match &geometry {
@@ -77,13 +76,12 @@ fn check(
     Ok(())
 }
 
-/// The medium at a side: `<ref name="interior" id="fog"/>`, or a `<medium name="interior">`.
+/// The medium at a side: `<ref name="interior" id="fog"/>` or a `<medium name="interior">`.
 fn side<'a>(plugin: &Plugin<'a>, name: &str) -> Result<Option<Element<'a>>, SceneError> {
     let Some(element) = plugin.get(name) else { return Ok(None) };
     match element.tag() {
         "medium" => Ok(Some(element)),
-        "ref" => lookup(&element, "medium").map(Some),
-        _ => Err(element.error(format!("\"{name}\" must be a <ref> to a medium or a <medium>"))),
+        _ => Err(element.wrong_tag("medium")),
     }
 }
 
