@@ -10,6 +10,7 @@
 //! | [`plume`] | an animation of smoke |
 //! | [`figures`] | figures of papers, rebuilt |
 //! | [`derivatives`] | second derivatives of the fluence by differences |
+//! | [`texture`] | values that vary over surfaces |
 //! | [`statistics`] | what a run took, phase by phase |
 //! | [`compare`] | how far two images are apart |
 //! | [`cli`] | the command line |
@@ -28,6 +29,7 @@ pub mod picture;
 pub mod plume;
 pub mod scene_file;
 pub mod statistics;
+pub mod texture;
 pub mod transform;
 pub mod volume;
 pub mod world;

@@ -24,17 +24,29 @@ const MAX_PIXELS: u64 = 1 << 28;
 
 impl Picture {
     /// Reads an image: `.exr`, `.pfm`, `.hdr`, `.npy` (f32 or f64, height × width × channels) as they
-    /// are, `.png` with the sRGB curve undone.
+    /// are, `.png`, `.jpg`, `.bmp` and `.tga` with the sRGB curve undone.
     ///
     /// # Errors
     /// A file that is missing or broken, or of another kind.
     pub fn read(file: &Path) -> Result<Self, DataError> {
+        Self::read_as(file, false)
+    }
+
+    /// The same, but all kinds as they are.
+    ///
+    /// # Errors
+    /// As [`Picture::read`].
+    pub fn read_raw(file: &Path) -> Result<Self, DataError> {
+        Self::read_as(file, true)
+    }
+
+    fn read_as(file: &Path, is_raw: bool) -> Result<Self, DataError> {
         let extension = file.extension().unwrap_or_default().to_string_lossy().to_lowercase();
-        let known = ["exr", "pfm", "hdr", "png", "npy"];
+        let known = ["exr", "pfm", "hdr", "png", "jpg", "jpeg", "bmp", "tga", "npy"];
         if !known.contains(&extension.as_str()) {
             return Err(DataError::new(file, "", format!("unknown kind of image; known are .{}", known.join(", ."))));
         }
-        Self::from_bytes(file, &extension, &read_file(file)?)
+        Self::decode(file, &extension, &read_file(file)?, is_raw)
     }
 
     /// Reads the bytes of an image with the given extension.
@@ -42,12 +54,19 @@ impl Picture {
     /// # Errors
     /// As [`Picture::read`].
     pub fn from_bytes(file: &Path, extension: &str, bytes: &[u8]) -> Result<Self, DataError> {
+        Self::decode(file, extension, bytes, false)
+    }
+
+    fn decode(file: &Path, extension: &str, bytes: &[u8], is_raw: bool) -> Result<Self, DataError> {
         let picture = match extension {
             "exr" => read_with_adapter(fogbow_std::image::exr::decode, bytes),
             "pfm" => read_with_adapter(fogbow_std::image::pfm::decode, bytes),
             "npy" => read_npy(bytes),
-            "hdr" => read_with_image(bytes, image::ImageFormat::Hdr),
-            "png" => read_with_image(bytes, image::ImageFormat::Png),
+            "hdr" => read_with_image(bytes, image::ImageFormat::Hdr, true),
+            "png" => read_with_image(bytes, image::ImageFormat::Png, is_raw),
+            "jpg" | "jpeg" => read_with_image(bytes, image::ImageFormat::Jpeg, is_raw),
+            "bmp" => read_with_image(bytes, image::ImageFormat::Bmp, is_raw),
+            "tga" => read_with_image(bytes, image::ImageFormat::Tga, is_raw),
             _ => Err("unknown kind of image".to_owned()),
         };
         let picture = picture.map_err(|reason| DataError::new(file, "", reason))?;
@@ -75,7 +94,7 @@ fn read_with_adapter(decode: fn(&[u8]) -> Result<Image, ErrorKind>, bytes: &[u8]
     })
 }
 
-fn read_with_image(bytes: &[u8], format: image::ImageFormat) -> Result<Picture, String> {
+fn read_with_image(bytes: &[u8], format: image::ImageFormat, is_linear: bool) -> Result<Picture, String> {
     let mut reader = image::ImageReader::with_format(Cursor::new(bytes), format);
     let mut limits = image::Limits::default();
     limits.max_image_width = Some(1 << 16);
@@ -83,10 +102,9 @@ fn read_with_image(bytes: &[u8], format: image::ImageFormat) -> Result<Picture, 
     reader.limits(limits);
     let decoded = reader.decode().map_err(|e| format!("is not a usable image: {e}"))?;
     check_size(u64::from(decoded.width()), u64::from(decoded.height()))?;
-    let is_display = format == image::ImageFormat::Png;
     let rgb = decoded.into_rgb32f();
     let (width, height) = (rgb.width() as usize, rgb.height() as usize);
-    let curve = |c: f32| if is_display { linear(c) } else { c };
+    let curve = |c: f32| if is_linear { c } else { linear(c) };
     Ok(Picture { width, height, pixels: rgb.pixels().map(|p| p.0.map(curve)).collect() })
 }
 

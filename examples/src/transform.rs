@@ -76,6 +76,19 @@ impl Transform {
         self.rows.map(|r| r[0] * p[0] + r[1] * p[1] + r[2] * p[2] + r[3])
     }
 
+    /// The transform with its linear part transposed, without translation. That of the inverse maps normals: they stand upright on
+    /// the images of their surfaces, but are not unit any more.
+    #[must_use]
+    pub fn transposed(&self) -> Self {
+        let r = &self.rows;
+        Self::from_columns(
+            [r[0][0], r[0][1], r[0][2]],
+            [r[1][0], r[1][1], r[1][2]],
+            [r[2][0], r[2][1], r[2][2]],
+            [0.0; 3],
+        )
+    }
+
     /// The image of an axis (0, 1 or 2), or of the origin (3).
     #[must_use]
     pub fn column(&self, index: usize) -> [f64; 3] {

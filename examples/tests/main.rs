@@ -3,3 +3,4 @@
 mod broken;
 mod caches;
 mod program;
+mod shapes;

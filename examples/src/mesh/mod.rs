@@ -1,14 +1,15 @@
 //! Triangle meshes and their files.
 
+mod normals;
 mod obj;
 mod ply;
 
 use std::path::Path;
 
-use fogbow::math::{Bounds, Vec3};
+use fogbow::math::{Bounds, Vec2, Vec3};
 
 use crate::error::{DataError, read_file};
-use crate::transform::{Transform, to_array, to_vec3};
+use crate::transform::{Transform, normalized, to_array, to_vec3};
 
 /// Triangles over shared vertices.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -17,10 +18,49 @@ pub struct Mesh {
     pub vertices: Vec<Vec3>,
     /// Three indices into the vertices each; the normal is `(b − a) × (c − a)`.
     pub triangles: Vec<[u32; 3]>,
+    /// Normals (unit) at the vertices, between which they are interpolated; empty where triangles are flat.
+    pub normals: Vec<Vec3>,
+    /// Texture coordinates of the vertices, the second down; empty if there are none.
+    pub texcoords: Vec<Vec2>,
+    /// Which of the vertices are one point, as equal numbers; empty where each is its own.
+    pub points: Vec<u32>,
+    /// Other values of vertices and triangles.
+    pub attributes: Vec<Attribute>,
+}
+
+/// Values of the vertices or triangles of a mesh, such as colours.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Attribute {
+    /// As textures name it: `vertex_…`, or `face_…` for triangles.
+    pub name: String,
+    /// Values of each: 1 or 3.
+    pub channels: usize,
+    /// All values, one vertex or triangle after another.
+    pub values: Vec<f32>,
+}
+
+impl Attribute {
+    /// Whether it belongs to triangles.
+    #[must_use]
+    pub fn is_of_triangles(&self) -> bool {
+        self.name.starts_with("face_")
+    }
+
+    /// The values of a vertex or triangle; one alone counts for all three.
+    #[must_use]
+    pub fn at(&self, index: usize) -> Vec3 {
+        let start = index.saturating_mul(self.channels);
+        match self.values.get(start..start.saturating_add(self.channels)) {
+            Some([x, y, z, ..]) => Vec3::new(*x, *y, *z),
+            Some([one, ..]) => Vec3::splat(*one),
+            _ => Vec3::ZERO,
+        }
+    }
 }
 
 impl Mesh {
-    /// Reads a PLY file: text or binary, triangles and quads.
+    /// Reads a PLY file: text or binary, triangles and quads, with normals, texture coordinates, colours and other values of
+    /// vertices and faces.
     ///
     /// # Errors
     /// A file that is missing, truncated or broken, or holds no triangle with an area.
@@ -64,8 +104,8 @@ impl Mesh {
         Bounds::of(self.vertices.iter().copied())
     }
 
-    /// The image of the mesh. A mirror image turns the normals to the other side, because they
-    /// follow from the order of the corners.
+    /// The image of the mesh. A mirror image turns the normals of triangles to the other side, because they
+    /// follow from the order of the corners; but where vertices have normals of their own, those decide.
     ///
     /// # Errors
     /// Vertices that leave the range of numbers.
@@ -74,7 +114,12 @@ impl Mesh {
             for vertex in &mut self.vertices {
                 *vertex = to_vec3(to_world.point(to_array(*vertex)));
             }
+            let upright = to_world.inverse().unwrap_or(Transform::IDENTITY).transposed();
+            for normal in &mut self.normals {
+                *normal = to_vec3(normalized(upright.point(to_array(*normal))).unwrap_or_default());
+            }
         }
+        self.face_normals();
         self.checked(file)
     }
 
@@ -91,6 +136,15 @@ impl Mesh {
                 let reason = format!("vertex {bad} does not exist: there are {}", self.vertices.len());
                 return Err(DataError::new(file, format!("face {index}"), reason));
             }
+        }
+        for (what, length) in [("normals", self.normals.len()), ("texture coordinates", self.texcoords.len())] {
+            if length != 0 && length != self.vertices.len() {
+                let reason = format!("{length} {what} for {} vertices", self.vertices.len());
+                return Err(DataError::new(file, "", reason));
+            }
+        }
+        if let Some(index) = self.texcoords.iter().position(|at| !at.is_finite()) {
+            return Err(DataError::new(file, format!("vertex {index}"), "texture coordinates are not finite"));
         }
         if !self.triangles.iter().any(|t| has_area(self.corners(*t))) {
             return Err(DataError::new(file, "", "holds no triangle with an area"));

@@ -3,9 +3,9 @@
 use core::fmt::Display;
 use std::path::Path;
 
-use fogbow::math::Vec3;
+use fogbow::math::{Vec2, Vec3};
 
-use super::Mesh;
+use super::{Attribute, Mesh};
 use crate::error::DataError;
 
 /// How values are stored.
@@ -94,17 +94,147 @@ pub(super) fn read(file: &Path, bytes: &[u8]) -> Result<Mesh, DataError> {
             let reason = format!("element \"{}\" has {count} entries, but only {left} bytes follow", section.name);
             return Err(DataError::new(file, "header", reason));
         }
+        let mut roles = Roles::of(section);
         for index in 0..section.count {
             let place = || format!("{} {index}", section.name);
             let fail = |reason: &dyn Display| DataError::new(file, place(), reason);
             match section.name.as_str() {
-                "vertex" => mesh.vertices.push(read_vertex(&mut input, section).map_err(|e| fail(&e))?),
-                "face" => read_face(&mut input, section, &mut mesh.triangles).map_err(|e| fail(&e))?,
+                "vertex" => read_vertex(&mut input, section, &mut roles, &mut mesh).map_err(|e| fail(&e))?,
+                "face" => read_face(&mut input, section, &mut roles, &mut mesh.triangles).map_err(|e| fail(&e))?,
                 _ => skip(&mut input, section).map_err(|e| fail(&e))?,
             }
         }
+        mesh.attributes.append(&mut roles.attributes);
     }
     Ok(mesh)
+}
+
+/// What a property is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Role {
+    Position(usize),
+    Normal(usize),
+    Texcoord(usize),
+    Corners,
+    /// A channel of an attribute.
+    Attribute(usize, usize),
+    Other,
+}
+
+/// What the properties of an element are, and attributes made of them.
+struct Roles {
+    roles: Vec<Role>,
+    attributes: Vec<Attribute>,
+}
+
+impl Roles {
+    /// Names as Mitsuba 3 knows them: `r`, `g`, `b` or `red`, `green`, `blue` are the attribute `color`; others end in `_` and a
+    /// letter or digit for their channel.
+    fn of(section: &Section) -> Self {
+        let mut roles = Self { roles: Vec::new(), attributes: Vec::new() };
+        if section.name != "vertex" && section.name != "face" {
+            return roles;
+        }
+        let is_vertex = section.name == "vertex";
+        let single = |name: &str| section.properties.iter().any(|p| p.name == name && p.count.is_none());
+        let has_normals = is_vertex && ["nx", "ny", "nz"].into_iter().all(single);
+        let pairs = [["u", "v"], ["s", "t"], ["texture_u", "texture_v"]];
+        let texcoords = pairs.into_iter().find(|pair| is_vertex && pair.iter().all(|name| single(name)));
+        let colours = [["r", "g", "b"], ["red", "green", "blue"]];
+        let colours = colours.into_iter().find(|names| names.iter().all(|name| single(name)));
+        let place = |names: &[&str], name: &str| names.iter().position(|n| *n == name);
+        for property in &section.properties {
+            let name = property.name.as_str();
+            let role = if property.count.is_some() {
+                if !is_vertex && is_corners(name) { Role::Corners } else { Role::Other }
+            } else if let Some(axis) = place(&["x", "y", "z"], name).filter(|_| is_vertex) {
+                Role::Position(axis)
+            } else if let Some(axis) = place(&["nx", "ny", "nz"], name).filter(|_| has_normals) {
+                Role::Normal(axis)
+            } else if let Some(axis) = texcoords.and_then(|pair| place(&pair, name)) {
+                Role::Texcoord(axis)
+            } else if let Some(channel) = colours.and_then(|names| place(&names, name)) {
+                roles.attribute(&section.name, "color", channel)
+            } else if let Some((prefix, postfix)) = name.rsplit_once('_') {
+                let schemes = ["xyzw", "rgba", "0123", "1234"];
+                // After "…_0", "…_1" is the second channel, else the first of another scheme.
+                let started = roles.attributes.last().filter(|a| is_of(a, &section.name, prefix)).map(|a| a.channels);
+                let channel = schemes.iter().filter_map(|s| s.find(postfix)).find(|c| *c == started.unwrap_or(0));
+                let is_colour = postfix.len() == 1 && "rgba".contains(postfix);
+                match channel.filter(|c| postfix.len() == 1 && *c < 3) {
+                    Some(channel) => {
+                        let full = if is_colour { format!("{prefix}_color") } else { prefix.to_owned() };
+                        roles.attribute(&section.name, &full, channel)
+                    }
+                    None => Role::Other,
+                }
+            } else {
+                Role::Other
+            };
+            roles.roles.push(role);
+        }
+        // A texture reads one value or three.
+        for slot in &mut roles.roles {
+            if let Role::Attribute(index, channel) = *slot
+                && channel == 1
+                && roles.attributes.get(index).is_some_and(|a| a.channels == 2)
+            {
+                *slot = Role::Other;
+            }
+        }
+        for attribute in &mut roles.attributes {
+            attribute.channels = if attribute.channels == 2 { 1 } else { attribute.channels };
+        }
+        roles
+    }
+
+    /// A channel of the attribute with the name.
+    fn attribute(&mut self, section: &str, name: &str, channel: usize) -> Role {
+        let name = format!("{section}_{name}");
+        let found = self.attributes.iter().position(|a| a.name == name);
+        let index = found.unwrap_or_else(|| {
+            self.attributes.push(Attribute { name, channels: 0, values: Vec::new() });
+            self.attributes.len() - 1
+        });
+        if let Some(attribute) = self.attributes.get_mut(index) {
+            attribute.channels = attribute.channels.max(channel + 1);
+        }
+        Role::Attribute(index, channel)
+    }
+
+    /// Makes room for the values of one more vertex or triangle.
+    fn grow(&mut self) {
+        for attribute in &mut self.attributes {
+            attribute.values.resize(attribute.values.len() + attribute.channels, 0.0);
+        }
+    }
+
+    fn put(&mut self, attribute: usize, channel: usize, value: f64) -> Result<(), String> {
+        let value = value as f32;
+        if !value.is_finite() {
+            return Err("an attribute is not a finite number".to_owned());
+        }
+        if let Some(attribute) = self.attributes.get_mut(attribute) {
+            let start = attribute.values.len().saturating_sub(attribute.channels);
+            if let Some(slot) = attribute.values.get_mut(start + channel) {
+                *slot = value;
+            }
+        }
+        Ok(())
+    }
+
+    /// The values of the last triangle once more.
+    fn repeat(&mut self) {
+        for attribute in &mut self.attributes {
+            let start = attribute.values.len().saturating_sub(attribute.channels);
+            attribute.values.extend_from_within(start..);
+        }
+    }
+}
+
+fn is_of(attribute: &Attribute, section: &str, prefix: &str) -> bool {
+    let rest = attribute.name.strip_prefix(section).and_then(|rest| rest.strip_prefix('_'));
+    rest.is_some_and(|rest| rest == prefix || rest.strip_suffix("_color") == Some(prefix))
 }
 
 fn read_header<'b>(file: &Path, bytes: &'b [u8]) -> Result<(Header, &'b [u8]), DataError> {
@@ -198,33 +328,52 @@ fn is_corners(name: &str) -> bool {
     name == "vertex_indices" || name == "vertex_index"
 }
 
-fn read_vertex(input: &mut Input<'_>, section: &Section) -> Result<Vec3, String> {
-    let mut position = Vec3::ZERO;
-    for property in &section.properties {
+fn read_vertex(input: &mut Input<'_>, section: &Section, roles: &mut Roles, mesh: &mut Mesh) -> Result<(), String> {
+    let (mut position, mut normal, mut texcoord) = ([0.0; 3], None, None);
+    roles.grow();
+    for (number, property) in section.properties.iter().enumerate() {
         let count = property.count.map_or(Ok(1), |c| input.length(c))?;
+        let role = roles.roles.get(number).copied().unwrap_or(Role::Other);
         for _ in 0..count {
             let value = input.number(property.kind)?;
-            let slot = match property.name.as_str() {
-                "x" => &mut position.x,
-                "y" => &mut position.y,
-                "z" => &mut position.z,
-                _ => continue,
-            };
-            *slot = value as f32;
-            if !slot.is_finite() {
-                return Err(format!("{} = {value} is not a finite number", property.name));
+            match role {
+                Role::Position(axis) => {
+                    if !(value as f32).is_finite() {
+                        return Err(format!("{} = {value} is not a finite number", property.name));
+                    }
+                    position[axis] = value as f32;
+                }
+                Role::Normal(axis) => normal.get_or_insert([0.0; 3])[axis] = value as f32,
+                Role::Texcoord(axis) => texcoord.get_or_insert([0.0; 2])[axis] = value as f32,
+                Role::Attribute(attribute, channel) => roles.put(attribute, channel, value)?,
+                Role::Corners | Role::Other => {}
             }
         }
     }
-    Ok(position)
+    mesh.vertices.push(Vec3::from_array(position));
+    // What is no direction counts as none.
+    mesh.normals.extend(normal.map(|n| Vec3::from_array(n).normalize_or_zero()));
+    mesh.texcoords.extend(texcoord.map(Vec2::from_array));
+    Ok(())
 }
 
-fn read_face(input: &mut Input<'_>, section: &Section, triangles: &mut Vec<[u32; 3]>) -> Result<(), String> {
-    for property in &section.properties {
+fn read_face(
+    input: &mut Input<'_>,
+    section: &Section,
+    roles: &mut Roles,
+    triangles: &mut Vec<[u32; 3]>,
+) -> Result<(), String> {
+    let before = triangles.len();
+    roles.grow();
+    for (number, property) in section.properties.iter().enumerate() {
         let count = property.count.map_or(Ok(1), |c| input.length(c))?;
-        if !(is_corners(&property.name) && property.count.is_some()) {
+        let role = roles.roles.get(number).copied().unwrap_or(Role::Other);
+        if role != Role::Corners {
             for _ in 0..count {
-                input.number(property.kind)?;
+                let value = input.number(property.kind)?;
+                if let Role::Attribute(attribute, channel) = role {
+                    roles.put(attribute, channel, value)?;
+                }
             }
             continue;
         }
@@ -244,6 +393,9 @@ fn read_face(input: &mut Input<'_>, section: &Section, triangles: &mut Vec<[u32;
         if count == 4 {
             triangles.push([a, c, d]);
         }
+    }
+    for _ in before + 1..triangles.len() {
+        roles.repeat();
     }
     Ok(())
 }

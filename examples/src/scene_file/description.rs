@@ -9,6 +9,7 @@ use fogbow::surface::Surface;
 
 use crate::mesh::Mesh;
 use crate::picture::Picture;
+use crate::texture::{self, Texture};
 use crate::transform::Transform;
 use crate::volume::Volume;
 
@@ -210,18 +211,67 @@ pub enum Geometry {
         centre: [f64; 3],
         /// Radius (m).
         radius: f64,
+        /// Its own axes: texture coordinates go around the third.
+        axes: Transform,
     },
     /// Triangles, already in world space.
     Mesh(Mesh),
 }
 
 /// What a surface does to light, and on which sides.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Material {
-    /// On the side of the normal.
+    /// On the side of the normal; where textures vary it, with their means.
     pub surface: Surface,
     /// Whether both sides do the same.
     pub is_two_sided: bool,
+    /// What varies over the surface.
+    pub textures: Vec<(Slot, Arc<Texture>)>,
+}
+
+/// A parameter of a surface that a texture may give.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Slot {
+    /// Diffuse reflectance.
+    Diffuse,
+    /// Factor on light reflected as by a mirror.
+    Specular,
+    /// Factor on transmitted light.
+    Transmitted,
+}
+
+impl Slot {
+    /// Sets the parameter; surfaces without it stay as they are.
+    pub fn put(self, surface: &mut Surface, value: Spectrum) {
+        let share = value.max(Spectrum::ZERO).min(Spectrum::ONE);
+        match (self, surface) {
+            (Self::Diffuse, Surface::Lambert { reflectance }) | (Self::Specular, Surface::Mirror { reflectance }) => {
+                *reflectance = share;
+            }
+            // Both together must not reflect more than all light.
+            (Self::Diffuse, Surface::Phong { diffuse, specular, .. }) => {
+                *diffuse = share.min(Spectrum::ONE - *specular)
+            }
+            (Self::Specular, Surface::Phong { diffuse, specular, .. }) => {
+                *specular = share.min(Spectrum::ONE - *diffuse)
+            }
+            (Self::Specular, Surface::Dielectric { reflectance, .. }) => *reflectance = share,
+            (Self::Transmitted, Surface::Dielectric { transmittance, .. }) => *transmittance = share,
+            _ => {}
+        }
+    }
+}
+
+impl Material {
+    /// What the surface does to light at a place.
+    #[must_use]
+    pub fn surface_at(&self, place: &texture::Place<'_>) -> Surface {
+        let mut surface = self.surface;
+        for (slot, texture) in &self.textures {
+            slot.put(&mut surface, texture.at(place));
+        }
+        surface
+    }
 }
 
 /// A light without a surface.

@@ -1,19 +1,23 @@
 //! `<bsdf>`.
 
+use std::sync::Arc;
+
 use fogbow::spectrum::Spectrum;
 use fogbow::surface::Surface;
 
-use super::description::Material;
+use super::description::{Material, Slot};
 use super::element::Element;
 use super::plugin::Plugin;
+use super::textures;
 use crate::error::SceneError;
+use crate::texture::Texture;
 
 const KNOWN: &str = "diffuse, twosided, null, conductor, dielectric, phong";
 
 /// What a shape without a `<bsdf>` reflects; one that shines reflects nothing.
 pub(super) fn default_material(is_emitter: bool) -> Material {
     let reflectance = Spectrum::splat(if is_emitter { 0.0 } else { 0.5 });
-    Material { surface: Surface::Lambert { reflectance }, is_two_sided: false }
+    Material { surface: Surface::Lambert { reflectance }, is_two_sided: false, textures: Vec::new() }
 }
 
 /// The material of a `<bsdf>`.
@@ -22,22 +26,35 @@ pub(super) fn read(element: &Element<'_>) -> Result<Material, SceneError> {
     let material = if plugin.kind == "twosided" {
         let inner = plugin.nested("bsdf").ok_or_else(|| element.error("a <bsdf> is missing inside"))?;
         let inner_plugin = Plugin::new(inner)?;
-        let surface = read_one(&inner_plugin)?;
+        let (surface, textures) = read_one(&inner_plugin)?;
         inner_plugin.finish()?;
         if matches!(surface, Surface::Dielectric { .. } | Surface::Null) {
             return Err(inner.error("light passes through it, so it cannot be made two-sided"));
         }
-        Material { surface, is_two_sided: true }
+        Material { surface, is_two_sided: true, textures }
     } else {
-        Material { surface: read_one(&plugin)?, is_two_sided: false }
+        let (surface, textures) = read_one(&plugin)?;
+        Material { surface, is_two_sided: false, textures }
     };
     plugin.finish()?;
     Ok(material)
 }
 
-fn read_one(plugin: &Plugin<'_>) -> Result<Surface, SceneError> {
+/// What varies over a surface.
+type Textures = Vec<(Slot, Arc<Texture>)>;
+
+fn read_one(plugin: &Plugin<'_>) -> Result<(Surface, Textures), SceneError> {
+    let mut textures = Textures::new();
+    let surface = read_surface(plugin, &mut textures)?;
+    Ok((surface, textures))
+}
+
+fn read_surface(plugin: &Plugin<'_>, textures: &mut Textures) -> Result<Surface, SceneError> {
+    // A colour, or a texture that goes into the slot.
+    let mut share =
+        |name: &str, default: Spectrum, slot| textures::share(plugin, name, default, &mut |t| textures.push((slot, t)));
     match plugin.kind.as_str() {
-        "diffuse" => Ok(Surface::Lambert { reflectance: plugin.share("reflectance", Spectrum::splat(0.5))? }),
+        "diffuse" => Ok(Surface::Lambert { reflectance: share("reflectance", Spectrum::splat(0.5), Slot::Diffuse)? }),
         "null" => Ok(Surface::Null),
         "conductor" => {
             match plugin.string("material")? {
@@ -54,20 +71,20 @@ fn read_one(plugin: &Plugin<'_>) -> Result<Surface, SceneError> {
                     ));
                 }
             }
-            Ok(Surface::Mirror { reflectance: plugin.share("specular_reflectance", Spectrum::ONE)? })
+            Ok(Surface::Mirror { reflectance: share("specular_reflectance", Spectrum::ONE, Slot::Specular)? })
         }
         "dielectric" => {
             let inside = index_of_refraction(plugin, "int_ior", 1.5046)?;
             let outside = index_of_refraction(plugin, "ext_ior", 1.000_277)?;
             Ok(Surface::Dielectric {
                 eta: (inside / outside) as f32,
-                reflectance: plugin.share("specular_reflectance", Spectrum::ONE)?,
-                transmittance: plugin.share("specular_transmittance", Spectrum::ONE)?,
+                reflectance: share("specular_reflectance", Spectrum::ONE, Slot::Specular)?,
+                transmittance: share("specular_transmittance", Spectrum::ONE, Slot::Transmitted)?,
             })
         }
         "phong" => {
-            let diffuse = plugin.share("diffuse_reflectance", Spectrum::splat(0.5))?;
-            let specular = plugin.share("specular_reflectance", Spectrum::splat(0.2))?;
+            let diffuse = share("diffuse_reflectance", Spectrum::splat(0.5), Slot::Diffuse)?;
+            let specular = share("specular_reflectance", Spectrum::splat(0.2), Slot::Specular)?;
             let exponent = plugin.number_in("exponent", 30.0, 0.0..=1e6)? as f32;
             if (diffuse + specular).max_element() > 1.0 + 1e-6 {
                 return Err(plugin.element.error("diffuse_reflectance + specular_reflectance is above 1"));

@@ -10,6 +10,7 @@
 //! | `phase` | `isotropic`, `hg`, `rayleigh`, `blendphase` |
 //! | `shape` | `rectangle`, `cube`, `sphere`, `disk`, `ply`, `obj` |
 //! | `bsdf` | `diffuse`, `twosided`, `null`, `conductor` with material `none`, `dielectric`; and `phong`, which Mitsuba 3 does not know |
+//! | `texture` | `bitmap`, `checkerboard`, `mesh_attribute`, `volume`, `uniform`, `rawconstant`: on reflectances |
 //! | `emitter` | `point`, `spot`, `area`, `directional`, `constant`, `envmap` |
 //!
 //! `<include>`, `<path>`, `<default>` with `$name`, `<alias>`, `<ref>` to anything, and all transforms are understood; files of
@@ -28,6 +29,7 @@ mod plugin;
 mod preprocess;
 mod sensor;
 mod shapes;
+mod textures;
 mod transforms;
 mod tree;
 mod upgrade;
@@ -37,7 +39,7 @@ use std::path::Path;
 
 pub use description::{
     Container, Emitter, FovAxis, Geometry, Integrator, Material, Matter, MediumDescription, Place, SceneFile, Sensor,
-    Shape,
+    Shape, Slot,
 };
 pub use fingerprint::{fingerprint, fingerprint_with};
 pub use notes::{Note, NoteKind};

@@ -249,6 +249,24 @@ impl<'a> Plugin<'a> {
         self.triple(name)
     }
 
+    /// Three numbers of any sign as a colour, or one for all of them.
+    pub(super) fn point_or_number(&self, name: &str) -> Result<Option<Spectrum>, SceneError> {
+        let Some(element) = self.get(name) else { return Ok(None) };
+        match element.tag() {
+            "point" | "vector" => Ok(self.triple(name)?.map(|v| Spectrum(v.map(|c| c as f32)))),
+            _ => Ok(self.colour(name)?.map(|(value, _)| value)),
+        }
+    }
+
+    /// A transform, if given.
+    pub(super) fn transform(&self, name: &str) -> Result<Option<Transform>, SceneError> {
+        let Some(element) = self.get(name) else { return Ok(None) };
+        if element.tag() != "transform" {
+            return Err(element.error(format!("\"{name}\" must be a <transform>")));
+        }
+        transforms::read(&element).map(Some)
+    }
+
     /// The transform `to_world`, if given, and the element that holds it.
     pub(super) fn to_world(&self) -> Result<Option<(Transform, Element<'a>)>, SceneError> {
         let Some(element) = self.get("to_world") else { return Ok(None) };

@@ -5,8 +5,8 @@ use fogbow::surface::Surface;
 
 use super::description::{Container, Geometry, Material, Shape};
 use super::element::Element;
-use super::materials;
 use super::plugin::Plugin;
+use super::{materials, textures};
 use crate::error::SceneError;
 use crate::mesh::Mesh;
 use crate::transform::Transform;
@@ -40,9 +40,16 @@ pub(super) fn read<'a>(element: &Element<'a>) -> Result<ShapeElement<'a>, SceneE
     plugin.finish()?;
     let container = match &geometry {
         Geometry::Cube(to_world) => Some(Container::Cube(*to_world)),
-        Geometry::Sphere { centre, radius } => Some(Container::Sphere { centre: *centre, radius: *radius }),
+        Geometry::Sphere { centre, radius, .. } => Some(Container::Sphere { centre: *centre, radius: *radius }),
         _ => None,
     };
+    let mesh = match &geometry {
+        Geometry::Mesh(mesh) => Some(mesh),
+        _ => None,
+    };
+    for (_, texture) in &material.textures {
+        textures::check_attributes(texture, mesh).map_err(|reason| element.error(reason))?;
+    }
     check(element, &geometry, &material, radiance.is_some(), is_flipped, interior.is_some() || exterior.is_some())?;
     let is_visible = material.surface != Surface::Null;
     let shape = is_visible.then(|| Shape { geometry, is_flipped, material, radiance, line: element.line() });
@@ -115,17 +122,25 @@ fn read_geometry(plugin: &Plugin<'_>) -> Result<Geometry, SceneError> {
             if !(radius > 1e-18 && radius < 1e18) {
                 return Err(plugin.element.error(format!("radius {radius} is beyond what can be computed with")));
             }
-            Ok(Geometry::Sphere { centre, radius })
+            Ok(Geometry::Sphere { centre, radius, axes: to_world })
         }
         "ply" | "obj" => {
             let (file, source) = plugin.path("filename")?;
-            if !plugin.boolean("face_normals", false)? {
-                return Err(plugin.element.error(
-                    "normals are not interpolated here: <boolean name=\"face_normals\" value=\"true\"/> is needed",
-                ));
-            }
+            let is_flat = plugin.boolean("face_normals", false)?;
+            // Each format has its own idea of what is up.
+            let flips = plugin.boolean("flip_tex_coords", plugin.kind == "obj")? != (plugin.kind == "obj");
             let mesh = if plugin.kind == "ply" { Mesh::read_ply(&file) } else { Mesh::read_obj(&file) };
-            let mesh = mesh.and_then(|m| m.transformed(&to_world, &file)).map_err(|e| source.data_error(&e))?;
+            let mut mesh = mesh.map_err(|e| source.data_error(&e))?;
+            if is_flat {
+                mesh.normals = Vec::new();
+            }
+            if flips {
+                mesh.texcoords.iter_mut().for_each(|at| at.y = 1.0 - at.y);
+            }
+            let mut mesh = mesh.transformed(&to_world, &file).map_err(|e| source.data_error(&e))?;
+            if !is_flat {
+                mesh.smooth();
+            }
             Ok(Geometry::Mesh(mesh))
         }
         _ => Err(plugin.unknown_type("rectangle, cube, sphere, disk, ply, obj")),

@@ -16,6 +16,8 @@ pub(super) struct Pieces {
     pub(super) parts: Vec<Part>,
     pub(super) corners: Vec<[Vec3; 3]>,
     pub(super) triangle_parts: Vec<Part>,
+    /// Of each triangle, its number in its mesh.
+    pub(super) triangle_numbers: Vec<u32>,
 }
 
 impl Pieces {
@@ -23,7 +25,7 @@ impl Pieces {
         let mut pieces = Self::default();
         let mut lights = 0_u32..;
         for (index, shape) in (0_u32..).zip(&scene.shapes) {
-            pieces.materials.push(shape.material);
+            pieces.materials.push(shape.material.clone());
             let light = shape.radiance.and_then(|_| lights.next());
             let part = Part { material: index, side: if shape.is_flipped { -1.0 } else { 1.0 }, light };
             pieces.push(shape, part);
@@ -34,12 +36,13 @@ impl Pieces {
     fn push(&mut self, shape: &Shape, part: Part) {
         match &shape.geometry {
             Geometry::Mesh(mesh) => {
-                for triangle in &mesh.triangles {
+                for (number, triangle) in (0_u32..).zip(&mesh.triangles) {
                     let corners = mesh.corners(*triangle);
                     // Without an area there is nothing to hit, and no normal.
                     if has_area(corners) {
                         self.corners.push(corners);
                         self.triangle_parts.push(part);
+                        self.triangle_numbers.push(number);
                     }
                 }
             }
@@ -57,7 +60,7 @@ fn primitive(geometry: &Geometry) -> Option<Primitive> {
     match geometry {
         Geometry::Rectangle(to_world) => flat(to_world, false),
         Geometry::Disk(to_world) => flat(to_world, true),
-        Geometry::Sphere { centre, radius } => {
+        Geometry::Sphere { centre, radius, .. } => {
             Some(Primitive::Sphere { centre: to_vec3(*centre), radius: *radius as f32 })
         }
         Geometry::Cube(to_world) => {

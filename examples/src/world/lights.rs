@@ -184,7 +184,7 @@ fn area_light<'a>(
             let (u, v) = if is_swapped { (v, u) } else { (u, v) };
             QuadLight::new(corner, u, v, radiance).map(Light::Quad)
         }
-        Geometry::Sphere { centre, radius } => {
+        Geometry::Sphere { centre, radius, .. } => {
             SphereLight::new(to_vec3(*centre), *radius as f32, radiance).map(Light::Sphere)
         }
         Geometry::Cube(_) | Geometry::Mesh(_) => {

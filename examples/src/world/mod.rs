@@ -9,6 +9,7 @@
 //! | `triangles` | meshes in a tree |
 //! | `lights` | emitters and lent tables |
 //! | `media` | media and where they are |
+//! | `places` | texture coordinates and interpolated normals |
 //! | `rotated` | rotated grids, whose border reaches as far as Mitsuba's |
 
 mod analytic;
@@ -16,6 +17,7 @@ mod build;
 mod lights;
 mod many;
 mod media;
+mod places;
 mod rotated;
 #[cfg(test)]
 mod tests;
@@ -34,7 +36,8 @@ pub use media::{Media, WithMedium};
 
 use crate::camera::Camera;
 use crate::error::SceneError;
-use crate::scene_file::{Integrator, Material, SceneFile, Sensor};
+use crate::scene_file::{Geometry, Integrator, Material, SceneFile, Sensor};
+use crate::texture::Place;
 use analytic::Few;
 use many::Many;
 use triangles::Triangles;
@@ -75,6 +78,7 @@ pub struct World<'a> {
     many: Option<Many>,
     corners: Vec<[Vec3; 3]>,
     triangle_parts: Vec<Part>,
+    triangle_numbers: Vec<u32>,
     triangles: Option<Triangles>,
     lights: lights::Lights<'a>,
     media: Media<'a>,
@@ -105,6 +109,7 @@ impl<'a> World<'a> {
             many,
             corners: pieces.corners,
             triangle_parts: pieces.triangle_parts,
+            triangle_numbers: pieces.triangle_numbers,
             triangles,
             lights,
             media,
@@ -198,18 +203,30 @@ impl<'a> World<'a> {
         triangles + primitives + trees
     }
 
-    fn hit(&self, ray: &Ray, distance: f32, normal: Vec3, part: &Part) -> Option<Hit> {
+    fn hit(
+        &self,
+        ray: &Ray,
+        distance: f32,
+        normal: Vec3,
+        part: &Part,
+        place: impl FnOnce(&'a Geometry) -> Option<Place<'a>>,
+    ) -> Option<Hit> {
         let material = self.materials.get(part.material as usize)?;
         let normal = normal * part.side;
         let is_front = normal.dot(ray.direction) < 0.0;
         // Seen from behind, a light is dark, whatever its bsdf does there.
         let light = if is_front { part.light } else { None };
         let normal = if material.is_two_sided && !is_front { -normal } else { normal };
-        Some(Hit { distance, normal, surface: material.surface, light })
+        let surface = if material.textures.is_empty() {
+            material.surface
+        } else {
+            material.surface_at(&place(&self.scene.shapes.get(part.material as usize)?.geometry)?)
+        };
+        Some(Hit { distance, normal, surface, light })
     }
 }
 
-impl Scene for World<'_> {
+impl<'a> Scene for World<'a> {
     #[inline]
     fn closest_hit(&self, ray: &Ray) -> Option<Hit> {
         let analytic = match &self.many {
@@ -222,11 +239,19 @@ impl Scene for World<'_> {
         {
             let [a, b, c] = self.corners.get(index as usize)?;
             let normal = (*b - *a).cross(*c - *a).normalize_or(-ray.direction);
-            return self.hit(ray, t, normal, self.triangle_parts.get(index as usize)?);
+            let number = *self.triangle_numbers.get(index as usize)? as usize;
+            let place = |geometry: &'a Geometry| {
+                let Geometry::Mesh(mesh) = geometry else { return None };
+                let point = ray.at(t);
+                Some(places::of_triangle(mesh, number, places::weights([*a, *b, *c], point), point))
+            };
+            return self.hit(ray, t, normal, self.triangle_parts.get(index as usize)?, place);
         }
         let (t, index) = analytic?;
-        let normal = self.primitives.get(index as usize)?.normal(ray.at(t));
-        self.hit(ray, t, normal, self.parts.get(index as usize)?)
+        let primitive = self.primitives.get(index as usize)?;
+        let normal = primitive.normal(ray.at(t));
+        let place = |geometry: &'a Geometry| Some(places::of_form(geometry, primitive, ray.at(t)));
+        self.hit(ray, t, normal, self.parts.get(index as usize)?, place)
     }
 
     #[inline]

@@ -94,7 +94,7 @@ fn brute_force(geometry: &Geometry, ray: &Ray) -> (f64, [f64; 3], f64) {
             }
             best
         }
-        Geometry::Sphere { centre, radius } => {
+        Geometry::Sphere { centre, radius, .. } => {
             let d = to_array(ray.direction);
             let f = [0, 1, 2].map(|i| f64::from(ray.origin[i]) - centre[i]);
             let (a, b, c) = (dot(d, d), dot(f, d), dot(f, f) - radius * radius);

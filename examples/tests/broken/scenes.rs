@@ -150,7 +150,6 @@ const CASES: &[(&str, &str, &[&str])] = &[
         "<bsdf type=\"null\"/>",
         &["<bsdf type=\"null\">", "two-sided"],
     ),
-    ("<boolean name=\"face_normals\" value=\"true\"/>", "", &["<shape type=\"ply\">", "face_normals"]),
     (
         "<boolean name=\"face_normals\" value=\"true\"/>",
         "<boolean name=\"face_normals\" value=\"yes\"/>",

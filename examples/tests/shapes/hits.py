@@ -1,0 +1,88 @@
+#!/usr/bin/env python3
+"""Writes the files beside it: small meshes and pictures, and hits.txt, which holds what the independent renderer (Python package
+`mitsuba` 3.9.1) finds along rays through hits.xml. Each line: origin, direction; distance, geometric normal, shading normal,
+reflectance; or origin, direction and `-` where nothing is hit.
+
+    python3 hits.py
+"""
+
+import os
+import random
+import struct
+import zlib
+
+import mitsuba as mi
+
+HERE = os.path.dirname(os.path.abspath(__file__))
+
+
+def png(name, width, height, rows):
+    """An 8-bit RGB picture."""
+    raw = b"".join(b"\0" + bytes(row) for row in rows)
+    chunk = lambda kind, data: struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+    header = struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)
+    data = b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + chunk(b"IDAT", zlib.compress(raw, 9)) + chunk(b"IEND", b"")
+    open(os.path.join(HERE, name), "wb").write(data)
+
+
+def meshes(rng):
+    """A bent sheet of 3 x 3 points: as PLY with everything a vertex and a face can have, and as OBJ without normals."""
+    points = [(x, y, 0.3 * x * x - 0.2 * y * x) for y in (-1, 0, 1) for x in (-1, 0, 1)]
+    faces = []
+    for y in range(2):
+        for x in range(2):
+            a = 3 * y + x
+            faces += [(a, a + 1, a + 4), (a, a + 4, a + 3)]
+    normal = lambda p: (-0.6 * p[0] + 0.2 * p[1], 0.2 * p[0], 1.0)
+    with open(os.path.join(HERE, "sheet.ply"), "wb") as ply:
+        ply.write(b"ply\nformat binary_big_endian 1.0\ncomment a bent sheet\nelement vertex 9\n")
+        for name in ("x", "y", "z", "nx", "ny", "nz", "u", "v", "r", "g", "b", "weight_x", "unused"):
+            ply.write(b"property float %s\n" % name.encode())
+        ply.write(b"element face 8\nproperty list uchar int vertex_indices\n")
+        for name in ("r", "g", "b"):
+            ply.write(b"property double %s\n" % name.encode())
+        ply.write(b"end_header\n")
+        for p in points:
+            colour = [round(rng.random(), 3) for _ in range(3)]
+            ply.write(struct.pack(">13f", *p, *normal(p), 0.5 + 0.4 * p[0], 0.5 - 0.3 * p[1], *colour, rng.random(), 7.0))
+        for f in faces:
+            ply.write(struct.pack(">B3i3d", 3, *f, *(round(rng.random(), 3) for _ in range(3))))
+    with open(os.path.join(HERE, "sheet.obj"), "w") as obj:
+        obj.write("# a bent sheet\no sheet\n")
+        obj.writelines("v %g %g %g\n" % p for p in points)
+        obj.writelines("vt %g %g\n" % (0.5 + 0.5 * p[0], 0.5 + 0.25 * p[1]) for p in points)
+        # One seam of texture coordinates: normals do not notice.
+        obj.write("vt 0.1 0.9\ng left\n")
+        for number, f in enumerate(faces):
+            corners = [(i + 1, 10 if number == 3 and i == 4 else i + 1) for i in f]
+            obj.write("f " + " ".join("%d/%d" % c for c in corners) + "\n")
+    with open(os.path.join(HERE, "fold.obj"), "w") as obj:
+        obj.write("v -1 -1 0\nv 1 -1 0\nv 1 1 0.5\nv -1 1 0.5\nvn 0.3 0 1\nvn -0.3 0.1 1\ng quad\nf 1//1 2//2 3//2 4//1\n")
+
+
+def main():
+    rng = random.Random(7)
+    png("pattern.png", 5, 3, [[rng.randrange(256) for _ in range(15)] for _ in range(3)])
+    meshes(rng)
+    mi.set_variant("scalar_rgb")
+    scene = mi.load_file(os.path.join(HERE, "hits.xml"))
+    lines = []
+    for shape in scene.shapes():
+        box = shape.bbox()
+        for _ in range(14):
+            inside = [box.min[i] + (box.max[i] - box.min[i]) * rng.random() for i in range(3)]
+            origin = [inside[i] + rng.gauss(0, 3) for i in range(3)]
+            offset = [inside[i] - origin[i] for i in range(3)]
+            length = sum(c * c for c in offset) ** 0.5
+            # What the file holds is what both are asked.
+            origin = [float("%.6g" % c) for c in origin]
+            direction = mi.Vector3f([float("%.6g" % (c / length)) for c in offset])
+            si = scene.ray_intersect(mi.Ray3f(origin, direction / mi.ScalarFloat(sum(c * c for c in direction) ** 0.5)))
+            line = list(origin) + list(direction)
+            if si.is_valid():
+                line += [si.t, *si.n, *si.sh_frame.n, *si.bsdf().eval_diffuse_reflectance(si)]
+            lines.append(" ".join("%.6g" % c for c in line) + ("" if si.is_valid() else " -"))
+    open(os.path.join(HERE, "hits.txt"), "w").write("\n".join(lines) + "\n")
+
+
+main()
