@@ -1,6 +1,6 @@
 //! What covariances are used for in `fogbow render`, and the grid they come from.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::{Arg, Args, ValueEnum};
 use fogbow::bytes::Crc;
@@ -18,8 +18,8 @@ use fogbow_std::progress::Control;
 use fogbow_std::threads::{self, Ending, Threads};
 
 use super::defaults::{unit_outline, with_default};
+use super::scene::SceneArguments;
 use super::{Failure, output};
-use crate::scene_file::fingerprint;
 use crate::statistics::Statistics;
 use crate::world::{WithMedium, World};
 
@@ -121,7 +121,7 @@ impl core::error::Error for Stopped {}
 /// Fills or reads a grid, with a medium of any type.
 pub(crate) struct GridJob<'a> {
     pub(crate) arguments: &'a CovarianceArguments,
-    pub(crate) scene: &'a Path,
+    pub(crate) scene: &'a SceneArguments,
     /// Whether nothing but kernels of photon beams come from it.
     pub(crate) is_for_kernels: bool,
     pub(crate) world: &'a World<'a>,
@@ -175,12 +175,12 @@ impl WithMedium for GridJob<'_> {
 
 impl CovarianceArguments {
     /// What a grid is for: the scene, and how long paths may grow.
-    fn tag(&self, scene: &Path, paths: &path::Settings) -> Result<u64, Failure> {
+    fn tag(&self, scene: &SceneArguments, paths: &path::Settings) -> Result<u64, Failure> {
         if !self.is_named() {
             return Ok(0);
         }
         let mut crc = Crc::new();
-        crc.add(&fingerprint(scene)?.to_le_bytes());
+        crc.add(&scene.fingerprint()?.to_le_bytes());
         for number in [paths.max_scatterings, paths.roulette_after] {
             crc.add(&number.to_le_bytes());
         }

@@ -1,7 +1,5 @@
 //! `fogbow render --method march`.
 
-use std::path::Path;
-
 use fogbow::bake::{BakeMemory, Orders, ProbeGrid, Quantity, bytes};
 use fogbow::host::Medium;
 use fogbow::light::Light;
@@ -19,6 +17,7 @@ use super::Failure;
 use super::bake::is_made_for;
 use super::covariance::MarchArguments;
 use super::render::{LAYERS, Shot, write_layers};
+use super::scene::SceneArguments;
 use crate::error::read_file;
 use crate::world::{WithMedium, World};
 
@@ -37,7 +36,7 @@ pub(super) struct MarchJob<'a> {
 /// A file that is no bake, or of another scene, or one that lacks light or a part of the medium.
 pub(super) fn baked(
     arguments: &MarchArguments,
-    scene: &Path,
+    scene: &SceneArguments,
     paths: &path::Settings,
     world: &World<'_>,
 ) -> Result<Option<ProbeGrid<'static>>, Failure> {

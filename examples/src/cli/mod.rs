@@ -4,6 +4,7 @@
 
 mod bake;
 mod bias_layers;
+mod check;
 mod choice;
 mod compare;
 pub(crate) mod covariance;
@@ -20,6 +21,7 @@ mod radiance_cache;
 mod records;
 pub(crate) mod render;
 mod report;
+mod scene;
 mod vpl;
 
 use std::process::ExitCode;
@@ -27,6 +29,7 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 
 pub use bake::BakeArguments;
+pub use check::CheckArguments;
 pub use compare::CompareArguments;
 pub use covariance::{CovarianceArguments, MarchArguments, Step};
 pub use figures::{FiguresArguments, Paper};
@@ -37,6 +40,7 @@ pub use probe::{HessianArguments, Probe, ProbeArguments};
 pub use radiance_cache::{CacheArguments, Kind, Single};
 pub use records::RecordsArguments;
 pub use render::{Method, RenderArguments};
+pub use scene::{ReadArguments, SceneArguments};
 pub use vpl::{Clamp, Recovery, Switch, VplArguments};
 
 /// Light in fog, smoke and clouds.
@@ -53,6 +57,8 @@ pub struct Arguments {
 pub enum Command {
     /// Renders a Mitsuba 3 scene.
     Render(Box<RenderArguments>),
+    /// Says all at once what of a scene cannot be rendered or looks like a mistake.
+    Check(CheckArguments),
     /// Bakes light in fog into 3D textures for engines.
     Bake(Box<BakeArguments>),
     /// Draws where the records of radiance caches lie.
@@ -80,6 +86,7 @@ pub enum Ending {
 pub fn run(arguments: Arguments) -> ExitCode {
     let result = match arguments.command {
         Command::Render(arguments) => render::run(&arguments),
+        Command::Check(arguments) => check::run(&arguments),
         Command::Bake(arguments) => bake::run(&arguments),
         Command::Records(arguments) => records::run(&arguments),
         Command::Compare(arguments) => compare::run(&arguments),

@@ -10,9 +10,9 @@ use fogbow_std::progress::Control;
 
 use super::covariance::{CovarianceArguments, GridJob};
 use super::render::path_settings;
+use super::scene::SceneArguments;
 use super::{Ending, Failure, output};
 use crate::derivatives::{Upper, difference, filtered};
-use crate::scene_file::SceneFile;
 use crate::statistics::Statistics;
 use crate::world::{Storage, World};
 
@@ -42,8 +42,9 @@ pub enum Probe {
 #[derive(Debug, Args)]
 #[command(group = clap::ArgGroup::new("where").required(true))]
 pub struct HessianArguments {
-    /// The scene file.
-    pub scene: PathBuf,
+    /// The scene.
+    #[command(flatten)]
+    pub scene: SceneArguments,
     /// A point; may be repeated.
     #[arg(long, value_name = "X,Y,Z", value_parser = point, allow_hyphen_values = true, group = "where")]
     pub at: Vec<Vec3>,
@@ -116,7 +117,7 @@ fn hessian(arguments: &HessianArguments) -> Result<Ending, Failure> {
         output::check_place(file)?;
     }
     arguments.covariance.check()?;
-    let scene = SceneFile::read(&arguments.scene)?;
+    let scene = arguments.scene.read(arguments.quiet)?;
     let mut storage = Storage::new(&scene);
     let world = World::new(&scene, &mut storage)?;
     if world.media().glow() {

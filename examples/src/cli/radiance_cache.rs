@@ -1,6 +1,6 @@
 //! `fogbow render` by radiance caching.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::Duration;
 
 use clap::{Arg, Args, ValueEnum};
@@ -30,10 +30,10 @@ use fogbow_std::tiles::{self, Outcome};
 use super::covariance::Stopped;
 use super::defaults::{unit_outline, with_default};
 use super::image_sampling::is_computed;
+use super::scene::SceneArguments;
 use super::{Failure, output};
 use crate::camera::Camera;
 use crate::error::SceneError;
-use crate::scene_file::fingerprint;
 use crate::world::{WithMedium, World};
 
 /// Of `--method radiance-cache`.
@@ -96,12 +96,12 @@ impl CacheArguments {
     }
 
     /// What caches in files are for: all that changes the light of a scene, and not the camera.
-    pub(super) fn tag(&self, scene: &Path, paths: &path::Settings) -> Result<u64, SceneError> {
+    pub(super) fn tag(&self, scene: &SceneArguments, paths: &path::Settings) -> Result<u64, SceneError> {
         if !self.has_files() {
             return Ok(0);
         }
         let mut crc = Crc::new();
-        crc.add(&fingerprint(scene)?.to_le_bytes());
+        crc.add(&scene.fingerprint()?.to_le_bytes());
         let path::Settings { max_scatterings, roulette_after, lights_visible } = *paths;
         for number in [max_scatterings, roulette_after, u32::from(lights_visible)] {
             crc.add(&number.to_le_bytes());

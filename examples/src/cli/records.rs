@@ -15,16 +15,17 @@ use fogbow_std::tiles;
 use super::radiance_cache::{CacheArguments, CacheJob, Kind};
 use super::render::path_settings;
 use super::report::Bar;
+use super::scene::SceneArguments;
 use super::{Ending, Failure, output};
 use crate::camera::Camera;
-use crate::scene_file::SceneFile;
 use crate::world::{Storage, World, light_tree, view};
 
 /// Draws where the records of radiance caches lie.
 #[derive(Debug, Args)]
 pub struct RecordsArguments {
-    /// The scene file.
-    pub scene: PathBuf,
+    /// The scene.
+    #[command(flatten)]
+    pub scene: SceneArguments,
     /// Cache to draw; may be repeated [default: all].
     #[arg(long, value_name = "CACHE", value_enum)]
     pub kind: Vec<Kind>,
@@ -83,7 +84,7 @@ const KINDS: [(Kind, Spectrum); 4] = [
 pub(super) fn run(arguments: &RecordsArguments) -> Result<Ending, Failure> {
     output::check(&arguments.output)?;
     arguments.cache.check()?;
-    let mut scene = SceneFile::read(&arguments.scene)?;
+    let mut scene = arguments.scene.read(arguments.quiet)?;
     if let Some([origin, target]) = arguments.camera {
         scene = scene.seen_from(origin, target).map_err(|reason| format!("--camera: {reason}"))?;
     }

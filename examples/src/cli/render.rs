@@ -33,6 +33,7 @@ use super::march::{self, MarchJob};
 use super::photon_beams::{BeamArguments, BeamJob, Kernel};
 use super::radiance_cache::{Audited, CacheArguments, CacheJob};
 use super::report::{Bar, Report};
+use super::scene::SceneArguments;
 use super::vpl::{self, Audit, VplArguments, VplJob};
 use super::{Ending, Failure, bias_layers, ellipsoids, output};
 use crate::camera::Camera;
@@ -44,8 +45,9 @@ use crate::world::{Storage, WithMedium, World, light_tree, view};
 #[derive(Debug, Args)]
 #[command(mut_args(told))]
 pub struct RenderArguments {
-    /// The scene file.
-    pub scene: PathBuf,
+    /// The scene.
+    #[command(flatten)]
+    pub scene: SceneArguments,
     /// How light is computed [default: radiance-cache; path with a limit on depth, and where only mirrors and glass
     /// scatter light].
     #[arg(long, value_enum)]
@@ -238,7 +240,7 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<Ending, Failure> {
 /// Renders; writes nothing.
 pub(crate) fn render(arguments: &RenderArguments) -> Result<Rendered, Failure> {
     let mut statistics = Statistics::default();
-    let mut scene = statistics.time("read", || SceneFile::read(&arguments.scene))?;
+    let mut scene = statistics.time("read", || arguments.scene.read(arguments.quiet))?;
     if let Some([origin, target]) = arguments.camera {
         scene = scene.seen_from(origin, target).map_err(|reason| format!("--camera: {reason}"))?;
     }
@@ -424,7 +426,7 @@ impl RenderArguments {
 fn outputs(arguments: &RenderArguments) -> Result<Vec<PathBuf>, Failure> {
     let mut outputs = arguments.output.clone();
     if outputs.is_empty() {
-        let stem = arguments.scene.file_stem().ok_or("the scene has no name")?;
+        let stem = arguments.scene.file.file_stem().ok_or("the scene has no name")?;
         outputs = ["png", "exr"]
             .map(|extension| {
                 let mut name = stem.to_owned();

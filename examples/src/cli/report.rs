@@ -237,7 +237,7 @@ impl Report<'_> {
              \"seconds\": {{{phases}\n  }},\n  \"counts\": {{\"samples\": {}, \"rays\": {}, \"shadow_rays\": {}, \
              \"collisions\": {}, \"medium_lookups\": {}, \"medium_segments\": {}, \"cache_lookups\": {}, \"cache_misses\": {}, \"non_finite\": {}}},\n  \
              {energy}{findings}{noise}\"records\": {{{records}}},\n  \"bytes\": {{{bytes}}}\n}}\n",
-            quoted(&self.arguments.scene.display().to_string()),
+            quoted(&self.arguments.scene.file.display().to_string()),
             match self.choice.method {
                 Method::Path => "path",
                 Method::RadianceCache => "radiance-cache",

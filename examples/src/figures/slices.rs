@@ -9,6 +9,7 @@ use fogbow_std::film::Image;
 use fogbow_std::progress::Control;
 
 use super::{Plan, montage, percent, rendered};
+use crate::cli::SceneArguments;
 use crate::cli::covariance::GridJob;
 use crate::cli::render::path_settings;
 use crate::cli::{CovarianceArguments, Failure};
@@ -54,7 +55,7 @@ fn fill(plan: &Plan, edge: u32, paths: u64, seed: u64) -> Result<Filled, Failure
     let mut statistics = Statistics::default();
     let grid = world.media().with(GridJob {
         arguments: &arguments,
-        scene: &file,
+        scene: &SceneArguments::plain(file),
         is_for_kernels: false,
         world: &world,
         lights: (&world.lights()).into(),

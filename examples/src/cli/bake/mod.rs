@@ -13,11 +13,11 @@ use fogbow::math::{Bounds, Vec3};
 use fogbow::path;
 
 use super::defaults::{unit_outline, with_default};
+use super::scene::{ReadArguments, SceneArguments};
 use super::{Ending, Failure, output};
 use crate::bake::texture::Texel;
 use crate::bake::{Baked, Layout};
 use crate::error::read_file;
-use crate::scene_file::{SceneFile, fingerprint};
 use crate::world::{Storage, World, light_tree, view};
 use job::BakeJob;
 use write::Target;
@@ -33,6 +33,9 @@ pub struct BakeArguments {
     /// The scene file.
     #[arg(required_unless_present = "from_file")]
     pub scene: Option<PathBuf>,
+    /// How it is read.
+    #[command(flatten)]
+    pub reading: ReadArguments,
     /// Bakes nothing but writes what is in a .bake file in other formats.
     #[arg(long, value_name = "FILE.bake", conflicts_with_all = ["scene", "region", "spacing", "counts", "basis", "quantity", "orders", "error", "passes", "per_light", "resume"])]
     pub from_file: Option<PathBuf>,
@@ -305,10 +308,11 @@ pub(super) fn run(arguments: &BakeArguments) -> Result<Ending, Failure> {
         output::check_place(file)?;
     }
     arguments.kept()?;
-    let Some(scene) = &arguments.scene else {
+    let Some(file) = &arguments.scene else {
         let file = arguments.from_file.as_deref().ok_or("there is no scene to bake")?;
         return finish(arguments, from_file(file)?, Ending::Done, &arguments.output);
     };
+    let scene = &SceneArguments { file: file.clone(), reading: arguments.reading.clone() };
     if !arguments.per_light {
         let (made, ending) = match bake(arguments, scene, None) {
             Err(error) if error.is::<super::covariance::Stopped>() => {
@@ -348,15 +352,15 @@ fn finish(arguments: &BakeArguments, made: Made, ending: Ending, files: &[PathBu
 ///
 /// # Errors
 /// None, or more than anybody wants.
-fn light_count(file: &Path) -> Result<u32, Failure> {
+fn light_count(file: &SceneArguments) -> Result<u32, Failure> {
     /// Layers of light in files.
     const MOST: usize = 64;
-    let scene = SceneFile::read(file)?;
+    let scene = file.read(true)?;
     let mut storage = Storage::new(&scene);
     match World::new(&scene, &mut storage)?.lights().len() {
-        0 => Err(format!("{}: has no lights, so there is nothing to bake", file.display()).into()),
+        0 => Err(format!("{}: has no lights, so there is nothing to bake", file.file.display()).into()),
         count if count > MOST => {
-            Err(format!("--per-light: {} has {count} lights; at most {MOST} are baked one by one", file.display())
+            Err(format!("--per-light: {} has {count} lights; at most {MOST} are baked one by one", file.file.display())
                 .into())
         }
         count => Ok(count as u32),
@@ -385,15 +389,17 @@ fn from_file(file: &Path) -> Result<Made, Failure> {
 }
 
 /// Bakes a scene, by all its lights or by one of them.
-fn bake(arguments: &BakeArguments, file: &Path, light: Option<u32>) -> Result<(Made, Ending), Failure> {
-    let scene = SceneFile::read(file)?;
+fn bake(arguments: &BakeArguments, file: &SceneArguments, light: Option<u32>) -> Result<(Made, Ending), Failure> {
+    let scene = file.read(true)?;
     let mut storage = Storage::new(&scene);
     let world = World::new(&scene, &mut storage)?;
     let paths = super::render::path_settings(&scene, None);
     let around = world.medium_bounds();
     let needs_medium = arguments.quantity() == Quantity::InScattered;
     let bounds = match (arguments.region, around) {
-        (_, None) if needs_medium => return Err(format!("{}: has no medium to bake light for", file.display()).into()),
+        (_, None) if needs_medium => {
+            return Err(format!("{}: has no medium to bake light for", file.file.display()).into());
+        }
         (Some(region), Some(around)) if needs_medium && !overlap(&region, &around) => {
             let Bounds { min, max } = around;
             return Err(format!(
@@ -408,7 +414,7 @@ fn bake(arguments: &BakeArguments, file: &Path, light: Option<u32>) -> Result<(M
     let counts = arguments.cells(&bounds)?;
     let lights = world.lights();
     if lights.is_empty() && !world.media().glow() {
-        return Err(format!("{}: has no lights, so there is nothing to bake", file.display()).into());
+        return Err(format!("{}: has no lights, so there is nothing to bake", file.file.display()).into());
     }
     let tree = light_tree(&lights);
     let method = arguments.method;
@@ -454,7 +460,12 @@ fn overlap(a: &Bounds, b: &Bounds) -> bool {
 
 /// What a grid in a file is for: in the upper half the light of the scene, in the lower one all else that changes a probe but for what the file's
 /// header says.
-fn tag(arguments: &BakeArguments, scene: &Path, paths: &path::Settings, light: Option<u32>) -> Result<u64, Failure> {
+fn tag(
+    arguments: &BakeArguments,
+    scene: &SceneArguments,
+    paths: &path::Settings,
+    light: Option<u32>,
+) -> Result<u64, Failure> {
     let mut crc = Crc::new();
     let method = arguments.method;
     let of_caches = if method != Source::Path { arguments.error.unwrap_or(0.0).to_bits() } else { 0 };
@@ -468,15 +479,15 @@ fn tag(arguments: &BakeArguments, scene: &Path, paths: &path::Settings, light: O
 }
 
 /// A number for the light of a scene.
-fn of_scene(scene: &Path, paths: &path::Settings) -> Result<u32, Failure> {
+fn of_scene(scene: &SceneArguments, paths: &path::Settings) -> Result<u32, Failure> {
     let mut crc = Crc::new();
-    crc.add(&fingerprint(scene)?.to_le_bytes());
+    crc.add(&scene.fingerprint()?.to_le_bytes());
     crc.add(&paths.max_scatterings.to_le_bytes());
     Ok((crc.value() >> 32) as u32)
 }
 
 /// Whether a grid with a tag has the light of a scene.
-pub(super) fn is_made_for(tag: u64, scene: &Path, paths: &path::Settings) -> Result<bool, Failure> {
+pub(super) fn is_made_for(tag: u64, scene: &SceneArguments, paths: &path::Settings) -> Result<bool, Failure> {
     Ok((tag >> 32) as u32 == of_scene(scene, paths)?)
 }
 
