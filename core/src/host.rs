@@ -5,13 +5,13 @@
 
 pub(crate) mod passing;
 
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 pub use rand_core::Rng;
 
 use crate::math::{Ray, Symmetric3};
 use crate::phase::Phase;
 use crate::spectrum::{Gradient, Hessian, Spectrum};
-use crate::surface::Surface;
+use crate::surface::{Surface, SurfaceSample};
 
 /// Optical properties of a medium at a point.
 ///
@@ -343,11 +343,125 @@ pub struct Hit {
     /// Geometric normal (unit). One-sided surfaces reflect and emit on the side it points to; for
     /// a two-sided one the host turns it against the ray.
     pub normal: Vec3,
+    /// The normal (unit) that scattering goes by: interpolated between vertices, or bent by a texture; where nothing is, the
+    /// geometric one. On its side: their scalar product is positive.
+    pub shading: Vec3,
     /// What the surface does to light, textures already looked up.
     pub surface: Surface,
     /// Index of the area light this surface belongs to, if any. Every area light of a [`World`](crate::world::World) must be
     /// found so, or part of its light is lost: see [`World::lights`](crate::world::World::lights).
     pub light: Option<u32>,
+}
+
+/// Scattering at the surface: [`Surface`]'s answers with [`Hit::shading`] for a normal, and nothing for directions that the two
+/// normals see on different sides. So no light leaks through a smooth mesh, as it would by the shading normal alone (Veach 1997,
+/// § 5.3). Where both normals are the same, these are the surface's own.
+impl Hit {
+    /// Whether both normals see `direction` on the same side.
+    #[inline]
+    fn is_agreed(&self, direction: Vec3) -> bool {
+        (self.normal.dot(direction) > 0.0) == (self.shading.dot(direction) > 0.0)
+    }
+
+    /// Whether `direction` leaves on the side of the normals, by both of them.
+    ///
+    /// ```
+    /// # use fogbow::{host::Hit, math::Vec3, surface::Surface};
+    /// let bent = Hit { distance: 1.0, normal: Vec3::Z, shading: Vec3::new(0.6, 0.0, 0.8), surface: Surface::BLACK, light: None };
+    /// assert!(bent.faces(Vec3::Z) && !bent.faces(Vec3::NEG_Z) && !bent.faces(Vec3::new(-0.96, 0.0, 0.28)));
+    /// ```
+    #[inline]
+    #[must_use]
+    pub fn faces(&self, direction: Vec3) -> bool {
+        self.normal.dot(direction) > 0.0 && self.shading.dot(direction) > 0.0
+    }
+
+    /// Bidirectional scattering function (sr⁻¹), without the cosine: see [`Surface::value`].
+    ///
+    /// ```
+    /// # use fogbow::{host::Hit, math::Vec3, spectrum::Spectrum, surface::Surface};
+    /// let surface = Surface::Lambert { reflectance: Spectrum::ONE };
+    /// let bent = Hit { distance: 1.0, normal: Vec3::Z, shading: Vec3::new(0.6, 0.0, 0.8), surface, light: None };
+    /// let to_light = Vec3::new(0.8, 0.0, 0.6);
+    /// assert_eq!(bent.value(Vec3::Z, to_light), surface.value(Vec3::Z, Vec3::Z, to_light));
+    /// assert!((bent.cosine(to_light) - 0.96).abs() < 1e-6);
+    /// // The shading normal alone would have it shine from beneath.
+    /// assert_eq!(bent.value(Vec3::Z, Vec3::new(0.98, 0.0, -0.2).normalize()), Spectrum::ZERO);
+    /// ```
+    #[inline]
+    #[must_use]
+    pub fn value(&self, to_eye: Vec3, to_light: Vec3) -> Spectrum {
+        if !(self.is_agreed(to_eye) && self.is_agreed(to_light)) {
+            return Spectrum::ZERO;
+        }
+        self.surface.value(self.shading, to_eye, to_light)
+    }
+
+    /// The cosine that goes with [`Hit::value`], negative from behind.
+    ///
+    /// ```
+    /// # use fogbow::{host::Hit, math::Vec3, surface::Surface};
+    /// let wall = Hit { distance: 1.0, normal: Vec3::Z, shading: Vec3::Z, surface: Surface::BLACK, light: None };
+    /// assert_eq!(wall.cosine(Vec3::NEG_Z), -1.0);
+    /// ```
+    #[inline]
+    #[must_use]
+    pub fn cosine(&self, direction: Vec3) -> f32 {
+        self.shading.dot(direction)
+    }
+
+    /// Density (sr⁻¹) with which [`Hit::sample`] draws `to_light`: see [`Surface::pdf`].
+    ///
+    /// ```
+    /// # use fogbow::{host::Hit, math::{Vec3, float::PI}, surface::Surface};
+    /// let wall = Hit { distance: 1.0, normal: Vec3::Z, shading: Vec3::Z, surface: Surface::BLACK, light: None };
+    /// assert!((wall.pdf(Vec3::Z, Vec3::Z) - 1.0 / PI).abs() < 1e-6);
+    /// ```
+    #[inline]
+    #[must_use]
+    pub fn pdf(&self, to_eye: Vec3, to_light: Vec3) -> f32 {
+        if self.is_agreed(to_eye) { self.surface.pdf(self.shading, to_eye, to_light) } else { 0.0 }
+    }
+
+    /// Draws the direction from which light is received: see [`Surface::sample`].
+    ///
+    /// ```
+    /// # use fogbow::{host::Hit, math::{Vec2, Vec3}, spectrum::Spectrum, surface::Surface};
+    /// let surface = Surface::Mirror { reflectance: Spectrum::ONE };
+    /// let bent = Hit { distance: 1.0, normal: Vec3::Z, shading: Vec3::new(0.6, 0.0, 0.8), surface, light: None };
+    /// let sample = bent.sample(Vec3::Z, 0.5, Vec2::ZERO).unwrap();
+    /// assert!((sample.to_light - Vec3::new(0.96, 0.0, 0.28)).length() < 1e-6);
+    /// // Reflected into the surface: that light is lost.
+    /// assert!(bent.sample(Vec3::new(-0.6, 0.0, 0.8), 0.5, Vec2::ZERO).is_none());
+    /// ```
+    #[inline]
+    #[must_use]
+    pub fn sample(&self, to_eye: Vec3, choice: f32, u: Vec2) -> Option<SurfaceSample> {
+        if !self.is_agreed(to_eye) {
+            return None;
+        }
+        let sample = self.surface.sample(self.shading, to_eye, choice, u)?;
+        self.is_agreed(sample.to_light).then_some(sample)
+    }
+
+    /// What power that arrives from `to_light` counts for: the ratio of its cosines to both normals; 1 where they are the same. Light
+    /// on its way from the lights is scattered by the adjoint of what [`Hit::value`] says (Veach 1997, § 5.3.2):
+    /// `f |n_s·ω| |n·ω′| / (|n·ω| |n_s·ω′|)` with `ω` where it comes from and `ω′` where it goes.
+    ///
+    /// ```
+    /// # use fogbow::{host::Hit, math::Vec3, surface::Surface};
+    /// let bent = Hit { distance: 1.0, normal: Vec3::Z, shading: Vec3::new(0.6, 0.0, 0.8), surface: Surface::BLACK, light: None };
+    /// assert_eq!(bent.power_factor(Vec3::Z), 0.8);
+    /// ```
+    #[inline]
+    #[must_use]
+    pub fn power_factor(&self, to_light: Vec3) -> f32 {
+        if self.shading == self.normal {
+            return 1.0;
+        }
+        let geometric = self.normal.dot(to_light).abs();
+        if geometric > 0.0 { self.shading.dot(to_light).abs() / geometric } else { 0.0 }
+    }
 }
 
 /// The surfaces of the world.
@@ -359,7 +473,7 @@ pub struct Hit {
 ///     fn closest_hit(&self, ray: &Ray) -> Option<Hit> {
 ///         let distance = -ray.origin.z / ray.direction.z;
 ///         let surface = Surface::Lambert { reflectance: Spectrum::splat(0.5) };
-///         let hit = Hit { distance, normal: Vec3::Z, surface, light: None };
+///         let hit = Hit { distance, normal: Vec3::Z, shading: Vec3::Z, surface, light: None };
 ///         (distance > 0.0 && distance < ray.length).then_some(hit)
 ///     }
 /// }

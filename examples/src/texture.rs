@@ -129,22 +129,19 @@ impl Texture {
         match self {
             Self::Constant(value) => *value,
             Self::Bitmap { picture, wrap, is_smooth, to_uv } => {
-                let at = to_uv.apply(place.uv) * Vec2::new(picture.width as f32, picture.height as f32);
-                if !at.is_finite() {
-                    return Spectrum::ZERO;
-                }
-                let texel = |x: i64, y: i64| {
-                    let (x, y) = (wrap.index(x, picture.width), wrap.index(y, picture.height));
-                    picture.pixels.get(y * picture.width + x).map_or(Spectrum::ZERO, |p| Spectrum(*p))
-                };
+                let uv = to_uv.apply(place.uv);
                 if !*is_smooth {
-                    return texel(at.x.floor() as i64, at.y.floor() as i64);
+                    let at = uv * Vec2::new(picture.width as f32, picture.height as f32);
+                    let is_number = at.is_finite();
+                    return if is_number {
+                        texel(picture, *wrap, at.x.floor() as i64, at.y.floor() as i64)
+                    } else {
+                        Spectrum::ZERO
+                    };
                 }
-                let at = at - Vec2::splat(0.5);
-                let (low, share) = (at.floor(), at - at.floor());
-                let (x, y) = (low.x as i64, low.y as i64);
-                let row = |y: i64| texel(x, y) * (1.0 - share.x) + texel(x + 1, y) * share.x;
-                row(y) * (1.0 - share.y) + row(y + 1) * share.y
+                let Some(([a, b, c, d], share)) = bilinear(picture, *wrap, uv) else { return Spectrum::ZERO };
+                let row = |a: Spectrum, b: Spectrum| a * (1.0 - share.x) + b * share.x;
+                row(a, b) * (1.0 - share.y) + row(c, d) * share.y
             }
             Self::Checkerboard { parts, to_uv } => {
                 let uv = to_uv.apply(place.uv);
@@ -185,20 +182,39 @@ impl Texture {
     /// How a bump map `scale · value` rises along both texture coordinates: the gradient of its luminance.
     #[must_use]
     pub fn slope(&self, place: &Place<'_>) -> Vec2 {
-        // A quarter of a pixel, or what single precision tells apart.
-        let step = match self {
-            Self::Bitmap { picture, to_uv, .. } => {
-                let factor = to_uv.rows.iter().flat_map(|r| [r[0].abs(), r[1].abs()]).fold(1e-6, f32::max);
-                0.25 / (picture.width.max(picture.height) as f32 * factor)
-            }
-            _ => 1e-3,
-        };
         // Of a colour, what the eye sees of it (ITU-R BT.709).
         let luminance = |c: Spectrum| 0.212_671 * c[0] + 0.715_16 * c[1] + 0.072_169 * c[2];
+        if let Self::Bitmap { picture, wrap, is_smooth: true, to_uv } = self {
+            let Some((texels, share)) = bilinear(picture, *wrap, to_uv.apply(place.uv)) else { return Vec2::ZERO };
+            let [a, b, c, d] = texels.map(luminance);
+            let x = (b - a) * (1.0 - share.y) + (d - c) * share.y;
+            let y = (c - a) * (1.0 - share.x) + (d - b) * share.x;
+            let (x, y) = (x * picture.width as f32, y * picture.height as f32);
+            let [u, v] = to_uv.rows;
+            return Vec2::new(u[0] * x + v[0] * y, u[1] * x + v[1] * y);
+        }
+        let step = 1e-3;
         let value = |offset: Vec2| luminance(self.at(&Place { uv: place.uv + offset, ..*place }));
         let along = |axis: Vec2| (value(axis * step) - value(axis * -step)) / (2.0 * step);
         Vec2::new(along(Vec2::X), along(Vec2::Y))
     }
+}
+
+/// The four pixels around a point, the first row first, and where it lies between them. `None` where it is no number.
+fn bilinear(picture: &Picture, wrap: Wrap, uv: Vec2) -> Option<([Spectrum; 4], Vec2)> {
+    let at = uv * Vec2::new(picture.width as f32, picture.height as f32) - Vec2::splat(0.5);
+    if !at.is_finite() {
+        return None;
+    }
+    let low = at.floor();
+    let (x, y) = (low.x as i64, low.y as i64);
+    let texels = [(x, y), (x + 1, y), (x, y + 1), (x + 1, y + 1)].map(|(x, y)| texel(picture, wrap, x, y));
+    Some((texels, at - low))
+}
+
+fn texel(picture: &Picture, wrap: Wrap, x: i64, y: i64) -> Spectrum {
+    let (x, y) = (wrap.index(x, picture.width), wrap.index(y, picture.height));
+    picture.pixels.get(y * picture.width + x).map_or(Spectrum::ZERO, |p| Spectrum(*p))
 }
 
 /// Trilinear between centres of cells, clamped to the border.

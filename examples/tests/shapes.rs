@@ -32,6 +32,8 @@ fn rays_find_what_the_independent_renderer_finds() {
         // Where both sides do the same, the normal here is turned against the ray.
         let same_side = |mine: Vec3, theirs: Vec3| mine.distance(theirs).min(mine.distance(-theirs));
         assert!(same_side(hit.normal, vector(7)) < 2e-4, "{} on {place}", hit.normal);
+        assert!(same_side(hit.shading, vector(10)) < 2e-3, "{} on {place}", hit.shading);
+        assert!(hit.shading.dot(hit.normal) > 0.0, "{place}");
         let Surface::Lambert { reflectance } = hit.surface else { panic!("{:?} on {place}", hit.surface) };
         assert!(Vec3::from_array(reflectance.0).distance(vector(13)) < 3e-3, "{reflectance:?} on {place}");
         hits += 1;

@@ -249,7 +249,7 @@ impl Scene for Ball {
         }
         let outward = (ray.at(distance) - self.centre).normalize();
         let normal = if outward.dot(ray.direction) > 0.0 { -outward } else { outward };
-        Some(Hit { distance, normal, surface: self.surface, light: None })
+        Some(Hit { distance, normal, shading: normal, surface: self.surface, light: None })
     }
 }
 
@@ -269,7 +269,7 @@ impl Scene for Room {
             return None;
         }
         let normal = -Body::Box(self.bounds).normal(ray.at(distance));
-        Some(Hit { distance, normal, surface: self.surface, light: None })
+        Some(Hit { distance, normal, shading: normal, surface: self.surface, light: None })
     }
 }
 

@@ -114,7 +114,7 @@ fn white_bodies_in_a_furnace_are_as_bright_as_the_sky() {
     seen.assert_is(SKY, 2e-4, "in the fog");
     // On it: irradiance from the sky, which counts as indirect.
     let (at, normal) = (Vec3::Y * 0.5, Vec3::Y);
-    let hit = Hit { distance: 1.0, normal, surface: body.surface, light: None };
+    let hit = Hit { distance: 1.0, normal, shading: normal, surface: body.surface, light: None };
     let seen = estimate(3000, |rng| {
         let direct = make.direct(at, &hit, &mut Generator::child(rng));
         (direct + make.irradiance(at, normal, 4, rng).0.value) / PI
@@ -159,6 +159,7 @@ impl Scene for Bowl {
         (ray.direction.y < 0.0).then_some(Hit {
             distance: 2.0,
             normal: -ray.direction,
+            shading: -ray.direction,
             surface: Surface::BLACK,
             light: None,
         })
@@ -212,7 +213,7 @@ fn irradiance_in_a_hollow_ball_is_a_geometric_series() {
     let lights = [Light::Point(PointLight::new(Vec3::ZERO, intensity).unwrap())];
     let make = estimator(&vacuum, &wall, &lights);
     let (at, normal) = (Vec3::X * 2.0, Vec3::NEG_X);
-    let hit = Hit { distance: 1.0, normal, surface: wall.surface, light: None };
+    let hit = Hit { distance: 1.0, normal, shading: normal, surface: wall.surface, light: None };
     let truth = [1.0, 2.0, 3.0];
     estimate(200, |rng| make.direct(at, &hit, &mut Generator::child(rng))).assert_is(truth, 1e-5, "direct");
     estimate(3000, |rng| make.irradiance(at, normal, 4, rng).0.value).assert_is(truth, 1e-4, "indirect, by paths");
@@ -409,7 +410,13 @@ impl Scene for Lamp {
                 (hit.distance, hit.normal)
             }
         };
-        (distance < ray.length).then_some(Hit { distance, normal, surface: Surface::BLACK, light: Some(0) })
+        (distance < ray.length).then_some(Hit {
+            distance,
+            normal,
+            shading: normal,
+            surface: Surface::BLACK,
+            light: Some(0),
+        })
     }
 }
 

@@ -81,7 +81,7 @@ impl Scene for Sphere {
         let half = half2.sqrt();
         let distance = [-b - half, -b + half].into_iter().find(|&t| t > 0.0 && t < ray.length)?;
         let normal = ray.at(distance).normalize();
-        Some(Hit { distance, normal, surface: self.surface, light: self.light })
+        Some(Hit { distance, normal, shading: normal, surface: self.surface, light: self.light })
     }
 }
 
@@ -293,7 +293,8 @@ fn a_surface_close_to_a_small_lamp_and_far_from_the_eye_gets_all_its_light() {
             // A wall at z = −0.4, seen through nothing from z = 4.
             let t = (-0.4 - ray.origin.z) / ray.direction.z;
             let is_wall = t > 0.0 && t < ray.length;
-            let wall = is_wall.then_some(Hit { distance: t, normal: Vec3::Z, surface: wall, light: None });
+            let wall =
+                is_wall.then_some(Hit { distance: t, normal: Vec3::Z, shading: Vec3::Z, surface: wall, light: None });
             let lamp = lamp.closest_hit(ray);
             if lamp.is_some_and(|l| wall.is_none_or(|w| l.distance < w.distance)) { lamp } else { wall }
         }

@@ -320,7 +320,7 @@ impl Scene for Room<'_> {
         let mut best: Option<Hit> = None;
         let mut offer = |distance: f32, normal: Vec3, surface: Surface, light: Option<u32>| {
             if best.is_none_or(|b| distance < b.distance) {
-                best = Some(Hit { distance, normal, surface, light });
+                best = Some(Hit { distance, normal, shading: normal, surface, light });
             }
         };
         let t = (FLOOR - ray.origin.y) / ray.direction.y;

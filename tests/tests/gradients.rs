@@ -219,7 +219,7 @@ proptest! {
         let normal = if normal.dot(ray.direction) > 0.0 { -normal } else { normal };
         let cosine = -normal.dot(ray.direction);
         prop_assume!(ray.length > 0.3 && cosine > 0.1);
-        let hit = fogbow::host::Hit { distance: ray.length, normal, surface: Surface::BLACK, light: None };
+        let hit = fogbow::host::Hit { distance: ray.length, normal, shading: normal, surface: Surface::BLACK, light: None };
         let pdf = 0.25;
         let arrival = Arrival::from_surface(&ray, &hit, Spectrum::ONE, pdf, &medium, EXACT).unwrap();
         // The same as an area sample whose density over area is frozen at x.

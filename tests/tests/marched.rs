@@ -111,7 +111,7 @@ fn what_marching_missed_has_no_weight_without_bound() {
     let mut settings = Settings::new(Steps::Length(0.1));
     settings.lengths = Lengths::Marched;
     let walk = Walk { world: World { medium: &Sheet, scene: &fogbow::host::Empty, lights: (&[]).into() }, settings };
-    let wall = Hit { distance: 2.0, normal: Vec3::NEG_X, surface: Surface::BLACK, light: None };
+    let wall = Hit { distance: 2.0, normal: Vec3::NEG_X, shading: Vec3::NEG_X, surface: Surface::BLACK, light: None };
     let ray = Ray::new(Vec3::ZERO, Vec3::X);
     let rng = &mut Generator::new(3);
     for u in [0.0, 1e-10] {

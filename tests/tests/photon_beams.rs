@@ -270,12 +270,14 @@ impl Scene for Room {
         let floor = plane(-1.0).map(|distance| Hit {
             distance,
             normal: Vec3::Y,
+            shading: Vec3::Y,
             surface: Surface::Lambert { reflectance: Spectrum::new(0.7, 0.5, 0.3) },
             light: None,
         });
         let lamp = plane(1.0).filter(|&t| ray.at(t).x.abs() < 0.4 && ray.at(t).z.abs() < 0.4).map(|distance| Hit {
             distance,
             normal: Vec3::NEG_Y,
+            shading: Vec3::NEG_Y,
             surface: Surface::BLACK,
             light: (ray.direction.y > 0.0).then_some(0),
         });

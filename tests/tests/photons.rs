@@ -220,7 +220,7 @@ impl Scene for Floor {
     fn closest_hit(&self, ray: &Ray) -> Option<Hit> {
         let distance = -ray.origin.z / ray.direction.z;
         let is_hit = distance > 0.0 && distance < ray.length;
-        is_hit.then_some(Hit { distance, normal: Vec3::Z, surface: self.0, light: None })
+        is_hit.then_some(Hit { distance, normal: Vec3::Z, shading: Vec3::Z, surface: self.0, light: None })
     }
 }
 

@@ -48,7 +48,7 @@ impl Scene for Room {
             });
         let hits = planes.into_iter().chain(balls).filter(|hit| hit.0 > 0.0 && hit.0 < ray.length);
         let (distance, normal, surface, light) = hits.min_by(|a, b| a.0.total_cmp(&b.0))?;
-        Some(Hit { distance, normal, surface, light })
+        Some(Hit { distance, normal, shading: normal, surface, light })
     }
 }
 

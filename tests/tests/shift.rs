@@ -52,7 +52,13 @@ impl Around {
         let ray = Ray::between(Vec3::ZERO, vertex);
         let end = self.plane.and_then(|(normal, away)| {
             let cosine = -normal.dot(ray.direction);
-            (cosine > 0.0).then(|| Hit { distance: away / cosine, normal, surface: Surface::BLACK, light: None })
+            (cosine > 0.0).then(|| Hit {
+                distance: away / cosine,
+                normal,
+                shading: normal,
+                surface: Surface::BLACK,
+                light: None,
+            })
         });
         Shift::new(&Ray { length: f32::INFINITY, ..ray }, end.as_ref(), self.reach, ray.length)
     }
@@ -210,7 +216,7 @@ impl Scene for Lit {
         if !is_met || distance >= wall.map_or(ray.length, |wall| wall.distance) {
             return wall;
         }
-        Some(Hit { distance, normal: Vec3::NEG_Y, surface: Surface::BLACK, light: Some(0) })
+        Some(Hit { distance, normal: Vec3::NEG_Y, shading: Vec3::NEG_Y, surface: Surface::BLACK, light: Some(0) })
     }
 }
 

@@ -85,7 +85,7 @@ impl Scene for Room {
         let wall = |normal: Vec3, surface: Surface| {
             // One-sided, a metre from the middle.
             let distance = plane(ray, normal, -1.0)?;
-            Some(Hit { distance, normal, surface, light: None })
+            Some(Hit { distance, normal, shading: normal, surface, light: None })
         };
         let floor = wall(Vec3::Y, Surface::Lambert { reflectance: Spectrum::new(0.7, 0.5, 0.3) });
         let (diffuse, specular) = (Spectrum::new(0.2, 0.4, 0.5), Spectrum::splat(0.3));
@@ -94,6 +94,7 @@ impl Scene for Room {
         let lamp = lamp.map(|distance| Hit {
             distance,
             normal: Vec3::NEG_Y,
+            shading: Vec3::NEG_Y,
             surface: Surface::BLACK,
             light: (ray.direction.y > 0.0).then_some(0),
         });
@@ -104,6 +105,7 @@ impl Scene for Room {
         let ball = ball.map(|distance| Hit {
             distance,
             normal: (ray.at(distance) - centre).normalize(),
+            shading: (ray.at(distance) - centre).normalize(),
             surface: Surface::Mirror { reflectance: Spectrum::splat(0.9) },
             light: None,
         });

@@ -26,7 +26,13 @@ impl Scene for Sheets {
         let sheet = |k: u32| ((1.0 + (k as f32 + 0.5) / self.0 as f32) * tilted.z, tilted, Surface::Null);
         let hits = core::iter::once(floor).chain((0..self.0).map(sheet)).filter_map(|(height, normal, surface)| {
             let distance = (height - ray.origin.dot(normal)) / ray.direction.dot(normal);
-            (distance > 0.0 && distance < ray.length).then_some(Hit { distance, normal, surface, light: None })
+            (distance > 0.0 && distance < ray.length).then_some(Hit {
+                distance,
+                normal,
+                shading: normal,
+                surface,
+                light: None,
+            })
         });
         hits.min_by(|a, b| a.distance.total_cmp(&b.distance))
     }
@@ -140,7 +146,7 @@ struct Stuck(core::cell::Cell<u32>);
 impl Scene for Stuck {
     fn closest_hit(&self, _: &Ray) -> Option<Hit> {
         self.0.set(self.0.get() + 1);
-        Some(Hit { distance: 0.0, normal: Vec3::X, surface: Surface::Null, light: None })
+        Some(Hit { distance: 0.0, normal: Vec3::X, shading: Vec3::X, surface: Surface::Null, light: None })
     }
 }
 
@@ -169,7 +175,13 @@ impl Scene for Pane {
         let distance = (1.0 - ray.origin.z) / ray.direction.z;
         let is_within = ray.at(distance).abs().truncate().max_element() < 0.5;
         let is_hit = distance > 0.0 && distance < ray.length && is_within;
-        is_hit.then_some(Hit { distance, normal: Vec3::NEG_Z, surface: Surface::Null, light: Some(0) })
+        is_hit.then_some(Hit {
+            distance,
+            normal: Vec3::NEG_Z,
+            shading: Vec3::NEG_Z,
+            surface: Surface::Null,
+            light: Some(0),
+        })
     }
 }
 

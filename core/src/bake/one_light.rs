@@ -13,7 +13,7 @@ use crate::math::{Ray, Symmetric3};
 /// struct Lamp;
 /// impl Scene for Lamp {
 ///     fn closest_hit(&self, ray: &Ray) -> Option<Hit> {
-///         Some(Hit { distance: 1.0 - ray.origin.x, normal: Vec3::NEG_X, surface: Surface::BLACK, light: Some(3) })
+///         Some(Hit { distance: 1.0 - ray.origin.x, normal: Vec3::NEG_X, shading: Vec3::NEG_X, surface: Surface::BLACK, light: Some(3) })
 ///     }
 /// }
 /// let light = |number| OneLight { scene: &Lamp, number }.closest_hit(&Ray::new(Vec3::ZERO, Vec3::X)).unwrap().light;

@@ -65,7 +65,7 @@ impl Scene for Wall {
         let hit = |i: usize| {
             let distance = (self.faces[i] - ray.origin.x) / ray.direction.x;
             let normal = if i == 0 { Vec3::NEG_X } else { Vec3::X };
-            let hit = Hit { distance, normal, surface: Surface::BLACK, light: None };
+            let hit = Hit { distance, normal, shading: normal, surface: Surface::BLACK, light: None };
             (distance > 1e-6 && distance < ray.length).then_some(hit)
         };
         [0, 1].into_iter().filter_map(hit).min_by(|a, b| a.distance.total_cmp(&b.distance))
@@ -210,7 +210,7 @@ impl Scene for Panel {
         let is_hit = distance > 1e-6 && distance < ray.length && ray.at(distance).yz().abs().max_element() < 0.5;
         let surface = Surface::Lambert { reflectance: Spectrum::splat(0.5) };
         let light = (ray.direction.x < 0.0).then_some(1);
-        is_hit.then_some(Hit { distance, normal: Vec3::X, surface, light })
+        is_hit.then_some(Hit { distance, normal: Vec3::X, shading: Vec3::X, surface, light })
     }
 }
 

@@ -108,7 +108,7 @@ fn counts(eye: Option<(Vec3, &Phase)>, direction: Vec3) -> f32 {
 /// # let (paths, light_samples) = (path::Settings::default(), 1);
 /// let estimator = Estimator { world, surfaces: None, photons: None, walk, paths, light_samples, finest: 1e-3 };
 /// let surface = Surface::Lambert { reflectance: Spectrum::splat(0.5) };
-/// let floor = Hit { distance: 1.0, normal: Vec3::Z, surface, light: None };
+/// let floor = Hit { distance: 1.0, normal: Vec3::Z, shading: Vec3::Z, surface, light: None };
 /// # let near = |light: Spectrum, expected: f32| (light[0] / expected - 1.0).abs() < 1e-5;
 /// let (at, phase, mut rng) = (Vec3::ZERO, estimator.phase(Vec3::ZERO), Generator::new(1));
 /// // Irradiance is I/r² = ¼ W·m⁻²; scattered once 1/4π of it, reflected ρ/π.
@@ -400,11 +400,11 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
             return self.traced(&Ray { origin: leave(point, hit.normal, -ray.direction, hit.distance), ..*ray }, rng);
         };
         // One-sided: black from behind.
-        if reflectance.is_black() || hit.normal.dot(ray.direction) >= 0.0 {
+        if reflectance.is_black() || !hit.faces(-ray.direction) {
             return Spectrum::ZERO;
         }
         let direct = self.direct(point, hit, rng);
-        let known = self.surfaces.and_then(|(cache, reading)| cache.lookup(point, hit.normal, &reading));
+        let known = self.surfaces.and_then(|(cache, reading)| cache.lookup(point, hit.shading, &reading));
         let indirect = known.unwrap_or_else(|| self.indirect(point, hit, rng));
         lambert::value(reflectance) * (direct + indirect)
     }
@@ -426,7 +426,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
         rng: &mut Generator,
     ) -> Spectrum {
         let origin = |to_light: Vec3| leave(point, hit.normal, to_light, hit.distance);
-        let cosine = |to_light: Vec3| Spectrum::splat(hit.normal.dot(to_light).max(0.0));
+        let cosine = |to_light: Vec3| Spectrum::splat(if hit.faces(to_light) { hit.cosine(to_light) } else { 0.0 });
         let weight = FromPoint { sky: with_sky, ..FromPoint::all(point) };
         self.connected(&weight, origin, cosine, random, rng)
     }
@@ -459,7 +459,10 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
 
     /// Irradiance (W·m⁻²) that is not straight from the lights but from a sky, by one path.
     pub fn indirect(&self, point: Vec3, hit: &Hit, rng: &mut Generator) -> Spectrum {
-        let to_light = Frame::around(hit.normal).to_world(warp::cosine_hemisphere(uniform2(rng)));
+        let to_light = Frame::around(hit.shading).to_world(warp::cosine_hemisphere(uniform2(rng)));
+        if !hit.faces(to_light) {
+            return Spectrum::ZERO;
+        }
         let origin = leave(point, hit.normal, to_light, hit.distance);
         let ray = Ray::new(origin, to_light);
         let mut light = self.traced(&ray, rng);
@@ -481,8 +484,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
         rng: &mut Generator,
     ) -> Spectrum {
         let origin = |to_light: Vec3| leave(point, hit.normal, to_light, hit.distance);
-        let value =
-            |to_light: Vec3| hit.surface.value(hit.normal, to_eye, to_light) * hit.normal.dot(to_light).max(0.0);
+        let value = |to_light: Vec3| hit.value(to_eye, to_light) * hit.cosine(to_light).max(0.0);
         self.connected(&FromPoint::all(point), origin, value, random, rng)
     }
 

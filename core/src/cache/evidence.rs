@@ -84,7 +84,7 @@ mod tests {
 
     #[test]
     fn surfaces_at_the_point_itself_leave_numbers() {
-        let hit = |distance| Hit { distance, normal: Vec3::Y, surface: Surface::BLACK, light: None };
+        let hit = |distance| Hit { distance, normal: Vec3::Y, shading: Vec3::Y, surface: Surface::BLACK, light: None };
         let mut openings = Openings::default();
         (0..4096).for_each(|_| openings.add_surface(Some(&hit(0.0)), 0.08));
         assert_eq!(openings.norm(), Spectrum::ZERO, "without a sky");

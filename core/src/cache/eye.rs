@@ -195,7 +195,7 @@ fn look<M: Medium + ?Sized, S: Scene + ?Sized>(
         if ends || matches!(hit.surface, Surface::Lambert { .. }) {
             return;
         }
-        let Some(sample) = hit.surface.sample(hit.normal, to_eye, choice, turn) else { return };
+        let Some(sample) = hit.sample(to_eye, choice, turn) else { return };
         (lights_visible, bounced) = (true, true);
         lights_done = !hit.surface.is_discrete();
         throughput *= sample.weight;
@@ -278,9 +278,9 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized, F: FnMut(Place)> Wanted<'_, M, S, F>
     fn on_surface(&mut self, ray: &Ray, hit: &Hit, is_seen: bool, share: f32) {
         if let Surface::Lambert { reflectance } = hit.surface
             && !reflectance.is_black()
-            && hit.normal.dot(ray.direction) < 0.0
+            && hit.faces(-ray.direction)
         {
-            let (point, normal, to_eye) = (ray.at(hit.distance), Some(hit.normal), Some(-ray.direction));
+            let (point, normal, to_eye) = (ray.at(hit.distance), Some(hit.shading), Some(-ray.direction));
             (self.visit)(Place { point, normal, is_seen, share, to_eye });
         }
     }
@@ -296,7 +296,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized, F: FnMut(Place)> Sight for Wanted<'_
     fn surface(&mut self, ray: &Ray, hit: &Hit, weight: Spectrum) {
         self.on_surface(ray, hit, true, weight.mean().min(1.0));
         let point = ray.at(hit.distance);
-        let direction = Frame::around(hit.normal).to_world(warp::cosine_hemisphere(uniform2(&mut self.rng)));
+        let direction = Frame::around(hit.shading).to_world(warp::cosine_hemisphere(uniform2(&mut self.rng)));
         let origin = leave(point, hit.normal, direction, hit.distance);
         self.beyond(&Ray::new(origin, direction));
     }
@@ -531,7 +531,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Sight for Gather<'_, M, S> {
         let to_eye = -ray.direction;
         let value = match hit.surface {
             Surface::Lambert { reflectance } => {
-                if reflectance.is_black() || hit.normal.dot(ray.direction) >= 0.0 {
+                if reflectance.is_black() || !hit.faces(to_eye) {
                     return;
                 }
                 lambert::value(reflectance)
@@ -551,7 +551,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Sight for Gather<'_, M, S> {
             None => None,
             Some(reader) => {
                 self.seen.lookups += 1;
-                let known = reader.cache.lookup(point, hit.normal, &reader.reading);
+                let known = reader.cache.lookup(point, hit.shading, &reader.reading);
                 self.seen.misses += u32::from(known.is_none());
                 known
             }

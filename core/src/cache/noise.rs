@@ -210,7 +210,7 @@ mod measured {
             let distance = (along * along + 25.0 - ray.origin.length_squared()).sqrt() - along;
             let normal = -ray.at(distance).normalize();
             let is_closed = normal.y > -0.9 && distance < ray.length;
-            is_closed.then_some(Hit { distance, normal, surface: Surface::BLACK, light: None })
+            is_closed.then_some(Hit { distance, normal, shading: normal, surface: Surface::BLACK, light: None })
         }
     }
 

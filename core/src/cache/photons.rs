@@ -534,6 +534,7 @@ mod tests {
             (distance > 1e-6 && distance < ray.length).then_some(Hit {
                 distance,
                 normal: Vec3::NEG_Z,
+                shading: Vec3::NEG_Z,
                 surface: Surface::BLACK,
                 light: None,
             })

@@ -118,7 +118,7 @@ const GRAZING: f32 = 0.1;
 /// impl Scene for Floor {
 ///     fn closest_hit(&self, ray: &Ray) -> Option<Hit> {
 ///         let distance = -ray.origin.z / ray.direction.z;
-///         let hit = Hit { distance, normal: Vec3::Z, surface: Surface::BLACK, light: None };
+///         let hit = Hit { distance, normal: Vec3::Z, shading: Vec3::Z, surface: Surface::BLACK, light: None };
 ///         (distance > 0.0 && distance < ray.length).then_some(hit)
 ///     }
 /// }

@@ -476,7 +476,7 @@ mod tests {
                 return None;
             }
             let normal = Vec3::X * -ray.direction.x.signum();
-            Some(Hit { distance, normal, surface: Surface::BLACK, light: None })
+            Some(Hit { distance, normal, shading: normal, surface: Surface::BLACK, light: None })
         }
     }
 

@@ -102,7 +102,7 @@ impl<'a> Occluders<'a> {
     /// impl Scene for Floor {
     ///     fn closest_hit(&self, ray: &Ray) -> Option<Hit> {
     ///         let distance = (0.1 - ray.origin.z) / ray.direction.z;
-    ///         let hit = Hit { distance, normal: Vec3::Z, surface: Surface::BLACK, light: None };
+    ///         let hit = Hit { distance, normal: Vec3::Z, shading: Vec3::Z, surface: Surface::BLACK, light: None };
     ///         (distance > 0.0 && distance < ray.length).then_some(hit)
     ///     }
     /// }

@@ -154,12 +154,12 @@ impl<'a, M: Medium + ?Sized, S: Scene + ?Sized> FrequencyPhotons<'a, M, S> {
     fn met(&self, light: &LightField, point: Vec3, incoming: Vec3, hit: &Hit, outgoing: Vec3) -> LightField {
         let ray = Ray { origin: point - incoming * hit.distance, direction: incoming, length: f32::INFINITY };
         let curvature = self.world.scene.curvature(&ray, hit);
-        let patch = Patch { normal: hit.normal, curvature, texture: Symmetric3::ZERO };
-        let passes = incoming.dot(hit.normal) * outgoing.dot(hit.normal) > 0.0;
+        let patch = Patch { normal: hit.shading, curvature, texture: Symmetric3::ZERO };
+        let passes = incoming.dot(hit.shading) * outgoing.dot(hit.shading) > 0.0;
         match hit.surface {
             Surface::Null => *light,
             Surface::Dielectric { eta, .. } if passes => {
-                let indices = if incoming.dot(hit.normal) < 0.0 { (1.0, eta) } else { (eta, 1.0) };
+                let indices = if incoming.dot(hit.shading) < 0.0 { (1.0, eta) } else { (eta, 1.0) };
                 light.refracted(outgoing, &patch, indices)
             }
             ref surface => light.reflected(outgoing, &patch, surface),

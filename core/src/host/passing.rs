@@ -40,7 +40,7 @@ pub fn leave(point: Vec3, normal: Vec3, direction: Vec3, distance: f32) -> Vec3 
 /// ```
 /// # use fogbow::{host::Hit, math::{Ray, Vec3}, surface::Surface, world::beyond};
 /// let ray = Ray::new(Vec3::ZERO, Vec3::X).with_length(5.0);
-/// let sheet = Hit { distance: 2.0, normal: Vec3::NEG_X, surface: Surface::Null, light: None };
+/// let sheet = Hit { distance: 2.0, normal: Vec3::NEG_X, shading: Vec3::NEG_X, surface: Surface::Null, light: None };
 /// let rest = beyond(&ray, &sheet);
 /// assert!(rest.origin.x > 2.0 && rest.origin.x < 2.001 && rest.length == 3.0);
 /// ```
@@ -64,7 +64,7 @@ pub fn beyond(ray: &Ray, hit: &Hit) -> Ray {
 ///     fn closest_hit(&self, ray: &Ray) -> Option<Hit> {
 ///         let (x, surface) = if ray.origin.x < 1.0 { (1.0, Surface::Null) } else { (2.0, Surface::BLACK) };
 ///         let distance = (x - ray.origin.x) / ray.direction.x;
-///         (distance > 0.0 && distance < ray.length).then_some(Hit { distance, normal: Vec3::NEG_X, surface, light: None })
+///         (distance > 0.0 && distance < ray.length).then_some(Hit { distance, normal: Vec3::NEG_X, shading: Vec3::NEG_X, surface, light: None })
 ///     }
 /// }
 /// let ray = Ray::new(Vec3::ZERO, Vec3::X);

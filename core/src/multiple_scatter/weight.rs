@@ -42,7 +42,7 @@ impl Shift {
     ///
     /// ```
     /// # use fogbow::{host::Hit, math::{Ray, Vec3}, multiple_scatter::Shift, surface::Surface};
-    /// let wall = Hit { distance: 2.0, normal: Vec3::NEG_X, surface: Surface::Null, light: None };
+    /// let wall = Hit { distance: 2.0, normal: Vec3::NEG_X, shading: Vec3::NEG_X, surface: Surface::Null, light: None };
     /// let shift = Shift::new(&Ray::new(Vec3::ZERO, Vec3::X), Some(&wall), f32::INFINITY, 0.5);
     /// assert_eq!((shift.share, shift.spread), (0.75, Vec3::new(0.5, 0.0, 0.0)));
     /// ```

@@ -290,16 +290,15 @@ fn walk<const BEYOND: bool, M: Medium + ?Sized, S: Scene + ?Sized>(
                     false,
                     |to_light| leave(point, hit.normal, to_light, hit.distance),
                     |to_light| {
-                        let cosine = hit.normal.dot(to_light).abs();
-                        let value = surface.value(hit.normal, to_eye, to_light) * cosine;
-                        (value, surface.pdf(hit.normal, to_eye, to_light))
+                        let value = hit.value(to_eye, to_light) * hit.cosine(to_light).abs();
+                        (value, hit.pdf(to_eye, to_light))
                     },
                     (light_choice, light_u),
                     &mut child,
                 );
                 path.add(path.throughput * light, path.first, path.scatterings);
             }
-            let Some(sample) = surface.sample(hit.normal, to_eye, lobe_choice, lobe_u) else {
+            let Some(sample) = hit.sample(to_eye, lobe_choice, lobe_u) else {
                 break;
             };
             path.throughput *= sample.weight;

@@ -17,6 +17,10 @@ const MAX_SEGMENTS: u32 = 100_000;
 /// take longer to end. Smaller: their powers spread.
 const MAX_SURVIVAL: f32 = 0.99;
 
+/// Largest factor of the adjoint at a shading normal. Larger: photons that graze a triangle may become as bright as a lamp. Smaller: light
+/// is lost; of what arrives at grazing angles alone, a part in ten thousand at this.
+const MOST_POWER: f32 = 100.0;
+
 /// Sends one photon from the lights through the world and tells `visit` what happens to it.
 ///
 /// A light is chosen in proportion to its [power](crate::light::Light::power), a ray drawn by
@@ -125,7 +129,7 @@ pub fn trace<M: Medium + ?Sized, S: Scene + ?Sized>(
         } else if let Some(hit) = hit {
             let point = reach.at(hit.distance);
             let to_eye = -ray.direction;
-            let sample = hit.surface.sample(hit.normal, to_eye, lobe_choice, lobe_u);
+            let sample = hit.sample(to_eye, lobe_choice, lobe_u);
             let after = sample.and_then(|sample| {
                 let weight = weight_of_power(&hit, &sample, to_eye);
                 Some((roulette(arrived * weight)?, sample.to_light))
@@ -144,10 +148,16 @@ pub fn trace<M: Medium + ?Sized, S: Scene + ?Sized>(
 /// What a surface does to power, where a [`SurfaceSample`] says what it does to radiance.
 #[inline]
 fn weight_of_power(hit: &Hit, sample: &SurfaceSample, to_eye: glam::Vec3) -> Spectrum {
-    match hit.surface {
-        Surface::Dielectric { transmittance, .. } if hit.normal.dot(to_eye) * hit.normal.dot(sample.to_light) < 0.0 => {
+    let weight = match hit.surface {
+        Surface::Dielectric { transmittance, .. } if hit.cosine(to_eye) * hit.cosine(sample.to_light) < 0.0 => {
             transmittance
         }
         _ => sample.weight,
+    };
+    if hit.shading == hit.normal {
+        return weight;
     }
+    // The adjoint: see `Hit::power_factor`.
+    let going = hit.power_factor(sample.to_light);
+    weight * if going > 0.0 { (hit.power_factor(to_eye) / going).min(MOST_POWER) } else { 0.0 }
 }

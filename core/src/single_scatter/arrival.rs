@@ -128,7 +128,7 @@ impl Arrival {
     /// # use fogbow::{host::{Empty, Hit}, math::{Ray, Vec3, float::PI}, spectrum::Spectrum, surface::Surface};
     /// # use fogbow::{single_scatter::Arrival, transmittance::thickness::Marching};
     /// // A wall two metres ahead, in vacuum; its direction was drawn uniformly from the sphere.
-    /// let wall = Hit { distance: 2.0, normal: Vec3::NEG_X, surface: Surface::BLACK, light: None };
+    /// let wall = Hit { distance: 2.0, normal: Vec3::NEG_X, shading: Vec3::NEG_X, surface: Surface::BLACK, light: None };
     /// let (ray, pdf) = (Ray::new(Vec3::ZERO, Vec3::X), 1.0 / (4.0 * PI));
     /// let arrival = Arrival::from_surface(&ray, &wall, Spectrum::ONE, pdf, &Empty, Marching::midpoints(1)).unwrap();
     /// assert!((arrival.irradiance[0] - 4.0 * PI).abs() < 1e-5);
@@ -154,7 +154,7 @@ impl Arrival {
     /// ```
     /// # use fogbow::{host::Hit, math::{Ray, Vec3}, spectrum::{Gradient, Spectrum}, surface::Surface};
     /// # use fogbow::{single_scatter::Arrival, transmittance::thickness::Transmittance};
-    /// let wall = Hit { distance: 2.0, normal: Vec3::NEG_X, surface: Surface::BLACK, light: None };
+    /// let wall = Hit { distance: 2.0, normal: Vec3::NEG_X, shading: Vec3::NEG_X, surface: Surface::BLACK, light: None };
     /// let still = Gradient::ZERO;
     /// let half = || Transmittance { value: Spectrum::splat(0.5), gradient_fixed: still, gradient_joint: still };
     /// let arrival = Arrival::from_surface_through(&Ray::new(Vec3::ZERO, Vec3::X), &wall, Spectrum::ONE, 1.0, half).unwrap();

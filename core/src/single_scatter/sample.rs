@@ -112,7 +112,7 @@ pub fn visit_lights<M: Medium + ?Sized, S: Scene + ?Sized>(
 /// struct Shell;
 /// impl Scene for Shell {
 ///     fn closest_hit(&self, ray: &Ray) -> Option<Hit> {
-///         Some(Hit { distance: 2.0, normal: -ray.direction, surface: Surface::BLACK, light: None })
+///         Some(Hit { distance: 2.0, normal: -ray.direction, shading: -ray.direction, surface: Surface::BLACK, light: None })
 ///     }
 /// }
 /// let world = World { medium: &Empty, scene: &Shell, lights: (&[]).into() };
@@ -248,7 +248,7 @@ pub fn sample_surfaces<M: Medium + ?Sized, S: Scene + ?Sized>(
 /// struct Shell;
 /// impl Scene for Shell {
 ///     fn closest_hit(&self, ray: &Ray) -> Option<Hit> {
-///         Some(Hit { distance: 2.0, normal: -ray.direction, surface: Surface::BLACK, light: None })
+///         Some(Hit { distance: 2.0, normal: -ray.direction, shading: -ray.direction, surface: Surface::BLACK, light: None })
 ///     }
 /// }
 /// let world = World { medium: &Empty, scene: &Shell, lights: (&[]).into() };

@@ -222,7 +222,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Gatherer<'_, M, S> {
         let Some(hit) = nearest_surface(&way, self.world.scene).filter(|hit| hit.surface.is_discrete()) else {
             return Spectrum::ZERO;
         };
-        let Some(sample) = hit.surface.sample(hit.normal, -direction, uniform(rng), uniform2(rng)) else {
+        let Some(sample) = hit.sample(-direction, uniform(rng), uniform2(rng)) else {
             return Spectrum::ZERO;
         };
         let reach = transmittance(self.world.medium, &way.with_length(hit.distance), rng);

@@ -5,6 +5,7 @@ use crate::host::{Medium, Rng, Scene};
 use crate::math::Bounds;
 use crate::path::Settings;
 use crate::photon::{self, Event};
+use crate::surface::Surface;
 use crate::world::World;
 
 /// Sends one path from the lights and keeps a virtual light wherever it is scattered, in the medium or on a
@@ -46,9 +47,12 @@ pub fn shoot<M: Medium + ?Sized, S: Scene + ?Sized>(
             }
             Event::Met { point, incoming, hit, power, .. } => {
                 scatterings += 1;
-                let reflects = hit.normal.dot(incoming) < 0.0 && !hit.surface.albedo().is_black();
+                let reflects = hit.faces(-incoming) && !hit.surface.albedo().is_black();
                 if reflects {
-                    VirtualLight::on_surface(point, incoming, power, scatterings, hit.normal, &hit.surface)
+                    // What leaves does so through the area that there is; a lobe is where the shading normal has it.
+                    let normal = if matches!(hit.surface, Surface::Lambert { .. }) { hit.normal } else { hit.shading };
+                    let power = power * hit.power_factor(-incoming);
+                    VirtualLight::on_surface(point, incoming, power, scatterings, normal, &hit.surface)
                 } else {
                     None
                 }

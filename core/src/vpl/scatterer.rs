@@ -124,7 +124,7 @@ impl Receiver {
     ///
     /// ```
     /// # use fogbow::{host::Hit, math::Vec3, spectrum::Spectrum, surface::Surface, vpl::Receiver};
-    /// let hit = |surface| Hit { distance: 1.0, normal: Vec3::Z, surface, light: None };
+    /// let hit = |surface| Hit { distance: 1.0, normal: Vec3::Z, shading: Vec3::Z, surface, light: None };
     /// let wall = hit(Surface::Lambert { reflectance: Spectrum::ONE });
     /// assert!(Receiver::on_surface(Vec3::ZERO, Vec3::Z, &wall).is_some());
     /// assert!(Receiver::on_surface(Vec3::ZERO, Vec3::NEG_Z, &wall).is_none());   // from behind
@@ -134,10 +134,10 @@ impl Receiver {
     #[must_use]
     pub fn on_surface(point: Vec3, to_eye: Vec3, hit: &Hit) -> Option<Self> {
         let scatters = !hit.surface.is_discrete() && !hit.surface.albedo().is_black();
-        (scatters && hit.normal.dot(to_eye) > 0.0).then_some(Self {
+        (scatters && hit.faces(to_eye)).then_some(Self {
             point,
             to_eye,
-            scatterer: Scatterer::Surface { normal: hit.normal, surface: hit.surface },
+            scatterer: Scatterer::Surface { normal: hit.shading, surface: hit.surface },
         })
     }
 
@@ -146,7 +146,7 @@ impl Receiver {
     /// ```
     /// # use fogbow::{host::{Hit, Properties}, math::Vec3, spectrum::Spectrum, surface::Surface, vpl::Receiver};
     /// let surface = Surface::Lambert { reflectance: Spectrum::ONE };
-    /// let hit = Hit { distance: 1.0, normal: Vec3::Z, surface, light: None };
+    /// let hit = Hit { distance: 1.0, normal: Vec3::Z, shading: Vec3::Z, surface, light: None };
     /// let on_wall = Receiver::on_surface(4.0 * Vec3::Z, Vec3::Z, &hit).unwrap();
     /// let start = on_wall.origin(Vec3::Z).z;
     /// assert!(start > 4.0 && start < 4.001);   // off the wall, by a few roundings

@@ -351,6 +351,7 @@ mod tests {
             hits.then_some(Hit {
                 distance,
                 normal: Vec3::NEG_Y,
+                shading: Vec3::NEG_Y,
                 surface: Surface::BLACK,
                 light: (ray.direction.y > 0.0).then_some(0),
             })

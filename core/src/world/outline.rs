@@ -271,6 +271,7 @@ mod tests {
                 (distance > 1e-6 && distance < ray.length).then_some(Hit {
                     distance,
                     normal: Vec3::Z,
+                    shading: Vec3::Z,
                     surface,
                     light: None,
                 })

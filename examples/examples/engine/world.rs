@@ -83,7 +83,13 @@ impl Scene for Room {
     fn closest_hit(&self, ray: &Ray) -> Option<Hit> {
         let (distance, normal, colour) = self.cast(ray.origin.into(), ray.direction.into())?;
         let surface = Surface::Lambert { reflectance: Spectrum(colour) };
-        (distance < ray.length).then_some(Hit { distance, normal: normal.into(), surface, light: None })
+        (distance < ray.length).then_some(Hit {
+            distance,
+            normal: normal.into(),
+            shading: normal.into(),
+            surface,
+            light: None,
+        })
     }
 }
 

@@ -227,6 +227,22 @@ pub struct Material {
     pub is_two_sided: bool,
     /// What varies over the surface.
     pub textures: Vec<(Slot, Arc<Texture>)>,
+    /// What bends its normals.
+    pub relief: Option<Relief>,
+}
+
+/// What bends the normals of a surface.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Relief {
+    /// A height (m) above the surface.
+    Height {
+        /// Luminance of the texture, times the factor.
+        texture: Arc<Texture>,
+        /// Factor.
+        scale: f32,
+    },
+    /// Normals in the frame of the surface: `(x + 1)/2` in each channel.
+    Normals(Arc<Texture>),
 }
 
 /// A parameter of a surface that a texture may give.

@@ -12,29 +12,39 @@ use super::textures;
 use crate::error::SceneError;
 use crate::texture::Texture;
 
-const KNOWN: &str = "diffuse, twosided, null, conductor, dielectric, phong";
+const KNOWN: &str = "diffuse, twosided, bumpmap, normalmap, null, conductor, dielectric, phong";
 
 /// What a shape without a `<bsdf>` reflects; one that shines reflects nothing.
 pub(super) fn default_material(is_emitter: bool) -> Material {
     let reflectance = Spectrum::splat(if is_emitter { 0.0 } else { 0.5 });
-    Material { surface: Surface::Lambert { reflectance }, is_two_sided: false, textures: Vec::new() }
+    Material { surface: Surface::Lambert { reflectance }, is_two_sided: false, textures: Vec::new(), relief: None }
 }
 
 /// The material of a `<bsdf>`.
 pub(super) fn read(element: &Element<'_>) -> Result<Material, SceneError> {
     let plugin = Plugin::new(*element)?;
+    if let Some(relief) = textures::relief(&plugin)? {
+        let inner = plugin.nested("bsdf").ok_or_else(|| element.error("a <bsdf> is missing inside"))?;
+        let material = read(&inner)?;
+        plugin.finish()?;
+        if material.relief.is_some() {
+            return Err(inner.error("one relief on another is not supported"));
+        }
+        return Ok(Material { relief: Some(relief), ..material });
+    }
     let material = if plugin.kind == "twosided" {
         let inner = plugin.nested("bsdf").ok_or_else(|| element.error("a <bsdf> is missing inside"))?;
-        let inner_plugin = Plugin::new(inner)?;
-        let (surface, textures) = read_one(&inner_plugin)?;
-        inner_plugin.finish()?;
-        if matches!(surface, Surface::Dielectric { .. } | Surface::Null) {
+        let material = read(&inner)?;
+        if matches!(material.surface, Surface::Dielectric { .. } | Surface::Null) {
             return Err(inner.error("light passes through it, so it cannot be made two-sided"));
         }
-        Material { surface, is_two_sided: true, textures }
+        if material.is_two_sided {
+            return Err(inner.attribute_error("type", "a two-sided bsdf cannot stand inside another"));
+        }
+        Material { is_two_sided: true, ..material }
     } else {
         let (surface, textures) = read_one(&plugin)?;
-        Material { surface, is_two_sided: false, textures }
+        Material { surface, is_two_sided: false, textures, relief: None }
     };
     plugin.finish()?;
     Ok(material)
@@ -91,7 +101,6 @@ fn read_surface(plugin: &Plugin<'_>, textures: &mut Textures) -> Result<Surface,
             }
             Ok(Surface::Phong { diffuse, specular, exponent })
         }
-        "twosided" => Err(plugin.element.attribute_error("type", "a two-sided bsdf cannot stand inside another")),
         _ => Err(plugin.unknown_type(KNOWN)),
     }
 }

@@ -38,8 +38,8 @@ use std::collections::HashSet;
 use std::path::Path;
 
 pub use description::{
-    Container, Emitter, FovAxis, Geometry, Integrator, Material, Matter, MediumDescription, Place, SceneFile, Sensor,
-    Shape, Slot,
+    Container, Emitter, FovAxis, Geometry, Integrator, Material, Matter, MediumDescription, Place, Relief, SceneFile,
+    Sensor, Shape, Slot,
 };
 pub use fingerprint::{fingerprint, fingerprint_with};
 pub use notes::{Note, NoteKind};

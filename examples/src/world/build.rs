@@ -27,7 +27,9 @@ impl Pieces {
         for (index, shape) in (0_u32..).zip(&scene.shapes) {
             pieces.materials.push(shape.material.clone());
             let light = shape.radiance.and_then(|_| lights.next());
-            let part = Part { material: index, side: if shape.is_flipped { -1.0 } else { 1.0 }, light };
+            let is_smooth = matches!(&shape.geometry, Geometry::Mesh(mesh) if !mesh.normals.is_empty());
+            let varies = is_smooth || !shape.material.textures.is_empty() || shape.material.relief.is_some();
+            let part = Part { material: index, side: if shape.is_flipped { -1.0 } else { 1.0 }, light, varies };
             pieces.push(shape, part);
         }
         pieces

@@ -37,9 +37,9 @@ pub use media::{Media, WithMedium};
 use crate::camera::Camera;
 use crate::error::SceneError;
 use crate::scene_file::{Geometry, Integrator, Material, SceneFile, Sensor};
-use crate::texture::Place;
 use analytic::Few;
 use many::Many;
+use places::Spot;
 use triangles::Triangles;
 
 /// Analytic primitives up to this number are all tested, four at a time; above, a tree pays.
@@ -54,6 +54,8 @@ struct Part {
     side: f32,
     /// Index of the light it belongs to.
     light: Option<u32>,
+    /// Whether a place of it differs from others in more than its normal.
+    varies: bool,
 }
 
 /// The surfaces of a scene file, with its lights, media and camera.
@@ -209,20 +211,26 @@ impl<'a> World<'a> {
         distance: f32,
         normal: Vec3,
         part: &Part,
-        place: impl FnOnce(&'a Geometry) -> Option<Place<'a>>,
+        place: impl FnOnce(&'a Geometry, bool) -> Option<Spot<'a>>,
     ) -> Option<Hit> {
         let material = self.materials.get(part.material as usize)?;
+        // Before it is turned to a side.
+        let outward = normal;
         let normal = normal * part.side;
         let is_front = normal.dot(ray.direction) < 0.0;
         // Seen from behind, a light is dark, whatever its bsdf does there.
         let light = if is_front { part.light } else { None };
         let normal = if material.is_two_sided && !is_front { -normal } else { normal };
-        let surface = if material.textures.is_empty() {
-            material.surface
-        } else {
-            material.surface_at(&place(&self.scene.shapes.get(part.material as usize)?.geometry)?)
-        };
-        Some(Hit { distance, normal, surface, light })
+        if !part.varies {
+            return Some(Hit { distance, normal, shading: normal, surface: material.surface, light });
+        }
+        let spot = place(&self.scene.shapes.get(part.material as usize)?.geometry, material.relief.is_some())?;
+        let mut shading = spot.normal;
+        if let Some(relief) = &material.relief {
+            shading = spot.bent(relief, outward, part.side, ray.direction);
+        }
+        let shading = if normal.dot(outward) < 0.0 { -shading } else { shading };
+        Some(Hit { distance, normal, shading, surface: material.surface_at(&spot.place), light })
     }
 }
 
@@ -240,17 +248,16 @@ impl<'a> Scene for World<'a> {
             let [a, b, c] = self.corners.get(index as usize)?;
             let normal = (*b - *a).cross(*c - *a).normalize_or(-ray.direction);
             let number = *self.triangle_numbers.get(index as usize)? as usize;
-            let place = |geometry: &'a Geometry| {
+            let place = |geometry: &'a Geometry, has_relief: bool| {
                 let Geometry::Mesh(mesh) = geometry else { return None };
-                let point = ray.at(t);
-                Some(places::of_triangle(mesh, number, places::weights([*a, *b, *c], point), point))
+                Some(Spot::of_triangle(mesh, number, ([*a, *b, *c], normal), ray.at(t), has_relief))
             };
             return self.hit(ray, t, normal, self.triangle_parts.get(index as usize)?, place);
         }
         let (t, index) = analytic?;
         let primitive = self.primitives.get(index as usize)?;
         let normal = primitive.normal(ray.at(t));
-        let place = |geometry: &'a Geometry| Some(places::of_form(geometry, primitive, ray.at(t)));
+        let place = |geometry: &'a Geometry, _: bool| Some(Spot::of_form(geometry, primitive, ray.at(t), normal));
         self.hit(ray, t, normal, self.parts.get(index as usize)?, place)
     }
 

@@ -4,9 +4,9 @@ use fogbow::math::{Vec2, Vec3, float::PI};
 
 use super::analytic::Primitive;
 use crate::mesh::Mesh;
-use crate::scene_file::Geometry;
+use crate::scene_file::{Geometry, Relief};
 use crate::texture::Place;
-use crate::transform::{Transform, dot, to_array};
+use crate::transform::{Transform, dot, to_array, to_vec3};
 
 /// Weights of a triangle's corners at a point of it.
 pub(super) fn weights([a, b, c]: [Vec3; 3], point: Vec3) -> [f32; 3] {
@@ -19,21 +19,88 @@ pub(super) fn weights([a, b, c]: [Vec3; 3], point: Vec3) -> [f32; 3] {
     [(1.0 - v - w).max(0.0), v, w]
 }
 
-/// A place in a triangle of a mesh.
-pub(super) fn of_triangle(mesh: &Mesh, triangle: usize, weights: [f32; 3], point: Vec3) -> Place<'_> {
-    let vertices = mesh.triangles.get(triangle).copied().unwrap_or_default();
-    let uv = if mesh.texcoords.is_empty() {
-        Vec2::new(weights[1], weights[2])
-    } else {
-        let at = |vertex: u32| mesh.texcoords.get(vertex as usize).copied().unwrap_or_default();
-        vertices.iter().zip(weights).map(|(vertex, weight)| at(*vertex) * weight).sum()
-    };
-    Place { point, uv, attributes: &mesh.attributes, triangle, vertices, weights }
+/// The interpolated normal; the triangle's own where that is none, or points to its other side.
+pub(super) fn smooth_normal(mesh: &Mesh, vertices: [u32; 3], weights: [f32; 3], own: Vec3) -> Vec3 {
+    let sum: Vec3 = vertices
+        .iter()
+        .zip(weights)
+        .map(|(vertex, weight)| mesh.normals.get(*vertex as usize).copied().unwrap_or(own) * weight)
+        .sum();
+    match sum.try_normalize() {
+        Some(normal) if normal.dot(own) > 1e-3 => normal,
+        _ => own,
+    }
 }
 
-/// A place of any other form, with the texture coordinates of Mitsuba 3.
-pub(super) fn of_form(geometry: &Geometry, primitive: &Primitive, point: Vec3) -> Place<'static> {
-    Place::plain(point, uv_of(geometry, primitive, point))
+/// Where a surface that varies is hit.
+pub(super) struct Spot<'a> {
+    pub(super) place: Place<'a>,
+    /// The interpolated normal (unit), on the side of the primitive's own.
+    pub(super) normal: Vec3,
+    /// How the point moves with each texture coordinate (m).
+    tangents: [Vec3; 2],
+}
+
+impl<'a> Spot<'a> {
+    /// A point of a triangle of a mesh, given its corners and normal.
+    pub(super) fn of_triangle(
+        mesh: &'a Mesh,
+        triangle: usize,
+        (corners, own): ([Vec3; 3], Vec3),
+        point: Vec3,
+        has_relief: bool,
+    ) -> Self {
+        let weights = weights(corners, point);
+        let vertices = mesh.triangles.get(triangle).copied().unwrap_or_default();
+        let [e1, e2] = [corners[1] - corners[0], corners[2] - corners[0]];
+        let (mut uv, mut tangents) = (Vec2::new(weights[1], weights[2]), [e1, e2]);
+        if !mesh.texcoords.is_empty() {
+            let at = vertices.map(|vertex| mesh.texcoords.get(vertex as usize).copied().unwrap_or_default());
+            uv = at.iter().zip(weights).map(|(at, weight)| *at * weight).sum();
+            if has_relief {
+                let [a, b] = [at[1] - at[0], at[2] - at[0]];
+                let determinant = a.perp_dot(b);
+                let scale = if determinant == 0.0 { 0.0 } else { 1.0 / determinant };
+                tangents = [(e1 * b.y - e2 * a.y) * scale, (e2 * a.x - e1 * b.x) * scale];
+            }
+        }
+        let normal = if mesh.normals.is_empty() { own } else { smooth_normal(mesh, vertices, weights, own) };
+        let place = Place { point, uv, attributes: &mesh.attributes, triangle, vertices, weights };
+        Self { place, normal, tangents }
+    }
+
+    /// A point of any other form, with the texture coordinates of Mitsuba 3.
+    pub(super) fn of_form(geometry: &Geometry, primitive: &Primitive, point: Vec3, normal: Vec3) -> Self {
+        let (uv, tangents) = uv_of(geometry, primitive, point);
+        Self { place: Place::plain(point, uv), normal, tangents }
+    }
+
+    /// The normal as a relief has it: on the side of `own`, and turned so that a ray from the side of `side · own` sees it.
+    pub(super) fn bent(&self, relief: &Relief, own: Vec3, side: f32, direction: Vec3) -> Vec3 {
+        // Mitsuba's frames follow the flipped normal.
+        let n = self.normal * side;
+        let [du, dv] = self.tangents;
+        let bent = match relief {
+            Relief::Height { texture, scale } => {
+                let slope = texture.slope(&self.place) * *scale;
+                let rise = |tangent: Vec3, by: f32| tangent + n * (by - n.dot(tangent));
+                let bent = rise(du, slope.x).cross(rise(dv, slope.y));
+                if bent.dot(own * side) < 0.0 { -bent } else { bent }
+            }
+            Relief::Normals(texture) => {
+                let local = Vec3::from_array(texture.at(&self.place).0) * 2.0 - Vec3::ONE;
+                let s = (du - n * n.dot(du)).normalize_or(n.any_orthonormal_vector());
+                s * local.x + n.cross(s) * local.y + n * local.z
+            }
+        };
+        let Some(mut bent) = bent.try_normalize() else { return self.normal };
+        // What faces away from the eye is turned about the normal.
+        if n.dot(direction) * bent.dot(direction) <= 0.0 {
+            bent = n * (2.0 * n.dot(bent)) - bent;
+        }
+        let bent = bent * side;
+        if bent.dot(own) > 1e-3 { bent } else { self.normal }
+    }
 }
 
 /// An angle as a share of a turn, in [0, 1).
@@ -42,25 +109,60 @@ fn turn(y: f32, x: f32) -> f32 {
     if share < 0.0 { share + 1.0 } else { share }
 }
 
-fn uv_of(geometry: &Geometry, primitive: &Primitive, point: Vec3) -> Vec2 {
+/// Texture coordinates, and how the point moves with them.
+fn uv_of(geometry: &Geometry, primitive: &Primitive, point: Vec3) -> (Vec2, [Vec3; 2]) {
+    let axis = |to_world: &Transform, index: usize| to_vec3(to_world.column(index));
     match (geometry, primitive) {
-        (Geometry::Rectangle(_), Primitive::Flat { u, v, .. }) => {
-            Vec2::new(u.0.dot(point) + u.1, v.0.dot(point) + v.1) * 0.5 + Vec2::splat(0.5)
-        }
-        (Geometry::Disk(_), Primitive::Flat { u, v, .. }) => {
+        (Geometry::Rectangle(to_world), Primitive::Flat { u, v, .. }) => {
             let at = Vec2::new(u.0.dot(point) + u.1, v.0.dot(point) + v.1);
-            Vec2::new(at.length(), turn(at.y, at.x))
+            (at * 0.5 + Vec2::splat(0.5), [axis(to_world, 0) * 2.0, axis(to_world, 1) * 2.0])
+        }
+        (Geometry::Disk(to_world), Primitive::Flat { u, v, .. }) => {
+            let at = Vec2::new(u.0.dot(point) + u.1, v.0.dot(point) + v.1);
+            let (x, y, out) = (axis(to_world, 0), axis(to_world, 1), at.normalize_or(Vec2::X));
+            let around = (y * at.x - x * at.y) * (2.0 * PI);
+            (Vec2::new(at.length(), turn(at.y, at.x)), [x * out.x + y * out.y, around])
         }
         (Geometry::Sphere { axes, .. }, Primitive::Sphere { centre, radius }) => {
             let out = (point - *centre) / *radius;
             let local = local_axes(axes, out);
-            Vec2::new(turn(local.y, local.x), local.z.clamp(-1.0, 1.0).acos() / PI)
+            let [x, y, z] = [0, 1, 2].map(|i| axis(axes, i).normalize_or_zero() * *radius);
+            let sine = local.x.hypot(local.y).max(1e-6);
+            let down = (x * local.x + y * local.y) * (local.z / sine) - z * sine;
+            let tangents = [(y * local.x - x * local.y) * (2.0 * PI), down * PI];
+            (Vec2::new(turn(local.y, local.x), local.z.clamp(-1.0, 1.0).acos() / PI), tangents)
         }
-        (Geometry::Cube(_), Primitive::Box { rows }) => {
+        (Geometry::Cube(to_world), Primitive::Box { rows }) => {
             let local = Vec3::from_array(rows.map(|(gradient, start)| gradient.dot(point) + start));
-            cube_uv(local)
+            // Coordinates are linear on a face: what a unit of each moves is found by trying.
+            let (uv, start) = (cube_uv(local), cube_face(local));
+            let mut tangents = [Vec3::ZERO; 2];
+            for i in (0..3).filter(|i| *i != start) {
+                let mut near = local;
+                near[i] += if near[i] > 0.0 { -0.5 } else { 0.5 };
+                let moved = (cube_uv(near) - uv) / (near[i] - local[i]);
+                // Each texture coordinate goes along one axis.
+                for (slot, by) in tangents.iter_mut().zip(moved.to_array()) {
+                    if by.abs() > 0.1 {
+                        *slot = axis(to_world, i) / by;
+                    }
+                }
+            }
+            (uv, tangents)
         }
-        _ => Vec2::ZERO,
+        _ => (Vec2::ZERO, [Vec3::ZERO; 2]),
+    }
+}
+
+/// The axis across the face of a cube.
+fn cube_face(at: Vec3) -> usize {
+    let size = at.abs();
+    if size.x >= size.y && size.x >= size.z {
+        0
+    } else if size.y >= size.z {
+        1
+    } else {
+        2
     }
 }
 
@@ -73,15 +175,13 @@ fn local_axes(axes: &Transform, direction: Vec3) -> Vec3 {
 
 /// Every face shows the whole unit square.
 fn cube_uv(at: Vec3) -> Vec2 {
-    let size = at.abs();
     let (x, y, z) = (at.x * 0.5 + 0.5, at.y * 0.5 + 0.5, at.z * 0.5 + 0.5);
-    if size.x >= size.y && size.x >= size.z {
-        if at.x > 0.0 { Vec2::new(y, 1.0 - z) } else { Vec2::new(y, z) }
-    } else if size.y >= size.z {
-        if at.y > 0.0 { Vec2::new(1.0 - x, 1.0 - z) } else { Vec2::new(z, x) }
-    } else if at.z > 0.0 {
-        Vec2::new(y, x)
-    } else {
-        Vec2::new(1.0 - y, x)
+    match (cube_face(at), at[cube_face(at)] > 0.0) {
+        (0, true) => Vec2::new(y, 1.0 - z),
+        (0, false) => Vec2::new(y, z),
+        (1, true) => Vec2::new(1.0 - x, 1.0 - z),
+        (1, false) => Vec2::new(z, x),
+        (_, true) => Vec2::new(y, x),
+        (_, false) => Vec2::new(1.0 - y, x),
     }
 }

@@ -12,6 +12,7 @@ import struct
 import zlib
 
 import mitsuba as mi
+import numpy as np
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 
@@ -51,19 +52,27 @@ def meshes(rng):
         obj.write("# a bent sheet\no sheet\n")
         obj.writelines("v %g %g %g\n" % p for p in points)
         obj.writelines("vt %g %g\n" % (0.5 + 0.5 * p[0], 0.5 + 0.25 * p[1]) for p in points)
-        # One seam of texture coordinates: normals do not notice.
-        obj.write("vt 0.1 0.9\ng left\n")
-        for number, f in enumerate(faces):
-            corners = [(i + 1, 10 if number == 3 and i == 4 else i + 1) for i in f]
-            obj.write("f " + " ".join("%d/%d" % c for c in corners) + "\n")
+        obj.write("g left\n")
+        obj.writelines("f " + " ".join("%d/%d" % (i + 1, i + 1) for i in f) + "\n" for f in faces)
     with open(os.path.join(HERE, "fold.obj"), "w") as obj:
         obj.write("v -1 -1 0\nv 1 -1 0\nv 1 1 0.5\nv -1 1 0.5\nvn 0.3 0 1\nvn -0.3 0.1 1\ng quad\nf 1//1 2//2 3//2 4//1\n")
+
+
+def normal_seen(si, colour):
+    """The normal that a diffuse bsdf goes by: what it reflects is that of Lambert, in three directions of which all are before it."""
+    if mi.Frame3f.cos_theta(si.wi) <= 0:
+        return si.sh_frame.n
+    directions = [[x, y, 1] for x, y in ((0, 0), (0.2, 0.1), (-0.1, 0.2))]
+    value = lambda d: si.bsdf().eval(mi.BSDFContext(), si, mi.Vector3f(d / np.linalg.norm(d)))[0] * np.pi / colour[0]
+    local = np.linalg.solve([d / np.linalg.norm(d) for d in directions], [value(d) for d in directions])
+    return si.to_world(mi.Vector3f(local))
 
 
 def main():
     rng = random.Random(7)
     png("pattern.png", 5, 3, [[rng.randrange(256) for _ in range(15)] for _ in range(3)])
     meshes(rng)
+    png("normals.png", 3, 2, [[rng.randrange(90, 166) if i % 3 < 2 else 240 for i in range(9)] for _ in range(2)])
     mi.set_variant("scalar_rgb")
     scene = mi.load_file(os.path.join(HERE, "hits.xml"))
     lines = []
@@ -80,7 +89,11 @@ def main():
             si = scene.ray_intersect(mi.Ray3f(origin, direction / mi.ScalarFloat(sum(c * c for c in direction) ** 0.5)))
             line = list(origin) + list(direction)
             if si.is_valid():
-                line += [si.t, *si.n, *si.sh_frame.n, *si.bsdf().eval_diffuse_reflectance(si)]
+                # Seen from behind, a bent normal shows nowhere.
+                if mi.Frame3f.cos_theta(si.wi) <= 0 and "Map" in str(si.bsdf())[:12]:
+                    continue
+                colour = si.bsdf().eval_diffuse_reflectance(si)
+                line += [si.t, *si.n, *normal_seen(si, colour), *colour]
             lines.append(" ".join("%.6g" % c for c in line) + ("" if si.is_valid() else " -"))
     open(os.path.join(HERE, "hits.txt"), "w").write("\n".join(lines) + "\n")
 

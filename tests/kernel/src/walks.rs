@@ -30,7 +30,7 @@ impl Scene for Balls {
         ];
         let floor = (-2.0 - ray.origin.y) / ray.direction.y;
         let grey = Surface::Phong { diffuse: Spectrum::splat(0.4), specular: Spectrum::splat(0.3), exponent: 20.0 };
-        let mut hit = Hit { distance: ray.length, normal: Vec3::Y, surface: grey, light: None };
+        let mut hit = Hit { distance: ray.length, normal: Vec3::Y, shading: Vec3::Y, surface: grey, light: None };
         let mut is_hit = false;
         if floor > 1e-4 && floor < hit.distance && ray.direction.y < 0.0 {
             hit.distance = floor;
@@ -40,7 +40,13 @@ impl Scene for Balls {
             if let Some(distance) = meets(ray, centre, radius)
                 && distance < hit.distance
             {
-                hit = Hit { distance, normal: (ray.at(distance) - centre).normalize(), surface, light };
+                hit = Hit {
+                    distance,
+                    normal: (ray.at(distance) - centre).normalize(),
+                    shading: (ray.at(distance) - centre).normalize(),
+                    surface,
+                    light,
+                };
                 is_hit = true;
             }
         }

@@ -39,7 +39,7 @@ impl Scene for Block {
         let axis = at.abs().cmpge(Vec3::splat(at.abs().max_element()));
         let normal = Vec3::select(axis, at.signum(), Vec3::ZERO).normalize();
         let surface = Surface::Lambert { reflectance: Spectrum::splat(0.5) };
-        is_hit.then_some(Hit { distance, normal, surface, light: None })
+        is_hit.then_some(Hit { distance, normal, shading: normal, surface, light: None })
     }
 }
 
