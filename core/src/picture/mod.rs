@@ -7,15 +7,20 @@
 //! |---|---|
 //! | `tiles` | [`Tiles`]: passes over all pixels, in memory that grows or is lent |
 //! | `noise` | [`Goal`]: how many samples are enough, by the noise they still have |
+//! | [`bytes`] | a picture on its way, to be gone on with later |
 //! | `budget` | [`affordable`]: samples that the time left allows |
 //! | `counting` | [`Queries`]: how often the world is asked |
 
 mod budget;
+#[cfg(feature = "alloc")]
+pub mod bytes;
 mod counting;
 mod noise;
 mod tiles;
 
 pub use budget::{affordable, whole_passes};
+#[cfg(feature = "alloc")]
+pub use bytes::PictureBytesError;
 pub use counting::{Counters, CountingMedium, CountingScene, Queries};
 pub use noise::{Goal, LEAST_SAMPLES, MOST_SAMPLES, PixelNoise, TileNoise};
 pub use tiles::{Counts, Integrand, Sample, Settings, Tally, TileOutput, TileRoom, TileSlots, Tiles, accumulate};

@@ -123,6 +123,41 @@ impl<'s> Noise<'s> {
         Self { goal, tiles: tiles.into(), pixels: pixels.into() }
     }
 
+    /// All that is known, for [`Noise::read`].
+    #[cfg(feature = "alloc")]
+    pub(super) fn write(&self, bytes: &mut alloc::vec::Vec<u8>) {
+        for tile in self.tiles.as_slice() {
+            let doubled = [tile.when_doubled, tile.doubled_before];
+            let flags = [tile.is_enough, doubled[0].is_some(), doubled[1].is_some()];
+            let flags = flags.iter().rev().fold(0, |all: u32, flag| all << 1 | u32::from(*flag));
+            bytes.extend(flags.to_le_bytes());
+            doubled.iter().for_each(|noise| bytes.extend(noise.unwrap_or(0.0).to_le_bytes()));
+        }
+        for part in self.pixels.as_slice().iter().flat_map(|pixel| [pixel.before, pixel.after]) {
+            bytes.extend(part.sum.to_le_bytes());
+            bytes.extend(part.count.to_le_bytes());
+        }
+    }
+
+    /// Into tiles that were added anew. `None` if it is nothing that passes leave.
+    #[cfg(feature = "alloc")]
+    pub(super) fn read(&mut self, bytes: &mut super::bytes::Reader<'_>) -> Option<()> {
+        for tile in self.tiles.as_mut_slice() {
+            let (flags, doubled) = (bytes.word(), [bytes.double(), bytes.double()]);
+            tile.is_enough = flags & 1 != 0;
+            tile.when_doubled = (flags & 2 != 0).then_some(doubled[0]);
+            tile.doubled_before = (flags & 4 != 0).then_some(doubled[1]);
+        }
+        for pixel in self.pixels.as_mut_slice() {
+            let [before, after] = [(); 2].map(|()| Part { sum: bytes.double(), count: bytes.word() });
+            if before.count > after.count || !before.sum.is_finite() || !after.sum.is_finite() {
+                return None;
+            }
+            *pixel = PixelNoise { before, after };
+        }
+        Some(())
+    }
+
     pub(super) fn is_enough(&self, tile: u32) -> bool {
         self.tiles.as_slice().get(tile as usize).is_some_and(|tile| tile.is_enough)
     }

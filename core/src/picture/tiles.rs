@@ -245,21 +245,21 @@ const SAMPLES_PER_JOB: u32 = 64;
 /// ```
 #[derive(Debug)]
 pub struct Tiles<'s, Q, C = ()> {
-    settings: Settings,
+    pub(super) settings: Settings,
     source: Q,
     /// Pixel by pixel, within each layer by layer; and samples of each pixel.
-    sums: List<'s, [f64; 3]>,
-    counts: List<'s, u32>,
-    noise: Option<Noise<'s>>,
+    pub(super) sums: List<'s, [f64; 3]>,
+    pub(super) counts: List<'s, u32>,
+    pub(super) noise: Option<Noise<'s>>,
     /// The pass at hand takes every pixel to so many samples, so many pixels a job.
-    until: u32,
-    pixels_per_job: u32,
+    pub(super) until: u32,
+    pub(super) pixels_per_job: u32,
     /// Jobs whose results were taken.
-    taken: u32,
-    taken_samples: Counts,
+    pub(super) taken: u32,
+    pub(super) taken_samples: Counts,
     total: C,
     is_by_pass: bool,
-    is_enough: bool,
+    pub(super) is_enough: bool,
     is_cut: bool,
 }
 
@@ -305,7 +305,7 @@ impl<'s, Q, C: Default> Tiles<'s, Q, C> {
     }
 
     /// Begins the first pass over a picture of which there are sums and numbers of samples; of the noise nothing is known.
-    fn start(
+    pub(super) fn start(
         settings: Settings,
         source: Q,
         (sums, counts): (List<'s, [f64; 3]>, List<'s, u32>),

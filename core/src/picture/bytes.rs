@@ -1,0 +1,328 @@
+//! A picture on its way as bytes: all that is needed to go on with it as if it had never been left.
+//!
+//! Little endian on every target, without gaps:
+//!
+//! | offset | bytes | what |
+//! |---|---|---|
+//! | 0 | 8 | [`MAGIC`] |
+//! | 8 | 4 | [`VERSION`] |
+//! | 12 | 8 | columns and rows |
+//! | 20 | 4 | layers |
+//! | 24 | 12 | the pass at hand: samples that it takes pixels to, jobs taken, pixels of a job |
+//! | 36 | 4 | side of tiles |
+//! | 40 | 8 | noise asked for as `f32`, samples at least; zeros without a goal |
+//! | 48 | 4 | samples asked for |
+//! | 52 | 4 | bit 0: all pixels have enough; bit 1: there is a goal |
+//! | 56 | 8 | seed |
+//! | 64 | 16 | samples taken, and those that were not finite |
+//! | 80 | 8 | tag: what the picture was made for, a number of the host's choice |
+//! | 88 | 8 | [`Crc`] of bytes 0 to 88 and of all from 96 on |
+//! | 96 | 24 n l | sums of `l` layers of `n` pixels, as `f64` |
+//! | | 4 n | samples of pixels |
+//! | | 20 t | of `t` tiles, with a goal: bit 0 enough, bits 1 and 2 which of two `f64` are known: noise squared when samples were last doubled, and one doubling earlier |
+//! | | 24 n | of pixels, with a goal: sum as `f64` and samples before a pass, and after it |
+
+use alloc::vec::Vec;
+use core::fmt;
+
+use super::noise::{Goal, Noise};
+use super::tiles::{Counts, Settings, Tiles};
+use crate::bytes::Crc;
+use crate::storage::{Full, List};
+
+/// The first bytes: not text, and damaged by whatever changes ends of lines.
+pub const MAGIC: [u8; 8] = *b"\x89FOGPIC\n";
+
+/// Of the layout above.
+pub const VERSION: u32 = 1;
+
+/// Length of the header (bytes).
+pub const HEADER_BYTES: usize = 96;
+
+/// Why bytes are not the picture asked for, in the order of the checks.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum PictureBytesError {
+    /// Fewer bytes than a header.
+    NoHeader {
+        /// How many there are.
+        found: usize,
+    },
+    /// Other first bytes: something else altogether.
+    Magic,
+    /// Of another version than [`VERSION`].
+    Version(u32),
+    /// Not as many bytes as the header says.
+    Length {
+        /// How many there are.
+        found: usize,
+        /// How many the header says.
+        due: usize,
+    },
+    /// Damaged.
+    Checksum,
+    /// Made for something else.
+    Tag {
+        /// What it was made for.
+        found: u64,
+        /// What was asked for.
+        due: u64,
+    },
+    /// Of another size, number of layers, seed or goal; in what it differs.
+    Settings(&'static str),
+    /// Sums or numbers that no passes leave.
+    Content,
+}
+
+impl fmt::Display for PictureBytesError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::NoHeader { found } => write!(f, "ends after {found} bytes, before its header of {HEADER_BYTES} does"),
+            Self::Magic => f.write_str("is no picture that was left: other first bytes"),
+            Self::Version(version) => write!(f, "has version {version} of the format; {VERSION} is known"),
+            Self::Length { found, due } if found < due => {
+                write!(f, "is cut off: {due} bytes are due, {found} are there")
+            }
+            Self::Length { found, due } => write!(f, "goes on after its end: {due} bytes are due, {found} are there"),
+            Self::Checksum => f.write_str("is damaged: the checksum is another"),
+            Self::Tag { found, due } => write!(f, "was made for something else (tag {found:016x}, not {due:016x})"),
+            Self::Settings(what) => write!(f, "is of a picture with another {what}"),
+            Self::Content => f.write_str("holds sums or numbers of samples that no picture has"),
+        }
+    }
+}
+
+impl core::error::Error for PictureBytesError {}
+
+/// Reads element after element.
+pub(super) struct Reader<'b>(&'b [u8]);
+
+impl Reader<'_> {
+    fn take<const N: usize>(&mut self) -> [u8; N] {
+        let (head, rest) = self.0.split_first_chunk::<N>().unwrap_or((&[0; N], &[]));
+        self.0 = rest;
+        *head
+    }
+
+    pub(super) fn word(&mut self) -> u32 {
+        u32::from_le_bytes(self.take())
+    }
+
+    pub(super) fn long(&mut self) -> u64 {
+        u64::from_le_bytes(self.take())
+    }
+
+    pub(super) fn double(&mut self) -> f64 {
+        f64::from_le_bytes(self.take())
+    }
+}
+
+/// Bytes behind the header.
+fn body_bytes(settings: &Settings) -> Option<usize> {
+    let pixels = settings.size[0].checked_mul(settings.size[1])? as usize;
+    let room = settings.room();
+    let sums = pixels.checked_mul(settings.layers as usize)?.checked_mul(24)?;
+    sums.checked_add(pixels.checked_mul(4)?)?.checked_add(room.tiles * 20)?.checked_add(room.pixels.checked_mul(24)?)
+}
+
+impl<Q, C> Tiles<'_, Q, C> {
+    /// The picture as it is now, in the middle of a pass or between two. `tag` says what it is made for: whoever reads it must give the
+    /// same. What integrands have counted is not in it.
+    ///
+    /// ```
+    /// use fogbow::picture::{Goal, Sample, Settings, TileOutput, Tiles};
+    /// use fogbow::{sampling::{Generator, Independent, uniform}, spectrum::Spectrum, work};
+    /// let goal = Some(Goal { noise: 0.05, least: 8 });
+    /// let settings = Settings { size: [17, 8], layers: 1, samples: 4096, goal, seed: 0, tile: 8 };
+    /// let ramp = |sample: &Sample<'_, ()>, rng: &mut Generator, layers: &mut [Spectrum]| {
+    ///     layers[0] = Spectrum::splat(if sample.x < 8 { 1.0 } else { 2.0 * uniform(rng) });
+    /// };
+    /// // Left after some jobs, and taken up again by another run of the program.
+    /// let mut left = Tiles::new(settings, Independent);
+    /// for _ in 0..100 {
+    ///     work::step(&mut left, &ramp, &mut TileOutput::default());
+    /// }
+    /// let bytes = left.to_bytes(7);
+    /// let mut taken_up = Tiles::read(settings, Independent, 7, &bytes)?;
+    /// work::finish(&mut taken_up, &ramp, &mut TileOutput::default());
+    ///
+    /// let mut whole: Tiles<'_, _, ()> = Tiles::new(settings, Independent);
+    /// work::finish(&mut whole, &ramp, &mut TileOutput::default());
+    /// assert_eq!(taken_up.into_sums(), whole.into_sums());
+    /// # Ok::<(), fogbow::picture::PictureBytesError>(())
+    /// ```
+    #[must_use]
+    pub fn to_bytes(&self, tag: u64) -> Vec<u8> {
+        let Self { settings, until, taken, pixels_per_job, taken_samples, .. } = self;
+        let mut bytes = Vec::with_capacity(HEADER_BYTES + body_bytes(settings).unwrap_or(0));
+        bytes.extend(MAGIC);
+        let goal = settings.goal.unwrap_or(Goal { noise: 0.0, least: 0 });
+        let flags = u32::from(self.is_enough) | u32::from(settings.goal.is_some()) << 1;
+        let [columns, rows] = settings.size;
+        let pass = [*until, *taken, *pixels_per_job];
+        let asked = [settings.tile, goal.noise.to_bits(), goal.least, settings.samples, flags];
+        let words = [VERSION, columns, rows, settings.layers].into_iter().chain(pass).chain(asked);
+        words.for_each(|word| bytes.extend(word.to_le_bytes()));
+        let longs = [settings.seed, taken_samples.samples, taken_samples.non_finite, tag, 0];
+        longs.iter().for_each(|long| bytes.extend(long.to_le_bytes()));
+        self.sums.as_slice().as_flattened().iter().for_each(|sum| bytes.extend(sum.to_le_bytes()));
+        self.counts.as_slice().iter().for_each(|count| bytes.extend(count.to_le_bytes()));
+        if let Some(noise) = &self.noise {
+            noise.write(&mut bytes);
+        }
+        let crc = checksum(&bytes);
+        bytes[HEADER_BYTES - 8..HEADER_BYTES].copy_from_slice(&crc.to_le_bytes());
+        bytes
+    }
+}
+
+fn checksum(bytes: &[u8]) -> u64 {
+    let mut crc = Crc::new();
+    crc.add(&bytes[..HEADER_BYTES - 8]);
+    crc.add(&bytes[HEADER_BYTES..]);
+    crc.value()
+}
+
+impl<Q, C: Default> Tiles<'static, Q, C> {
+    /// Goes on with what [`Tiles::to_bytes`] has left, to the bits of a picture that was never left. Without a goal, more samples may be asked
+    /// for than before.
+    ///
+    /// # Errors
+    /// Bytes that are damaged, or of another picture: another size, seed, goal or tag.
+    ///
+    /// ```
+    /// # use fogbow::picture::{PictureBytesError, Settings, Tiles};
+    /// # use fogbow::sampling::Independent;
+    /// let settings = Settings { size: [4, 3], layers: 1, samples: 64, goal: None, seed: 0, tile: 8 };
+    /// let bytes = Tiles::<'_, _, ()>::new(settings, Independent).to_bytes(7);
+    /// let read = |settings, tag| Tiles::<'_, _, ()>::read(settings, Independent, tag, &bytes).err();
+    /// assert_eq!(read(Settings { samples: 128, ..settings }, 7), None);
+    /// assert_eq!(read(settings, 8), Some(PictureBytesError::Tag { found: 7, due: 8 }));
+    /// assert_eq!(read(Settings { seed: 1, ..settings }, 7), Some(PictureBytesError::Settings("seed")));
+    /// ```
+    pub fn read(settings: Settings, source: Q, tag: u64, bytes: &[u8]) -> Result<Self, PictureBytesError> {
+        if bytes.len() < HEADER_BYTES {
+            return Err(PictureBytesError::NoHeader { found: bytes.len() });
+        }
+        let mut header = Reader(bytes);
+        if header.take() != MAGIC {
+            return Err(PictureBytesError::Magic);
+        }
+        let version = header.word();
+        if version != VERSION {
+            return Err(PictureBytesError::Version(version));
+        }
+        let [columns, rows, layers, until, taken, pixels_per_job] = [(); 6].map(|()| header.word());
+        let [tile, noise, least, samples, flags] = [(); 5].map(|()| header.word());
+        let [seed, all, non_finite, found, crc] = [(); 5].map(|()| header.long());
+        let goal = (flags & 2 != 0).then(|| Goal { noise: f32::from_bits(noise), least });
+        let of = Settings { size: [columns, rows], layers, samples, goal, seed, tile };
+        let due = body_bytes(&of).and_then(|body| body.checked_add(HEADER_BYTES)).ok_or(PictureBytesError::Content)?;
+        if bytes.len() != due {
+            return Err(PictureBytesError::Length { found: bytes.len(), due });
+        }
+        if checksum(bytes) != crc {
+            return Err(PictureBytesError::Checksum);
+        }
+        if found != tag {
+            return Err(PictureBytesError::Tag { found, due: tag });
+        }
+        let differs = [
+            (of.size != settings.size, "size"),
+            (of.layers != settings.layers, "number of layers"),
+            (of.seed != settings.seed, "seed"),
+            (of.goal != settings.goal, "noise asked for"),
+            (goal.is_some() && of.tile != settings.tile, "size of tiles"),
+            (goal.is_some() && of.samples != settings.samples, "number of samples asked for"),
+        ];
+        if let Some((_, what)) = differs.into_iter().find(|(differs, _)| *differs) {
+            return Err(PictureBytesError::Settings(what));
+        }
+        let room = settings.room();
+        let mut body = Reader(&bytes[HEADER_BYTES..]);
+        let sums: Vec<[f64; 3]> = (0..room.sums).map(|_| [(); 3].map(|()| body.double())).collect();
+        let counts: Vec<u32> = (0..room.counts).map(|_| body.word()).collect();
+        if !sums.as_flattened().iter().all(|sum| sum.is_finite()) {
+            return Err(PictureBytesError::Content);
+        }
+        let noise = settings.goal.map(|goal| Noise::new(goal, List::default(), List::default()));
+        let mut tiles = Self::start(settings, source, (sums.into(), counts.into()), noise)
+            .map_err(|Full| PictureBytesError::Content)?;
+        tiles.taken_samples = Counts { samples: all, non_finite };
+        if let Some(noise) = &mut tiles.noise {
+            noise.read(&mut body).ok_or(PictureBytesError::Content)?;
+        }
+        // A goal is judged where passes end, so they have to end where they would have. More samples than there were to be begin anew.
+        let is_enough = flags & 1 != 0;
+        if !is_enough || settings.samples <= samples {
+            (tiles.until, tiles.taken, tiles.is_enough) = (until.min(settings.samples), taken, is_enough);
+            tiles.pixels_per_job = pixels_per_job.max(1);
+        }
+        Ok(tiles)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::picture::{Sample, TileOutput};
+    use crate::sampling::{Generator, Independent, uniform};
+    use crate::spectrum::Spectrum;
+    use crate::work;
+
+    const GOAL: Option<Goal> = Some(Goal { noise: 0.04, least: 8 });
+    const SETTINGS: Settings = Settings { size: [19, 9], layers: 2, samples: 600, goal: None, seed: 5, tile: 4 };
+
+    fn ramp(sample: &Sample<'_, ()>, rng: &mut Generator, layers: &mut [Spectrum]) {
+        layers[0] = Spectrum::splat(uniform(rng) * sample.x as f32);
+        layers[1] = Spectrum::new(uniform(rng), 0.0, 1.0);
+    }
+
+    /// Left and taken up again every so many jobs.
+    fn left_every(settings: Settings, jobs: u32) -> (Vec<[f64; 3]>, Vec<u32>) {
+        let mut tiles: Tiles<'_, _, ()> = Tiles::new(settings, Independent);
+        let mut output = TileOutput::default();
+        while !tiles.is_done() {
+            for _ in 0..jobs {
+                work::step(&mut tiles, &ramp, &mut output);
+            }
+            tiles = Tiles::read(settings, Independent, 1, &tiles.to_bytes(1)).unwrap();
+        }
+        tiles.into_sums()
+    }
+
+    #[test]
+    fn a_picture_left_anywhere_has_the_bits_of_one_that_was_not() {
+        for goal in [None, GOAL] {
+            let settings = Settings { goal, ..SETTINGS };
+            let mut whole: Tiles<'_, _, ()> = Tiles::new(settings, Independent);
+            work::finish(&mut whole, &ramp, &mut TileOutput::default());
+            let whole = whole.into_sums();
+            if goal.is_some() {
+                assert!(whole.1.iter().any(|count| *count < 600) && whole.1.iter().any(|count| *count > 8));
+            }
+            for jobs in [1, 7, 50] {
+                assert_eq!(left_every(settings, jobs), whole, "{goal:?} {jobs}");
+            }
+        }
+    }
+
+    #[test]
+    fn damaged_bytes_are_an_error() {
+        let settings = Settings { goal: GOAL, ..SETTINGS };
+        let mut tiles: Tiles<'_, _, ()> = Tiles::new(settings, Independent);
+        for _ in 0..60 {
+            work::step(&mut tiles, &ramp, &mut TileOutput::default());
+        }
+        let bytes = tiles.to_bytes(3);
+        let read = |bytes: &[u8]| Tiles::<'_, _, ()>::read(settings, Independent, 3, bytes).map(drop);
+        assert_eq!(read(&bytes), Ok(()));
+        for at in (0..bytes.len()).step_by(61).chain(0..HEADER_BYTES) {
+            let mut damaged = bytes.clone();
+            damaged[at] ^= 16;
+            assert!(read(&damaged).is_err(), "{at}");
+            assert!(read(&bytes[..at]).is_err(), "{at}");
+        }
+        assert!(read(&[&bytes[..], &[0]].concat()).is_err());
+    }
+}
