@@ -5,6 +5,7 @@ use core::sync::atomic::{AtomicBool, Ordering};
 use core::time::Duration;
 
 use crate::stats::Stopwatch;
+use crate::tiles::Glimpse;
 
 /// How far a render is.
 ///
@@ -68,6 +69,11 @@ pub struct Control<'a> {
     pub cancel: Option<&'a AtomicBool>,
     /// Called at most twenty times a second, by the thread that renders, and once at the end.
     pub progress: Option<&'a (dyn Fn(&Progress) + Sync)>,
+    /// Called after every batch of jobs, which take some milliseconds each, with the picture as it is: to show it, or to save what there is
+    /// by [`Glimpse::to_bytes`]. How often that pays is for the host to say.
+    pub watch: Option<&'a (dyn Fn(&Glimpse<'_>) + Sync)>,
+    /// What [`Glimpse::to_bytes`] has saved, and its tag: the picture goes on from there, to the same bits.
+    pub resume: Option<(&'a [u8], u64)>,
 }
 
 impl Control<'_> {
@@ -80,7 +86,12 @@ impl Control<'_> {
 
 impl fmt::Debug for Control<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Control").field("cancel", &self.cancel).field("progress", &self.progress.is_some()).finish()
+        f.debug_struct("Control")
+            .field("cancel", &self.cancel)
+            .field("progress", &self.progress.is_some())
+            .field("watch", &self.watch.is_some())
+            .field("resume", &self.resume.map(|(bytes, tag)| (bytes.len(), tag)))
+            .finish()
     }
 }
 

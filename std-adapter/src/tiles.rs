@@ -9,10 +9,10 @@ use core::num::NonZero;
 use core::time::Duration;
 
 pub use fogbow::picture::Goal;
-use fogbow::picture::{self, Integrand, Tiles, affordable};
+use fogbow::picture::{self, Integrand, PictureBytesError, Tiles, affordable};
 use fogbow::spectrum::Spectrum;
 
-use crate::film::Film;
+use crate::film::{Film, Image, SizeError};
 use crate::progress::{Control, Reporter};
 use crate::seed::{SampleRng, Sequence};
 use crate::stats::{Counters, Queries, Seconds, Stopwatch};
@@ -85,6 +85,14 @@ pub enum RenderError {
     NoTile,
     /// The system gave no threads.
     Threads(ThreadsError),
+    /// What [`Control::resume`] holds is damaged, or of another picture.
+    Resume(PictureBytesError),
+}
+
+impl From<PictureBytesError> for RenderError {
+    fn from(error: PictureBytesError) -> Self {
+        Self::Resume(error)
+    }
 }
 
 impl From<ThreadsError> for RenderError {
@@ -99,6 +107,7 @@ impl fmt::Display for RenderError {
             Self::NoSamples => f.write_str("no samples were asked for"),
             Self::NoTile => f.write_str("the side of a tile is zero"),
             Self::Threads(error) => error.fmt(f),
+            Self::Resume(error) => write!(f, "the picture to go on with {error}"),
         }
     }
 }
@@ -151,6 +160,64 @@ pub struct Passes {
     pub may_break: bool,
 }
 
+/// The picture as it is now, between two batches of jobs: for [`Control::watch`].
+///
+/// ```
+/// use core::cell::Cell;
+/// use std::sync::Mutex;
+/// use fogbow::{sampling::uniform, spectrum::Spectrum};
+/// use fogbow_std::{film::Film, progress::Control, tiles::{Glimpse, Sample, Settings, render}, seed::SampleRng};
+/// let noise = |_: &Sample<'_>, rng: &mut SampleRng, layers: &mut [Spectrum]| layers[0] = Spectrum::splat(uniform(rng));
+/// let settings = Settings { samples: 64, ..Settings::default() };
+/// // Saved once half the samples are there.
+/// let saved = Mutex::new(Vec::new());
+/// let watch = |glimpse: &Glimpse<'_>| {
+///     if glimpse.samples() == 32 && saved.lock().unwrap().is_empty() {
+///         *saved.lock().unwrap() = glimpse.to_bytes(7);
+///     }
+/// };
+/// let mut whole = Film::new(8, 8, &["total"])?;
+/// render(&mut whole, &settings, &Control { watch: Some(&watch), ..Control::default() }, noise)?;
+/// // The program was killed; the next run goes on.
+/// let saved = saved.into_inner().unwrap();
+/// let mut resumed = Film::new(8, 8, &["total"])?;
+/// render(&mut resumed, &settings, &Control { resume: Some((&saved, 7)), ..Control::default() }, noise)?;
+/// assert_eq!(resumed, whole);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Debug)]
+pub struct Glimpse<'a> {
+    tiles: &'a Tiles<'static, Sequence, Counters>,
+    size: [u32; 2],
+}
+
+impl Glimpse<'_> {
+    /// Samples that every pixel has at least; 0 means that some have none.
+    #[must_use]
+    pub fn samples(&self) -> u32 {
+        self.tiles.least_count()
+    }
+
+    /// All that is needed to go on by [`Control::resume`], for a picture with this tag.
+    #[must_use]
+    pub fn to_bytes(&self, tag: u64) -> Vec<u8> {
+        self.tiles.to_bytes(tag)
+    }
+
+    /// The means of layer 0. Pixels without samples are black.
+    ///
+    /// # Errors
+    /// [`SizeError::Memory`].
+    pub fn image(&self) -> Result<Image, SizeError> {
+        let [width, height] = self.size;
+        let mut image = Image::new(width, height, Spectrum::ZERO)?;
+        for (pixel, at) in image.pixels.iter_mut().zip(0..) {
+            *pixel = self.tiles.mean(at % width, at / width, 0);
+        }
+        Ok(image)
+    }
+}
+
 /// An integrand whose queries of the world are counted.
 struct Counted<F>(F);
 
@@ -196,9 +263,6 @@ impl<'a> Render<'a> {
         }
         let threads = Threads::new(settings.threads)?;
         let clock = Stopwatch::start();
-        let pixels = u64::from(film.width()) * u64::from(film.height());
-        let total = pixels * u64::from(settings.samples);
-        let reporter = Reporter::new(control, film.total_count(), total, settings.time);
         let of = picture::Settings {
             size: [film.width(), film.height()],
             layers: film.layers().len() as u32,
@@ -207,8 +271,18 @@ impl<'a> Render<'a> {
             seed: settings.seed,
             tile: settings.tile,
         };
-        let (sums, counts) = film.take();
-        let tiles = Some(Tiles::of(of, settings.sequence, sums, counts).by_pass());
+        let before = film.total_count();
+        let tiles = match control.resume {
+            Some((bytes, tag)) => Tiles::read(of, settings.sequence, tag, bytes)?,
+            None => {
+                let (sums, counts) = film.take();
+                Tiles::of(of, settings.sequence, sums, counts)
+            }
+        };
+        let total = u64::from(film.width()) * u64::from(film.height()) * u64::from(settings.samples);
+        let before = if control.resume.is_some() { tiles.counts().samples } else { before };
+        let reporter = Reporter::new(control, before, total, settings.time);
+        let tiles = Some(tiles.by_pass());
         Ok(Self { film, settings, control, threads, tiles, clock, reporter })
     }
 
@@ -232,11 +306,24 @@ impl<'a> Render<'a> {
     {
         let Some(tiles) = &mut self.tiles else { return false };
         tiles.begin(until);
+        self.run_pass(integrand)
+    }
+
+    /// Takes the pass at hand to its end; whether it was not stopped.
+    fn run_pass<F>(&mut self, integrand: &Counted<F>) -> bool
+    where
+        F: Fn(&Sample<'_>, &mut SampleRng, &mut [Spectrum]) + Sync,
+    {
+        let (size, control) = ([self.film.width(), self.film.height()], self.control);
+        let Some(tiles) = &mut self.tiles else { return false };
         let mut before = tiles.counts().samples;
         let reporter = &mut self.reporter;
         let ran = run(tiles, integrand, &self.threads, self.control, None, |tiles| {
             reporter.add(tiles.counts().samples - before);
             before = tiles.counts().samples;
+            if let Some(watch) = control.watch {
+                watch(&Glimpse { tiles, size });
+            }
         });
         ran.ending == Ending::Done
     }
@@ -247,15 +334,25 @@ impl<'a> Render<'a> {
     {
         let integrand = Counted(integrand);
         let mut done = self.done();
-        if done >= self.settings.samples {
+        if done >= self.settings.samples || self.tiles.as_ref().is_none_or(Tiles::is_done) {
             return Reason::Done;
         }
         let mut until = done.saturating_add(1).min(self.settings.samples);
+        let mut is_begun = false;
+        if let (Some(_), Some(tiles)) = (self.control.resume, &self.tiles) {
+            // A goal is judged where passes end: so that which was left is taken to its end.
+            (until, done, is_begun) = (tiles.until(), done.min(tiles.until()), true);
+        }
         loop {
             let before = self.reporter.elapsed();
-            if self.control.is_cancelled() || !self.pass(until, &integrand) {
+            if self.control.is_cancelled() {
                 return Reason::Cancelled;
             }
+            let is_whole = if is_begun { self.run_pass(&integrand) } else { self.pass(until, &integrand) };
+            if !is_whole {
+                return Reason::Cancelled;
+            }
+            is_begun = false;
             let Some(tiles) = self.tiles.as_ref().filter(|tiles| !tiles.is_done()) else { return Reason::Done };
             let now = self.reporter.elapsed();
             let Some(most) = affordable(self.settings.time, now, now - before, until - done) else {

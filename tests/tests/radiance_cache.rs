@@ -336,7 +336,7 @@ fn photons_are_shot_once_for_all_views() {
 #[test]
 fn a_fill_cancelled_beforehand_leaves_empty_caches_that_serve() {
     let flag = AtomicBool::new(true);
-    let control = Control { cancel: Some(&flag), progress: None };
+    let control = Control { cancel: Some(&flag), ..Control::default() };
     let (filling, ending) = fill_on(RadianceCaches::new(settings()), &fog(), 2, &control);
     assert_eq!((ending, computed(&filling)), (Ending::Cancelled, [0; 5]));
     let caches = filling.finish();
@@ -379,7 +379,7 @@ fn a_fill_cancelled_on_its_way_leaves_caches_that_serve_and_goes_on_to_the_same_
     for tenths in [1, 3, 8] {
         let questions = asked * tenths / 10;
         flag.store(false, Ordering::Relaxed);
-        let control = Control { cancel: Some(&flag), progress: None };
+        let control = Control { cancel: Some(&flag), ..Control::default() };
         let (mut filling, ending) = fill_on(RadianceCaches::new(settled()), &impatient(questions), 2, &control);
         assert_eq!(ending, Ending::Cancelled, "{questions}");
 

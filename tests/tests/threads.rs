@@ -157,7 +157,7 @@ fn queries_are_counted() {
 fn a_cancelled_render_leaves_a_valid_film_that_can_be_finished() {
     for threads in [1, 3] {
         let (flag, taken) = (AtomicBool::new(false), AtomicU64::new(0));
-        let control = Control { cancel: Some(&flag), progress: None };
+        let control = Control { cancel: Some(&flag), ..Control::default() };
         let settings = Settings { samples: 64, threads, ..Settings::default() };
         let mut found = film();
         let outcome = render(&mut found, &settings, &control, |sample, rng, layers| {
@@ -185,7 +185,7 @@ fn a_cancelled_render_leaves_a_valid_film_that_can_be_finished() {
 fn a_render_cancelled_beforehand_does_nothing() {
     let flag = AtomicBool::new(true);
     let mut found = film();
-    let control = Control { cancel: Some(&flag), progress: None };
+    let control = Control { cancel: Some(&flag), ..Control::default() };
     let outcome = render(&mut found, &Settings::default(), &control, walk).unwrap();
     assert_eq!((outcome.reason, outcome.samples, found), (Reason::Cancelled, 0, film()));
 }
@@ -221,7 +221,7 @@ fn the_first_samples_are_taken_however_short_the_time() {
 fn progress_goes_forward_and_ends_at_one() {
     let seen = std::sync::Mutex::new(Vec::<Progress>::new());
     let report = |progress: &Progress| seen.lock().unwrap().push(*progress);
-    let control = Control { cancel: None, progress: Some(&report) };
+    let control = Control { progress: Some(&report), ..Control::default() };
     let settings = Settings { samples: 20, threads: 2, ..Settings::default() };
     render(&mut film(), &settings, &control, |_, _, _| std::thread::sleep(Duration::from_micros(20))).unwrap();
     let seen = seen.into_inner().unwrap();

@@ -97,7 +97,7 @@ pub(super) fn run(arguments: &RecordsArguments) -> Result<Ending, Failure> {
     let mut film = Film::new(width, height, &["total"])?;
     let bar = Bar::new(arguments.quiet);
     let progress = |progress: &Progress| bar.show(progress, u64::from(width) * u64::from(height));
-    let control = Control { cancel: None, progress: Some(&progress) };
+    let control = Control { progress: Some(&progress), ..Control::default() };
     let is_plain = arguments.section || arguments.black;
     let settings = tiles::Settings {
         samples: if is_plain { 1 } else { arguments.spp },

@@ -276,7 +276,7 @@ pub(crate) fn render(arguments: &RenderArguments) -> Result<Rendered, Failure> {
 
     let bar = Bar::new(arguments.quiet);
     let progress = |progress: &Progress| bar.show(progress, u64::from(width) * u64::from(height));
-    let control = Control { cancel: Some(stop_flag()), progress: Some(&progress) };
+    let control = Control { cancel: Some(stop_flag()), progress: Some(&progress), ..Control::default() };
     let (samples, noise) = arguments.samples(method, scene.sensor.samples);
     let settings = tiles::Settings {
         samples,

@@ -122,7 +122,7 @@ impl BakeJob<'_> {
         outline: &Outline,
     ) -> Result<Done, Failure> {
         let pool = Threads::new(self.arguments.threads)?;
-        let control = Control { cancel: Some(stop_flag()), progress: None };
+        let control = Control { cancel: Some(stop_flag()), ..Control::default() };
         let bar = Bar::new(self.arguments.quiet);
         let mut caches = None;
         if self.method != Source::Path {
