@@ -1,6 +1,7 @@
 //! The program as users call it: exit codes, files, messages.
 
 mod bake;
+mod care;
 mod radiance_cache;
 mod vpl;
 

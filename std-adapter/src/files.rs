@@ -1,5 +1,6 @@
 //! Files of caches and grids, read and written with care.
 
+use core::convert::Infallible;
 use core::fmt;
 use std::ffi::OsString;
 use std::io;
@@ -65,6 +66,22 @@ pub(crate) fn load<T, E>(path: &Path, decode: impl FnOnce(&[u8]) -> Result<T, E>
 }
 
 /// Writes a file; the one that was there is lost only when the new one is complete.
+///
+/// # Errors
+/// What the system says.
+///
+/// ```
+/// let file = std::env::temp_dir().join("fogbow-std-files-write");
+/// fogbow_std::files::write(&file, b"all of it")?;
+/// assert_eq!(std::fs::read(&file)?, b"all of it");
+/// # std::fs::remove_file(&file)?;
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn write(path: &Path, bytes: &[u8]) -> Result<(), FileError<Infallible>> {
+    save(path, bytes)
+}
+
+/// Writes a file; the one that was there is lost only when the new one is complete.
 pub(crate) fn save<E>(path: &Path, bytes: &[u8]) -> Result<(), FileError<E>> {
     replace(path, bytes).map_err(|error| Problem::Io(error).of(path))
 }
@@ -87,9 +104,18 @@ fn replace(path: &Path, bytes: &[u8]) -> io::Result<()> {
         let beside = path.with_file_name(beside);
         match std::fs::write(&beside, bytes).and_then(|()| std::fs::rename(&beside, path)) {
             Ok(()) => return Ok(()),
-            // No room for two, or a folder where nothing may be made: what remains is the file itself.
-            Err(_) => drop(std::fs::remove_file(&beside)),
+            Err(error) => {
+                drop(std::fs::remove_file(&beside));
+                // In a folder where nothing may be made, what remains is the file itself. Where there is no room, it is left alone.
+                if error.kind() != io::ErrorKind::PermissionDenied || !path.exists() {
+                    return Err(error);
+                }
+            }
         }
+    } else {
+        // A pipe or a device.
+        return std::fs::write(path, bytes);
     }
-    std::fs::write(path, bytes)
+    let before = std::fs::read(path)?;
+    std::fs::write(path, bytes).inspect_err(|_| drop(std::fs::write(path, before)))
 }

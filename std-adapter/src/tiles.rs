@@ -189,6 +189,7 @@ pub struct Passes {
 pub struct Glimpse<'a> {
     tiles: &'a Tiles<'static, Sequence, Counters>,
     size: [u32; 2],
+    is_last: bool,
 }
 
 impl Glimpse<'_> {
@@ -196,6 +197,12 @@ impl Glimpse<'_> {
     #[must_use]
     pub fn samples(&self) -> u32 {
         self.tiles.least_count()
+    }
+
+    /// Whether the render ends with it, done or stopped.
+    #[must_use]
+    pub fn is_last(&self) -> bool {
+        self.is_last
     }
 
     /// All that is needed to go on by [`Control::resume`], for a picture with this tag.
@@ -288,6 +295,9 @@ impl<'a> Render<'a> {
 
     pub(crate) fn outcome(self, reason: Reason) -> Outcome {
         self.reporter.tell();
+        if let (Some(watch), Some(tiles)) = (self.control.watch, &self.tiles) {
+            watch(&Glimpse { tiles, size: [self.film.width(), self.film.height()], is_last: true });
+        }
         let counters = self.tiles.as_ref().map_or_else(Counters::default, |tiles| {
             let picture::Counts { samples, non_finite } = tiles.counts();
             Counters { samples, non_finite, ..*tiles.total() }
@@ -322,7 +332,7 @@ impl<'a> Render<'a> {
             reporter.add(tiles.counts().samples - before);
             before = tiles.counts().samples;
             if let Some(watch) = control.watch {
-                watch(&Glimpse { tiles, size });
+                watch(&Glimpse { tiles, size, is_last: false });
             }
         });
         ran.ending == Ending::Done

@@ -1,7 +1,7 @@
 //! Checks made before a long render, so that its result is not lost.
 
 use std::fs::OpenOptions;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use fogbow_std::image::is_writable;
 
@@ -27,6 +27,23 @@ pub(super) fn check_place(file: &Path) -> Result<(), String> {
         std::fs::remove_file(file).map_err(|e| format!("{}: {e}", file.display()))?;
     }
     Ok(())
+}
+
+/// Where a picture goes: if it was `stopped`, not over one that is there, which may have had all its time, but beside it.
+pub(super) fn not_over_better(files: Vec<PathBuf>, stopped: bool) -> Vec<PathBuf> {
+    let beside = |file: PathBuf| {
+        if !stopped || !file.is_file() {
+            return file;
+        }
+        let mut name = file.file_stem().unwrap_or_default().to_owned();
+        name.push(".stopped");
+        if let Some(extension) = file.extension() {
+            name.push(".");
+            name.push(extension);
+        }
+        file.with_file_name(name)
+    };
+    files.into_iter().map(beside).collect()
 }
 
 /// A number above 0.

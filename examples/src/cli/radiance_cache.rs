@@ -6,8 +6,8 @@ use std::time::Duration;
 use clap::{Arg, Args, ValueEnum};
 use fogbow::bytes::Crc;
 use fogbow::cache::{
-    self, Asked, Audit, BiasMap, CachedRadiance, CachesError, Extrapolation, Findings, RadianceCaches, RaySettings,
-    Refinement,
+    self, Asked, Audit, BiasMap, CachedRadiance, CachesError, Extrapolation, Filling, Findings, RadianceCaches,
+    RaySettings, Refinement,
 };
 use fogbow::covariance::image_sampling::Plan;
 use fogbow::host::Medium;
@@ -30,6 +30,7 @@ use fogbow_std::tiles::{self, Outcome};
 use super::covariance::Stopped;
 use super::defaults::{unit_outline, with_default};
 use super::image_sampling::is_computed;
+use super::keep::{Keeper, Measured};
 use super::scene::SceneArguments;
 use super::{Failure, output};
 use crate::camera::Camera;
@@ -234,8 +235,10 @@ pub(super) struct CacheJob<'a> {
     /// Whether nobody says how many samples there are to be, or how little noise.
     pub(super) has_usual_goal: bool,
     pub(super) control: &'a Control<'a>,
-    /// Is told of every stage of filling, again and again.
-    pub(super) tell: &'a (dyn Fn(&'static str) + Sync),
+    /// Is told of every stage of filling, again and again, and which share of its jobs is done.
+    pub(super) tell: &'a (dyn Fn(&'static str, f32) + Sync),
+    /// What is kept of the render, if anything, and what it goes on with.
+    pub(super) keeper: Option<&'a Keeper<'a>>,
     pub(super) arguments: &'a CacheArguments,
     /// Which pixels are computed; `None` for all.
     pub(super) plan: Option<&'a Plan<'a>>,
@@ -264,21 +267,24 @@ pub(super) struct Cached {
 struct Filled {
     caches: RadianceCaches<'static>,
     ending: Ending,
-    /// Noise that a picture from them may have.
-    noise: f32,
+    measured: Measured,
     audited: Option<Audited>,
 }
 
 impl Filled {
     /// No more views follow, for which photons were kept.
-    fn new(mut caches: RadianceCaches<'static>, (ending, noise): (Ending, f32), audited: Option<Audited>) -> Self {
+    fn new(
+        mut caches: RadianceCaches<'static>,
+        (ending, measured): (Ending, Measured),
+        audited: Option<Audited>,
+    ) -> Self {
         caches.forget_photons();
-        Self { caches, ending, noise, audited }
+        Self { caches, ending, measured, audited }
     }
 
     /// When pixels have enough samples, unless told otherwise.
     fn usual_goal(&self) -> tiles::Goal {
-        tiles::Goal { noise: self.noise, least: LEAST_SAMPLES }
+        tiles::Goal { noise: self.measured.noise, least: LEAST_SAMPLES }
     }
 }
 
@@ -390,7 +396,13 @@ impl<M: Medium + Sync> Stages<'_, '_, M> {
         let ray = |at: [f32; 2]| self.ray(at);
         let width = job.film.width() as f32;
         let apart = ray([0.5, 0.5]).direction.angle_between(ray([0.5 + 1.0 / width, 0.5]).direction);
-        let tell = |filling: &_| (job.tell)(Rounds::<LitWorld<'_, M, World<'_>>>::stage(filling));
+        let tell = |filling: &Filling<'_, _>| {
+            let jobs = Rounds::<LitWorld<'_, M, World<'_>>>::jobs(filling);
+            (job.tell)(
+                Rounds::<LitWorld<'_, M, World<'_>>>::stage(filling),
+                jobs.start as f32 / jobs.end.max(1) as f32,
+            );
+        };
         let (mut repaired, mut noise) = (Vec::new(), error);
         loop {
             let clock = Stopwatch::start();
@@ -401,24 +413,41 @@ impl<M: Medium + Sync> Stages<'_, '_, M> {
             let audit_rays = job.arguments.audit.unwrap_or_else(|| filling.audit_rays());
             spent.record_noise = filling.record_noise().or(spent.record_noise);
             noise = noise.min(filling.noise_goal(error, job.film.width() * job.film.height()));
+            let measured = Measured { noise, audit_rays };
             caches = filling.finish();
             if ran.ending != Ending::Done || audit_rays == 0 || job.paths.max_scatterings == 0 {
-                return Filled::new(caches, (ran.ending, noise), None);
+                return Filled::new(caches, (ran.ending, measured), None);
             }
             let mut audit = Audit::new(&caches, ray, audit_rays);
             let share = time.map(|_| Refinement::audit_time(Duration::from_secs_f64(clock.elapsed().wall)));
             let ran = threads::run(&mut audit, &world, &self.pool, job.control, share, |_| {});
             add_times(&mut spent.filled, ran.stages);
             if ran.ending == Ending::Cancelled {
-                return Filled::new(caches, (ran.ending, noise), None);
+                return Filled::new(caches, (ran.ending, measured), None);
             }
             let (findings, map) = (audit.findings(), Box::new(audit.map()));
             let is_over = time.is_some() || repaired.len() as u32 >= cache::MOST_REPAIRS;
             if is_over || !caches.drop_wrong((&findings, &map), error, ray, &world) {
-                return Filled::new(caches, (Ending::Done, noise), Some(Audited { error, findings, map, repaired }));
+                return Filled::new(caches, (Ending::Done, measured), Some(Audited { error, findings, map, repaired }));
             }
             repaired.push((findings, map));
         }
+    }
+
+    /// Caches that were filled before, and audited anew: only what is said of them depends on that.
+    fn taken_up(&self, bytes: &[u8], measured: Measured, error: f32, spent: &mut Spent) -> Result<Filled, Failure> {
+        let (job, world) = (self.job, self.world());
+        let mut caches = RadianceCaches::new(job.settings(&self.outline, error));
+        caches.read(bytes, job.tag).map_err(|error| format!("the checkpoint's caches: {error}"))?;
+        if measured.audit_rays == 0 || job.paths.max_scatterings == 0 {
+            return Ok(Filled::new(caches, (Ending::Done, measured), None));
+        }
+        let mut audit = Audit::new(&caches, |at| self.ray(at), measured.audit_rays);
+        let ran = threads::run(&mut audit, &world, &self.pool, job.control, None, |_| (job.tell)("audit", 0.0));
+        add_times(&mut spent.filled, ran.stages);
+        let (findings, map) = (audit.findings(), Box::new(audit.map()));
+        let audited = Audited { error, findings, map, repaired: Vec::new() };
+        Ok(Filled::new(caches, (Ending::Done, measured), (ran.ending == Ending::Done).then_some(audited)))
     }
 
     /// Adds samples to a film.
@@ -526,13 +555,22 @@ impl WithMedium for CacheJob<'_> {
         let level = match self.settings.time {
             Some(time) if !self.arguments.has_files() => stages.timed(time, &mut spent)?,
             _ => {
-                let caches = self.arguments.load(self.settings(&outline, asked), self.tag)?;
-                loaded = clock.elapsed();
-                let filled = stages.fill(caches, asked, None, &mut spent);
+                let filled = if let Some((bytes, measured)) = self.keeper.and_then(Keeper::caches) {
+                    let filled = stages.taken_up(bytes, measured, asked, &mut spent)?;
+                    loaded = clock.elapsed();
+                    filled
+                } else {
+                    let caches = self.arguments.load(self.settings(&outline, asked), self.tag)?;
+                    loaded = clock.elapsed();
+                    stages.fill(caches, asked, None, &mut spent)
+                };
                 let mut film = Film::new(self.film.width(), self.film.height(), self.film.layers())?;
                 if filled.ending == Ending::Cancelled {
                     self.save(&filled.caches)?;
                     return Err(Stopped("caches").into());
+                }
+                if let Some(keeper) = self.keeper.filter(|keeper| keeper.is_asked()) {
+                    keeper.keep_caches(filled.caches.to_bytes(self.tag), filled.measured);
                 }
                 let goal = self.settings.goal.or_else(|| self.has_usual_goal.then(|| filled.usual_goal()));
                 let settings = tiles::Settings { goal, ..*self.settings };

@@ -14,7 +14,7 @@ use fogbow_std::tiles;
 
 use super::radiance_cache::{CacheArguments, CacheJob, Kind};
 use super::render::path_settings;
-use super::report::Bar;
+use super::report::{Bar, Voice};
 use super::scene::SceneArguments;
 use super::{Ending, Failure, output};
 use crate::camera::Camera;
@@ -95,7 +95,7 @@ pub(super) fn run(arguments: &RecordsArguments) -> Result<Ending, Failure> {
     let lights = world.lights();
     let tree = light_tree(&lights);
     let mut film = Film::new(width, height, &["total"])?;
-    let bar = Bar::new(arguments.quiet);
+    let bar = Bar::new(Voice::unless(arguments.quiet));
     let progress = |progress: &Progress| bar.show(progress, u64::from(width) * u64::from(height));
     let control = Control { progress: Some(&progress), ..Control::default() };
     let is_plain = arguments.section || arguments.black;
@@ -115,7 +115,8 @@ pub(super) fn run(arguments: &RecordsArguments) -> Result<Ending, Failure> {
         settings: &settings,
         has_usual_goal: false,
         control: &control,
-        tell: &|stage| bar.tell(stage),
+        tell: &|stage, share| bar.tell(stage, share),
+        keeper: None,
         arguments: &arguments.cache,
         plan: None,
         tag: arguments.cache.tag(&arguments.scene, &paths)?,

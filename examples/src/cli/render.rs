@@ -5,6 +5,7 @@ use core::time::Duration;
 use std::path::PathBuf;
 
 use clap::{Arg, Args, ValueEnum};
+use fogbow::bytes::Crc;
 use fogbow::cache::{self, Kind, RadianceCaches};
 use fogbow::covariance::image_sampling::Plan;
 use fogbow::covariance::{CovarianceGrid, GridView};
@@ -17,6 +18,7 @@ use fogbow::sampling::{Generator, uniform2};
 use fogbow::spectrum::Spectrum;
 use fogbow::vpl::VirtualLight;
 use fogbow::world::World as LitWorld;
+use fogbow_std::files;
 use fogbow_std::film::Film;
 use fogbow_std::image::write_film;
 use fogbow_std::progress::{Control, Progress};
@@ -29,10 +31,11 @@ use super::choice::Choice;
 use super::covariance::{CovarianceArguments, GridJob, MarchArguments, Step, Stopped};
 use super::defaults::{with_default, with_remark};
 use super::image_sampling::{self, SamplingArguments, Sight};
+use super::keep::{KeepArguments, Keeper};
 use super::march::{self, MarchJob};
 use super::photon_beams::{BeamArguments, BeamJob, Kernel};
 use super::radiance_cache::{Audited, CacheArguments, CacheJob};
-use super::report::{Bar, Report};
+use super::report::{Bar, Report, Voice};
 use super::scene::SceneArguments;
 use super::vpl::{self, Audit, VplArguments, VplJob};
 use super::{Ending, Failure, bias_layers, ellipsoids, output};
@@ -93,6 +96,12 @@ pub struct RenderArguments {
     /// No progress bar and no summary.
     #[arg(short, long)]
     pub quiet: bool,
+    /// Progress for other programs: a JSON object per line on standard output, with "event" and what belongs to it.
+    #[arg(long, conflicts_with = "quiet")]
+    pub json: bool,
+    /// Of renders that may be interrupted.
+    #[command(flatten)]
+    pub keep: KeepArguments,
     /// Of radiance caching.
     #[command(flatten)]
     pub cache: CacheArguments,
@@ -202,6 +211,8 @@ pub(crate) struct Rendered {
 }
 
 pub(super) fn run(arguments: &RenderArguments) -> Result<Ending, Failure> {
+    // Reading a scene takes a while, too.
+    stop_flag();
     let outputs = outputs(arguments)?;
     let rendered = match render(arguments) {
         // Nothing has been rendered yet, and nothing is wrong.
@@ -212,10 +223,15 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<Ending, Failure> {
         rendered => rendered?,
     };
     let Rendered { mut film, choice, outcome, mut statistics, audit, audited, .. } = rendered;
+    if outcome.samples == 0 && outcome.reason == Reason::Cancelled {
+        eprintln!("fogbow: stopped before every pixel had a sample; no picture is written");
+        return Ok(Ending::Stopped);
+    }
     if !arguments.aov && film.layers().len() > 1 {
         film = film.first(1)?;
     }
-    statistics.time("write", || outputs.iter().try_for_each(|file| write_film(file, &film, arguments.exposure)))?;
+    let outputs = output::not_over_better(outputs, outcome.reason == Reason::Cancelled);
+    let (outputs, trouble) = statistics.time("write", || write_all(outputs, &film, arguments.exposure));
 
     let size = (film.width(), film.height());
     let report = Report {
@@ -229,12 +245,40 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<Ending, Failure> {
         audited: audited.as_ref(),
     };
     if let Some(file) = &arguments.stats {
-        std::fs::write(file, report.json()).map_err(|e| format!("{}: cannot be written: {e}", file.display()))?;
+        files::write(file, report.json().as_bytes())?;
     }
     if !arguments.quiet {
         report.print();
     }
+    let bar = Bar::new(arguments.voice());
+    outputs.iter().for_each(|file| bar.wrote(file));
+    if let Some(trouble) = trouble {
+        return Err(trouble.into());
+    }
+    bar.ended(outcome.reason);
     Ok(if outcome.reason == Reason::Cancelled { Ending::Stopped } else { Ending::Done })
+}
+
+/// Writes a picture to every file that can be written; of the others, what went wrong. If none can, it goes into the folder of temporary files:
+/// hours of rendering are not lost for want of a place.
+fn write_all(files: Vec<PathBuf>, film: &Film, exposure: f32) -> (Vec<PathBuf>, Option<String>) {
+    let (mut written, mut trouble) = (Vec::new(), Vec::new());
+    for file in files {
+        match write_film(&file, film, exposure) {
+            Ok(()) => written.push(file),
+            Err(error) => trouble.push((file, error.to_string())),
+        }
+    }
+    if let (true, Some((file, _))) = (written.is_empty(), trouble.last()) {
+        let mut name = file.file_stem().unwrap_or_default().to_owned();
+        name.push(format!("-{}.exr", std::process::id()));
+        let rescue = std::env::temp_dir().join(name);
+        if write_film(&rescue, film, exposure).is_ok() {
+            written.push(rescue);
+        }
+    }
+    let trouble: Vec<_> = trouble.into_iter().map(|(_, error)| error).collect();
+    (written, (!trouble.is_empty()).then(|| trouble.join("; ")))
 }
 
 /// Renders; writes nothing.
@@ -274,9 +318,19 @@ pub(crate) fn render(arguments: &RenderArguments) -> Result<Rendered, Failure> {
     statistics.bytes.push(("volumes".to_owned(), scene.media.iter().map(|m| m.bytes() as u64).sum()));
     statistics.bytes.push(("world".to_owned(), world.bytes() as u64));
 
-    let bar = Bar::new(arguments.quiet);
+    let bar = Bar::new(arguments.voice());
     let progress = |progress: &Progress| bar.show(progress, u64::from(width) * u64::from(height));
-    let control = Control { cancel: Some(stop_flag()), progress: Some(&progress), ..Control::default() };
+    let keeper = Keeper::new(&arguments.keep, arguments.keep_tag(method, &scene)?)?;
+    if keeper.is_asked() && arguments.time.is_some() && method == Method::RadianceCache {
+        return Err(
+            "--checkpoint: radiance caching with --time makes several pictures, of which none can be gone on with; \
+                    leave --time out"
+                .into(),
+        );
+    }
+    let watch = |glimpse: &tiles::Glimpse<'_>| keeper.watch(glimpse);
+    let control =
+        Control { cancel: Some(stop_flag()), progress: Some(&progress), watch: Some(&watch), resume: keeper.picture() };
     let (samples, noise) = arguments.samples(method, scene.sensor.samples);
     let settings = tiles::Settings {
         samples,
@@ -352,7 +406,8 @@ pub(crate) fn render(arguments: &RenderArguments) -> Result<Rendered, Failure> {
                 settings: &settings,
                 has_usual_goal: arguments.spp.is_none() && arguments.noise.is_none() && arguments.time.is_none(),
                 control: &control,
-                tell: &|stage| bar.tell(stage),
+                tell: &|stage, share| bar.tell(stage, share),
+                keeper: Some(&keeper),
                 arguments: &arguments.cache,
                 plan: plan.as_ref(),
                 tag: arguments.cache.tag(&arguments.scene, &paths)?,
@@ -363,6 +418,9 @@ pub(crate) fn render(arguments: &RenderArguments) -> Result<Rendered, Failure> {
         }
     };
     bar.finish();
+    if let Some(problem) = keeper.problem() {
+        eprintln!("fogbow: {problem}");
+    }
     if let Some(plan) = &plan {
         film = statistics.time("fill in", || image_sampling::finished(&film, plan, arguments.aov, &threads))?;
     }
@@ -391,9 +449,36 @@ pub(crate) fn render(arguments: &RenderArguments) -> Result<Rendered, Failure> {
 }
 
 impl RenderArguments {
+    /// What a checkpoint is for: all that changes the picture but the number of samples, of which more may be asked for.
+    fn keep_tag(&self, method: Method, scene: &SceneFile) -> Result<u64, Failure> {
+        let Some(_) = &self.keep.checkpoint else { return Ok(0) };
+        let mut crc = Crc::new();
+        crc.add(&self.scene.fingerprint()?.to_le_bytes());
+        let Self { noise, max_depth, seed, size, camera, aov, cache, beams, vpl, march, sampling, covariance, .. } =
+            self;
+        let cache = CacheArguments { cache_in: None, cache_out: None, ..cache.clone() };
+        let covariance = CovarianceArguments { grid_out: None, ..covariance.clone() };
+        let what = (method, &scene.integrator);
+        crc.add(format!("{what:?} {noise:?} {max_depth:?} {seed} {size:?} {camera:?} {aov}").as_bytes());
+        crc.add(format!("{:?}", scene.sensor).as_bytes());
+        crc.add(format!("{cache:?} {beams:?} {vpl:?} {march:?} {sampling:?} {covariance:?}").as_bytes());
+        // Layers depend on it.
+        crc.add(&[u8::from(self.is_audited())]);
+        Ok(crc.value())
+    }
+
     /// Whether virtual lights' layers are kept: pixels that are filled in have none.
     fn is_audited(&self) -> bool {
         (self.aov || self.stats.is_some()) && self.sampling.is_uniform()
+    }
+
+    /// How progress is shown.
+    pub(super) fn voice(&self) -> Voice {
+        match (self.quiet, self.json) {
+            (true, _) => Voice::Quiet,
+            (_, true) => Voice::Json,
+            _ => Voice::Bar,
+        }
     }
 
     /// Samples of a pixel at most, given what the scene names, and the noise at which fewer are enough.
@@ -448,6 +533,7 @@ fn outputs(arguments: &RenderArguments) -> Result<Vec<PathBuf>, Failure> {
         return Err("--cache-in and --cache-out need --method radiance-cache".into());
     }
     caches.check()?;
+    arguments.keep.check()?;
     if arguments.march.step != Step::Uniform && arguments.method != Some(Method::March) {
         return Err("--step covariance and frequency need --method march".into());
     }

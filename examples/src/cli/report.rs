@@ -1,7 +1,10 @@
 //! What the user sees of a render: the bar, the summary, the file of statistics.
 
 use core::fmt::Write;
-use std::path::PathBuf;
+use std::io::IsTerminal;
+use std::path::{Path, PathBuf};
+use std::sync::Mutex;
+use std::time::{Duration, Instant};
 
 use fogbow::cache::{AuditedRegion, BiasMap, Deviation, Findings, Kind, MeanLight};
 use fogbow_std::progress::Progress;
@@ -18,48 +21,132 @@ use crate::statistics::Statistics;
 /// Steps of the progress bar.
 const STEPS: u64 = 1000;
 
-/// The progress bar.
-pub(super) struct Bar(Option<ProgressBar>);
+/// How often a line says how far the work is, where there is no terminal to draw a bar on: often enough for a log.
+const BETWEEN_LINES: Duration = Duration::from_secs(10);
+
+/// How often other programs are told.
+const BETWEEN_EVENTS: Duration = Duration::from_millis(500);
+
+/// How a user sees progress.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Voice {
+    /// Not at all.
+    Quiet,
+    /// A bar on a terminal, now and then a line elsewhere: on standard error.
+    Bar,
+    /// A JSON object per line, on standard output.
+    Json,
+}
+
+impl Voice {
+    pub(super) fn unless(quiet: bool) -> Self {
+        if quiet { Self::Quiet } else { Self::Bar }
+    }
+}
+
+/// The progress of a command, in every stage.
+pub(super) struct Bar {
+    voice: Voice,
+    /// On a terminal.
+    bar: Option<ProgressBar>,
+    clock: Instant,
+    last: Mutex<Instant>,
+}
 
 impl Bar {
-    pub(super) fn new(is_quiet: bool) -> Self {
-        if is_quiet {
-            return Self(None);
-        }
-        let bar = ProgressBar::new(STEPS);
-        if let Ok(style) = ProgressStyle::with_template("{bar:40} {percent:>3} %  {msg}") {
-            bar.set_style(style.progress_chars("=> "));
-        }
-        Self(Some(bar))
+    pub(super) fn new(voice: Voice) -> Self {
+        let has_bar = voice == Voice::Bar && std::io::stderr().is_terminal();
+        let bar = has_bar.then(|| {
+            let bar = ProgressBar::new(STEPS);
+            // No wider than 40 columns, with the message.
+            if let Ok(style) = ProgressStyle::with_template("{bar:10} {percent:>3} % {msg}") {
+                bar.set_style(style.progress_chars("=> "));
+            }
+            bar
+        });
+        let now = Instant::now();
+        Self { voice, bar, clock: now, last: Mutex::new(now) }
     }
 
+    /// Shows which share of a stage is done, and how long it may still take (s).
+    fn say(&self, stage: &str, share: f64, left: Option<f64>, detail: &str) {
+        if let Some(bar) = &self.bar {
+            bar.set_position((share.clamp(0.0, 1.0) * STEPS as f64) as u64);
+            let left =
+                left.filter(|left| left.is_finite()).map_or_else(String::new, |left| format!("{} left", clock(left)));
+            let what = if detail.is_empty() { stage } else { detail };
+            bar.set_message(if left.is_empty() { what.to_owned() } else { format!("{what}, {left}") });
+            return;
+        }
+        let every = match self.voice {
+            Voice::Quiet => return,
+            Voice::Bar => BETWEEN_LINES,
+            Voice::Json => BETWEEN_EVENTS,
+        };
+        let Ok(mut last) = self.last.lock() else { return };
+        if last.elapsed() < every {
+            return;
+        }
+        *last = Instant::now();
+        let elapsed = self.clock.elapsed().as_secs_f64();
+        if self.voice == Voice::Json {
+            let left =
+                left.filter(|left| left.is_finite()).map_or_else(|| "null".to_owned(), |left| format!("{left:.1}"));
+            let stage = quoted(stage);
+            println!(
+                "{{\"event\": \"progress\", \"stage\": {stage}, \"share\": {share:.3}, \"elapsed\": {elapsed:.1}, \"left\": {left}}}"
+            );
+        } else {
+            let left =
+                left.filter(|left| left.is_finite()).map_or_else(String::new, |left| format!(", {} left", clock(left)));
+            let detail = if detail.is_empty() { String::new() } else { format!(", {detail}") };
+            eprintln!("{}: {stage} {:.0} %{detail}{left}", clock(elapsed), 100.0 * share);
+        }
+    }
+
+    /// How far a picture is.
     pub(super) fn show(&self, progress: &Progress, pixels: u64) {
-        let Some(bar) = &self.0 else { return };
-        bar.set_position((progress.fraction() * STEPS as f64) as u64);
         let spp = progress.done as f64 / pixels.max(1) as f64;
-        let left = progress.remaining().map_or_else(String::new, |t| format!(", {} left", clock(t.as_secs_f64())));
-        bar.set_message(format!("{spp:.1} samples per pixel{left}"));
+        let left = progress.remaining().map(|left| left.as_secs_f64());
+        self.say("render", progress.fraction(), left, &format!("{spp:.0} spp"));
     }
 
     /// Shows a share of work that is done after so many seconds.
     pub(super) fn share(&self, share: f32, elapsed: f64) {
-        let Some(bar) = &self.0 else { return };
-        bar.set_position((f64::from(share) * STEPS as f64) as u64);
-        let left = elapsed * f64::from((1.0 - share) / share);
-        bar.set_message(if left.is_finite() { format!("{} left", clock(left)) } else { String::new() });
+        self.say("bake", f64::from(share), Some(elapsed * f64::from((1.0 - share) / share)), "");
     }
 
-    /// Says what is done before there is anything to show.
-    pub(super) fn tell(&self, stage: &'static str) {
-        if let Some(bar) = &self.0 {
-            bar.set_message(stage);
+    /// Says what is done before there is anything to show, and which share of the jobs of this stage.
+    pub(super) fn tell(&self, stage: &'static str, share: f32) {
+        self.say(stage, f64::from(share), None, "");
+    }
+
+    /// Tells other programs of a file that was written.
+    pub(super) fn wrote(&self, file: &Path) {
+        if self.voice == Voice::Json {
+            println!("{{\"event\": \"wrote\", \"file\": {}}}", quoted(&file.display().to_string()));
+        }
+    }
+
+    /// Tells other programs how the command ended.
+    pub(super) fn ended(&self, how: Reason) {
+        if self.voice == Voice::Json {
+            println!("{{\"event\": \"end\", \"ended\": \"{}\"}}", reason_word(how));
         }
     }
 
     pub(super) fn finish(&self) {
-        if let Some(bar) = &self.0 {
+        if let Some(bar) = &self.bar {
             bar.finish_and_clear();
         }
+    }
+}
+
+fn reason_word(reason: Reason) -> &'static str {
+    match reason {
+        Reason::Done => "done",
+        Reason::TimeUp => "time",
+        Reason::Cancelled => "cancelled",
     }
 }
 
@@ -167,11 +254,7 @@ impl Report<'_> {
     /// The file of statistics.
     pub(super) fn json(&self) -> String {
         let counters = &self.outcome.counters;
-        let reason = match self.outcome.reason {
-            Reason::Done => "done",
-            Reason::TimeUp => "time",
-            Reason::Cancelled => "cancelled",
-        };
+        let reason = reason_word(self.outcome.reason);
         let mut phases = String::new();
         for (index, (name, seconds)) in self.statistics.phases.iter().enumerate() {
             let cpu = seconds.cpu.map_or_else(|| "null".to_owned(), |c| format!("{c:.6}"));

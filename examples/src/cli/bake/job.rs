@@ -16,7 +16,7 @@ use fogbow_std::threads::{self, Threads};
 
 use super::super::covariance::Stopped;
 use super::super::render::stop_flag;
-use super::super::report::Bar;
+use super::super::report::{Bar, Voice};
 use super::super::{Ending, Failure};
 use super::{BakeArguments, Source, begun, write};
 use crate::world::{WithMedium, World};
@@ -123,11 +123,11 @@ impl BakeJob<'_> {
     ) -> Result<Done, Failure> {
         let pool = Threads::new(self.arguments.threads)?;
         let control = Control { cancel: Some(stop_flag()), ..Control::default() };
-        let bar = Bar::new(self.arguments.quiet);
+        let bar = Bar::new(Voice::unless(self.arguments.quiet));
         let mut caches = None;
         if self.method != Source::Path {
             let mut filling = self.caches(outline).fill(Asked::anywhere_in(self.bounds));
-            let tell = |filling: &_| bar.tell(Rounds::<LitWorld<'_, M, S>>::stage(filling));
+            let tell = |filling: &_| bar.tell(Rounds::<LitWorld<'_, M, S>>::stage(filling), 0.0);
             let ran = threads::run(&mut filling, world, &pool, &control, None, tell);
             if ran.ending != threads::Ending::Done {
                 bar.finish();
@@ -162,7 +162,7 @@ impl BakeJob<'_> {
         });
         let mut deviation = None;
         if caches.is_some() && ran.ending == threads::Ending::Done {
-            bar.tell("compare");
+            bar.tell("compare", 0.0);
             let bricks: Vec<usize> = compared(self.counts).collect();
             let mut unbiased = Bake::new(settings)?.only(|brick| bricks.contains(&brick));
             let ran = threads::run(&mut unbiased, world, &pool, &control, None, |_| ());
