@@ -1,8 +1,11 @@
 //! Triangle meshes and their files.
 
+mod curves;
+mod forms;
 mod normals;
 mod obj;
 mod ply;
+mod serialized;
 
 use std::path::Path;
 
@@ -90,6 +93,39 @@ impl Mesh {
     /// As [`Mesh::read_ply`].
     pub fn from_obj(file: &Path, bytes: &[u8]) -> Result<Self, DataError> {
         obj::read(file, bytes)?.checked(file)
+    }
+
+    /// Reads one of the meshes in a file of Mitsuba's serialized meshes.
+    ///
+    /// # Errors
+    /// As [`Mesh::read_ply`], and an index that the file does not have.
+    pub fn read_serialized(file: &Path, index: usize) -> Result<Self, DataError> {
+        Self::from_serialized(file, &read_file(file)?, index)
+    }
+
+    /// Reads one of the meshes in the bytes of a file.
+    ///
+    /// # Errors
+    /// As [`Mesh::read_serialized`].
+    pub fn from_serialized(file: &Path, bytes: &[u8], index: usize) -> Result<Self, DataError> {
+        serialized::read(file, bytes, index)?.checked(file)
+    }
+
+    /// Reads Mitsuba's curves, a control point with its radius on each line and an empty line between two curves, as tubes of
+    /// triangles: straight between points, or cubic B-splines. Points are transformed, radii are not.
+    ///
+    /// # Errors
+    /// A file that is missing or broken.
+    pub fn read_curves(file: &Path, is_smooth: bool, to_world: &Transform) -> Result<Self, DataError> {
+        Self::from_curves(file, &read_file(file)?, is_smooth, to_world)
+    }
+
+    /// Reads the bytes of a file of curves.
+    ///
+    /// # Errors
+    /// As [`Mesh::read_curves`].
+    pub fn from_curves(file: &Path, bytes: &[u8], is_smooth: bool, to_world: &Transform) -> Result<Self, DataError> {
+        curves::read(file, bytes, is_smooth, to_world)?.checked(file)
     }
 
     /// The corners of a triangle.

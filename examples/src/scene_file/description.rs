@@ -214,6 +214,8 @@ pub enum Geometry {
         /// Its own axes: texture coordinates go around the third.
         axes: Transform,
     },
+    /// The image of the open cylinder around z, of radius 1 from z = 0 to z = 1, normals outwards.
+    Cylinder(Transform),
     /// Triangles, already in world space.
     Mesh(Mesh),
 }

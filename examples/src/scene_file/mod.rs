@@ -8,7 +8,7 @@
 //! | `sampler` | any of Mitsuba's: `sample_count` |
 //! | `medium` | `homogeneous` (`sigma_t` and `albedo`, or `sigma_a` and `sigma_s`; `scale`), `heterogeneous` (`sigma_t` as `gridvolume` or `constvolume`) |
 //! | `phase` | `isotropic`, `hg`, `rayleigh`, `blendphase` |
-//! | `shape` | `rectangle`, `cube`, `sphere`, `disk`, `ply`, `obj` |
+//! | `shape` | `rectangle`, `cube`, `sphere`, `disk`, `cylinder`, `ply`, `obj`, `serialized`, `linearcurve`, `bsplinecurve` (tubes of triangles), `shapegroup`, `instance`, `merge` |
 //! | `bsdf` | `diffuse`, `twosided`, `null`, `conductor` with material `none`, `dielectric`; and `phong`, which Mitsuba 3 does not know |
 //! | `texture` | `bitmap`, `checkerboard`, `mesh_attribute`, `volume`, `uniform`, `rawconstant`: on reflectances |
 //! | `emitter` | `point`, `spot`, `area`, `directional`, `constant`, `envmap` |
@@ -21,6 +21,7 @@ mod description;
 mod element;
 mod emitters;
 mod fingerprint;
+mod groups;
 mod materials;
 mod media;
 mod notes;
@@ -139,12 +140,13 @@ fn read_scene(scene: &Element<'_>, options: &ReadOptions) -> Result<SceneFile, S
     let is_referred_to = referred_to(scene);
     let (mut integrators, mut sensors) = (Vec::new(), Vec::new());
     let (mut shapes, mut emitters, mut media) = (Vec::new(), Vec::new(), Vec::new());
+    let mut groups = groups::Groups::default();
     for child in scene.children()? {
         match child.tag() {
             "integrator" => integrators.push(child),
             "sensor" => sensors.push(child),
             "medium" => media.push(child),
-            "shape" => shapes.extend(child.keep(shapes::read(&child))),
+            "shape" => shapes.extend(child.keep(shapes::read(&child, &mut groups)).into_iter().flatten()),
             // Those that are used are read where they are used.
             "bsdf" if !is_referred_to.contains(&child.node.id()) => {
                 if let Err(error) = materials::read(&child) {

@@ -5,14 +5,17 @@ use fogbow::surface::Surface;
 
 use super::description::{Container, Geometry, Material, Shape};
 use super::element::Element;
+use super::groups::Groups;
 use super::plugin::Plugin;
-use super::{materials, textures};
+use super::{groups, materials, textures};
 use crate::error::SceneError;
 use crate::mesh::Mesh;
-use crate::transform::Transform;
+use crate::transform::{Transform, normalized};
+
+const KNOWN: &str = "rectangle, cube, sphere, disk, cylinder, ply, obj, serialized, linearcurve, bsplinecurve, shapegroup, instance, merge";
 
 /// A shape and the media at its sides.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(super) struct ShapeElement<'a> {
     pub(super) element: Element<'a>,
     /// The surface; `None` where light passes unchanged.
@@ -24,25 +27,45 @@ pub(super) struct ShapeElement<'a> {
     pub(super) exterior: Option<Element<'a>>,
 }
 
-pub(super) fn read<'a>(element: &Element<'a>) -> Result<ShapeElement<'a>, SceneError> {
+/// The shapes of a `<shape>`: several for an instance of a group, none for the group itself.
+pub(super) fn read<'a>(element: &Element<'a>, groups: &mut Groups<'a>) -> Result<Vec<ShapeElement<'a>>, SceneError> {
     let plugin = Plugin::new(*element)?;
+    match plugin.kind.as_str() {
+        // What nobody instances is not seen.
+        "shapegroup" => {
+            groups.of(element)?;
+            Ok(Vec::new())
+        }
+        "instance" => groups::instance(&plugin, groups),
+        "merge" => {
+            let shapes = groups::members(&plugin, groups)?;
+            plugin.finish()?;
+            Ok(shapes)
+        }
+        _ => Ok(vec![read_one(&plugin)?]),
+    }
+}
+
+fn read_one<'a>(plugin: &Plugin<'a>) -> Result<ShapeElement<'a>, SceneError> {
+    let element = &plugin.element;
     let is_flipped = plugin.boolean("flip_normals", false)?;
     let radiance = plugin.nested("emitter").map(|e| area_emitter(&e)).transpose()?;
-    let interior = side(&plugin, "interior")?;
-    let exterior = side(&plugin, "exterior")?;
+    let interior = side(plugin, "interior")?;
+    let exterior = side(plugin, "exterior")?;
     let material = match plugin.nested("bsdf") {
         // A shape whose material is not known still tells what else is wrong with it.
         Some(bsdf) => bsdf.keep(materials::read(&bsdf)),
         None => None,
     };
     let material = material.unwrap_or_else(|| materials::default_material(radiance.is_some()));
-    let geometry = read_geometry(&plugin)?;
+    let geometry = read_geometry(plugin)?;
     plugin.finish()?;
     let container = match &geometry {
         Geometry::Cube(to_world) => Some(Container::Cube(*to_world)),
         Geometry::Sphere { centre, radius, .. } => Some(Container::Sphere { centre: *centre, radius: *radius }),
         _ => None,
     };
+    let geometry = if radiance.is_some() { shining(geometry, is_flipped) } else { geometry };
     let mesh = match &geometry {
         Geometry::Mesh(mesh) => Some(mesh),
         _ => None,
@@ -68,12 +91,6 @@ fn check(
     if is_emitter && is_clear {
         return Err(element.error("an area light needs a bsdf that light cannot pass through"));
     }
-    if is_emitter && matches!(geometry, Geometry::Disk(_)) {
-        return Err(element.error("a disk cannot be an area light here; rectangle, sphere, cube and meshes can"));
-    }
-    if is_emitter && is_flipped && matches!(geometry, Geometry::Sphere { .. }) {
-        return Err(element.error("a sphere that shines inwards is not supported"));
-    }
     if has_media && !matches!(geometry, Geometry::Cube(_) | Geometry::Sphere { .. }) && is_clear {
         return Err(element.error("only a cube or a sphere can hold a medium"));
     }
@@ -81,6 +98,20 @@ fn check(
         return Err(element.error("a container of a medium cannot have flipped normals"));
     }
     Ok(())
+}
+
+/// A form that can shine: those that the lights of the core do not know become triangles.
+fn shining(geometry: Geometry, is_flipped: bool) -> Geometry {
+    match geometry {
+        Geometry::Disk(to_world) => Geometry::Mesh(Mesh::disc(&to_world)),
+        Geometry::Cylinder(to_world) => Geometry::Mesh(Mesh::cylinder(&to_world)),
+        // Lights that are spheres shine outwards.
+        Geometry::Sphere { centre, radius, .. } if is_flipped => {
+            let placed = Transform::scaling([radius; 3]).then(&Transform::translation(centre));
+            Geometry::Mesh(Mesh::ball(&placed))
+        }
+        other => other,
+    }
 }
 
 /// The medium at a side: `<ref name="interior" id="fog"/>` or a `<medium name="interior">`.
@@ -124,12 +155,22 @@ fn read_geometry(plugin: &Plugin<'_>) -> Result<Geometry, SceneError> {
             }
             Ok(Geometry::Sphere { centre, radius, axes: to_world })
         }
-        "ply" | "obj" => {
+        "cylinder" => cylinder(plugin, &to_world),
+        "linearcurve" | "bsplinecurve" => {
+            let (file, source) = plugin.path("filename")?;
+            let mesh = Mesh::read_curves(&file, plugin.kind == "bsplinecurve", &to_world);
+            Ok(Geometry::Mesh(mesh.map_err(|e| source.data_error(&e))?))
+        }
+        "ply" | "obj" | "serialized" => {
             let (file, source) = plugin.path("filename")?;
             let is_flat = plugin.boolean("face_normals", false)?;
             // Each format has its own idea of what is up.
             let flips = plugin.boolean("flip_tex_coords", plugin.kind == "obj")? != (plugin.kind == "obj");
-            let mesh = if plugin.kind == "ply" { Mesh::read_ply(&file) } else { Mesh::read_obj(&file) };
+            let mesh = match plugin.kind.as_str() {
+                "ply" => Mesh::read_ply(&file),
+                "obj" => Mesh::read_obj(&file),
+                _ => Mesh::read_serialized(&file, plugin.integer("shape_index", 0, 0..=i64::from(u32::MAX))? as usize),
+            };
             let mut mesh = mesh.map_err(|e| source.data_error(&e))?;
             if is_flat {
                 mesh.normals = Vec::new();
@@ -143,6 +184,26 @@ fn read_geometry(plugin: &Plugin<'_>) -> Result<Geometry, SceneError> {
             }
             Ok(Geometry::Mesh(mesh))
         }
-        _ => Err(plugin.unknown_type("rectangle, cube, sphere, disk, ply, obj")),
+        _ => Err(plugin.unknown_type(KNOWN)),
     }
+}
+
+/// Around the line between two points.
+fn cylinder(plugin: &Plugin<'_>, to_world: &Transform) -> Result<Geometry, SceneError> {
+    let from = plugin.point("p0")?.unwrap_or([0.0; 3]);
+    let to = plugin.point("p1")?.unwrap_or([0.0, 0.0, 1.0]);
+    let radius = plugin.positive("radius", 1.0)?;
+    let axis = [0, 1, 2].map(|i| to[i] - from[i]);
+    let along = normalized(axis).ok_or_else(|| plugin.element.error("p0 and p1 are the same point"))?;
+    // Where angles begin: the frame of Duff et al. 2017, "Building an Orthonormal Basis, Revisited".
+    let sign = if along[2] < 0.0 { -1.0 } else { 1.0 };
+    let a = -1.0 / (sign + along[2]);
+    let b = along[0] * along[1] * a;
+    let x = [1.0 + sign * along[0] * along[0] * a, sign * b, -sign * along[0]];
+    let y = [b, sign + along[1] * along[1] * a, -along[1]];
+    let placed = Transform::from_columns(x.map(|c| c * radius), y.map(|c| c * radius), axis, from).then(to_world);
+    if !placed.is_regular() {
+        return Err(plugin.element.error("the cylinder is flattened, or beyond what can be computed with"));
+    }
+    Ok(Geometry::Cylinder(placed))
 }

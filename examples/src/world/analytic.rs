@@ -39,6 +39,11 @@ pub(super) enum Primitive {
         /// Gradients of the coordinates, and values at the origin.
         rows: [(Vec3, f32); 3],
     },
+    /// An open cylinder: points whose coordinates, as of a box, have `x² + y² = 1` and `0 ≤ z ≤ 1`.
+    Cylinder {
+        /// Gradients of the coordinates, and values at the origin.
+        rows: [(Vec3, f32); 3],
+    },
 }
 
 impl Primitive {
@@ -58,6 +63,9 @@ impl Primitive {
                     }
                 }
                 outward.normalize()
+            }
+            Self::Cylinder { rows: [x, y, _] } => {
+                ((x.0 * (x.0.dot(point) + x.1)) + (y.0 * (y.0.dot(point) + y.1))).normalize()
             }
         }
     }
@@ -83,6 +91,9 @@ impl Primitive {
             Self::Flat { .. } => FlatChunk::of(core::slice::from_ref(self)).distances(ray, Vec4::splat(length))[0],
             Self::Sphere { .. } => SphereChunk::of(core::slice::from_ref(self)).distances(ray, Vec4::splat(length))[0],
             Self::Box { .. } => BoxChunk::of(core::slice::from_ref(self)).distances(ray, Vec4::splat(length))[0],
+            Self::Cylinder { .. } => {
+                CylinderChunk::of(core::slice::from_ref(self)).distances(ray, Vec4::splat(length))[0]
+            }
         }
     }
 
@@ -92,6 +103,7 @@ impl Primitive {
             Self::Flat { is_disc: true, .. } => 1,
             Self::Sphere { .. } => 2,
             Self::Box { .. } => 3,
+            Self::Cylinder { .. } => 4,
         }
     }
 }
@@ -233,12 +245,62 @@ impl BoxChunk {
     }
 }
 
+/// Up to four cylinders.
+#[derive(Debug, Clone, Copy)]
+struct CylinderChunk {
+    rows: [([Vec4; 3], Vec4); 3],
+}
+
+impl CylinderChunk {
+    fn of(primitives: &[Primitive]) -> Self {
+        // Unused lanes: every point has the coordinates (2, 2, 2).
+        let mut chunk = Self { rows: [([Vec4::ZERO; 3], Vec4::splat(2.0)); 3] };
+        for (lane, primitive) in primitives.iter().take(LANES).enumerate() {
+            let Primitive::Cylinder { rows } = primitive else { continue };
+            for ((slot, offset), (gradient, start)) in chunk.rows.iter_mut().zip(rows) {
+                for axis in 0..3 {
+                    slot[axis][lane] = gradient[axis];
+                }
+                offset[lane] = *start;
+            }
+        }
+        chunk
+    }
+
+    #[inline(always)]
+    fn distances(&self, ray: &Ray, limit: Vec4) -> Vec4 {
+        let local =
+            |(gradient, start): &([Vec4; 3], Vec4)| (dot(gradient, ray.origin) + *start, dot(gradient, ray.direction));
+        let [(ox, dx), (oy, dy), (oz, dz)] = [local(&self.rows[0]), local(&self.rows[1]), local(&self.rows[2])];
+        // As for spheres: the discriminant from the distance to the axis.
+        let a = dx * dx + dy * dy;
+        let b = -(ox * dx + oy * dy);
+        let (px, py) = (ox + dx * (b / a), oy + dy * (b / a));
+        let discriminant = a * (1.0 - (px * px + py * py));
+        let is_met = discriminant.cmpge(Vec4::ZERO);
+        if !is_met.any() {
+            return Vec4::INFINITY;
+        }
+        let root = Vec4::from_array(discriminant.max(Vec4::ZERO).to_array().map(f32::sqrt));
+        let q = b + root.copysign(b);
+        let (s, t) = ((ox * ox + oy * oy - 1.0) / q, q / a);
+        let (near, far) = (s.min(t), s.max(t));
+        let is_on = |t: Vec4| {
+            let z = oz + dz * t;
+            t.cmpgt(Vec4::ZERO) & z.cmpge(Vec4::ZERO) & z.cmple(Vec4::ONE) & t.cmplt(limit)
+        };
+        let t = Vec4::select(is_on(near), near, far);
+        only_where!(is_met & is_on(t), t)
+    }
+}
+
 /// A short list of primitives, all of which are tested.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Few {
     flats: Vec<FlatChunk>,
     spheres: Vec<SphereChunk>,
     boxes: Vec<BoxChunk>,
+    cylinders: Vec<CylinderChunk>,
     /// For each lane of all chunks in turn: which primitive it is.
     order: Vec<u32>,
 }
@@ -246,7 +308,7 @@ pub(super) struct Few {
 impl Few {
     pub(super) fn new(primitives: &[Primitive]) -> Self {
         let mut few = Self::default();
-        for rank in 0..4 {
+        for rank in 0..5 {
             let chosen: Vec<(u32, Primitive)> =
                 (0_u32..).zip(primitives.iter().copied()).filter(|(_, p)| p.rank() == rank).collect();
             for group in chosen.chunks(LANES) {
@@ -254,7 +316,8 @@ impl Few {
                 match rank {
                     0 | 1 => few.flats.push(FlatChunk::of(&members)),
                     2 => few.spheres.push(SphereChunk::of(&members)),
-                    _ => few.boxes.push(BoxChunk::of(&members)),
+                    3 => few.boxes.push(BoxChunk::of(&members)),
+                    _ => few.cylinders.push(CylinderChunk::of(&members)),
                 }
                 let mut order: Vec<u32> = group.iter().map(|(index, _)| *index).collect();
                 order.resize(LANES, u32::MAX);
@@ -285,6 +348,9 @@ impl Few {
         for chunk in &self.boxes {
             take(chunk.distances(ray, best), &mut best);
         }
+        for chunk in &self.cylinders {
+            take(chunk.distances(ray, best), &mut best);
+        }
         let nearest = best.min_element();
         if nearest >= length {
             return None;
@@ -302,6 +368,7 @@ impl Few {
         self.boxes.iter().any(|c| is_any(c.distances(ray, limit)))
             || self.flats.iter().any(|c| is_any(c.distances(ray, limit)))
             || self.spheres.iter().any(|c| is_any(c.distances(ray, limit)))
+            || self.cylinders.iter().any(|c| is_any(c.distances(ray, limit)))
     }
 }
 
@@ -317,12 +384,14 @@ pub(super) fn bounds(primitive: &Primitive) -> Bounds {
             let corner = |a: f32, b: f32| matrix * Vec3::new(a - u.1, b - v.1, *offset);
             Bounds::of([corner(-1.0, -1.0), corner(1.0, -1.0), corner(-1.0, 1.0), corner(1.0, 1.0)])
         }
-        Primitive::Box { rows } => {
+        Primitive::Box { rows } | Primitive::Cylinder { rows } => {
+            // Of a cylinder, the lower end lies in the middle of the box.
+            let bottom = if matches!(primitive, Primitive::Cylinder { .. }) { 0.0 } else { -1.0 };
             let matrix = fogbow::math::Mat3::from_cols(rows[0].0, rows[1].0, rows[2].0).transpose().inverse();
             let start = Vec3::new(rows[0].1, rows[1].1, rows[2].1);
             let corner = |i: u32| {
-                let sign = |bit: u32| if i & bit == 0 { -1.0 } else { 1.0 };
-                matrix * (Vec3::new(sign(1), sign(2), sign(4)) - start)
+                let sign = |bit: u32, low: f32| if i & bit == 0 { low } else { 1.0 };
+                matrix * (Vec3::new(sign(1, -1.0), sign(2, -1.0), sign(4, bottom)) - start)
             };
             Bounds::of((0..8).map(corner))
         }

@@ -69,6 +69,10 @@ fn primitive(geometry: &Geometry) -> Option<Primitive> {
             let rows = to_world.inverse()?.rows.map(|r| (to_vec3([r[0], r[1], r[2]]), r[3] as f32));
             Some(Primitive::Box { rows })
         }
+        Geometry::Cylinder(to_world) => {
+            let rows = to_world.inverse()?.rows.map(|r| (to_vec3([r[0], r[1], r[2]]), r[3] as f32));
+            Some(Primitive::Cylinder { rows })
+        }
         Geometry::Mesh(_) => None,
     }
 }

@@ -80,7 +80,7 @@ fn triangles_of(shape: &Shape) -> Option<Vec<Triangle>> {
     let corners: Vec<[Vec3; 3]> = match &shape.geometry {
         Geometry::Mesh(mesh) => mesh.triangles.iter().map(|t| mesh.corners(*t)).filter(|c| has_area(*c)).collect(),
         Geometry::Cube(to_world) => cube_triangles(to_world),
-        Geometry::Rectangle(_) | Geometry::Disk(_) | Geometry::Sphere { .. } => return None,
+        Geometry::Rectangle(_) | Geometry::Disk(_) | Geometry::Cylinder(_) | Geometry::Sphere { .. } => return None,
     };
     let turned = |[a, b, c]: [Vec3; 3]| if shape.is_flipped { [a, c, b] } else { [a, b, c] };
     Some(corners.into_iter().map(|c| Triangle { corners: turned(c) }).collect())
@@ -191,7 +191,8 @@ fn area_light<'a>(
             let table = meshes.next().ok_or(LightError::Size)?;
             MeshLight::new(&table.triangles, &mut table.areas, radiance).map(Light::Mesh)
         }
-        Geometry::Disk(_) => Err(LightError::Geometry),
+        // The reader makes them of triangles.
+        Geometry::Disk(_) | Geometry::Cylinder(_) => Err(LightError::Geometry),
     }
 }
 

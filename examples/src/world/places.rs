@@ -150,6 +150,11 @@ fn uv_of(geometry: &Geometry, primitive: &Primitive, point: Vec3) -> (Vec2, [Vec
             }
             (uv, tangents)
         }
+        (Geometry::Cylinder(to_world), Primitive::Cylinder { rows }) => {
+            let [x, y, z] = rows.map(|(gradient, start)| gradient.dot(point) + start);
+            let around = (axis(to_world, 1) * x - axis(to_world, 0) * y) * (2.0 * PI);
+            (Vec2::new(turn(y, x), z), [around, axis(to_world, 2)])
+        }
         _ => (Vec2::ZERO, [Vec3::ZERO; 2]),
     }
 }

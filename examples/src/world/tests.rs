@@ -106,7 +106,7 @@ fn brute_force(geometry: &Geometry, ray: &Ray) -> (f64, [f64; 3], f64) {
             let distance = [(-b - root) / a, (-b + root) / a].into_iter().find(|t| *t > 0.0).unwrap_or(f64::INFINITY);
             (distance, [0, 1, 2].map(|i| f[i] + distance * d[i]), discriminant)
         }
-        Geometry::Mesh(_) => none,
+        Geometry::Cylinder(_) | Geometry::Mesh(_) => none,
     }
 }
 

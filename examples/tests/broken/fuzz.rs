@@ -10,6 +10,7 @@ use fogbow::math::{Ray, Vec2, Vec3};
 use fogbow_examples::mesh::Mesh;
 use fogbow_examples::picture::Picture;
 use fogbow_examples::scene_file::SceneFile;
+use fogbow_examples::transform::Transform;
 use fogbow_examples::volume::Volume;
 use fogbow_examples::world::{Storage, World};
 
@@ -156,7 +157,21 @@ fn fuzz_meshes() {
     binary.extend([0_i32, 1, 2].iter().flat_map(|i| i.to_le_bytes()));
     assert!(Mesh::from_ply(Path::new("m.ply"), &binary).is_ok());
     fuzz(&[PLY.as_bytes().to_vec(), binary], |bytes| drop(Mesh::from_ply(Path::new("m.ply"), bytes)));
+    let rich =
+        PLY.replace("property float z", "property float z\nproperty float nx\nproperty float ny\nproperty float nz");
+    let sheet = include_bytes!("../shapes/sheet.ply").to_vec();
+    assert!(Mesh::from_ply(Path::new("m.ply"), &sheet).is_ok());
+    fuzz(&[rich.into_bytes(), sheet], |bytes| drop(Mesh::from_ply(Path::new("m.ply"), bytes)));
     fuzz(&[OBJ.as_bytes().to_vec()], |bytes| drop(Mesh::from_obj(Path::new("m.obj"), bytes)));
+    let obj = include_bytes!("../shapes/fold.obj").to_vec();
+    fuzz(&[obj], |bytes| drop(Mesh::from_obj(Path::new("m.obj"), bytes)));
+    let several = include_bytes!("../shapes/two.serialized").to_vec();
+    assert!(Mesh::from_serialized(Path::new("m.serialized"), &several, 1).is_ok());
+    fuzz(&[several], |bytes| drop(Mesh::from_serialized(Path::new("m.serialized"), bytes, 1)));
+    let curve = include_bytes!("../shapes/curve.txt").to_vec();
+    let read = |bytes: &[u8]| Mesh::from_curves(Path::new("c.txt"), bytes, true, &Transform::IDENTITY);
+    assert!(read(&curve).is_ok());
+    fuzz(&[curve], |bytes| drop(read(bytes)));
 }
 
 #[test]

@@ -123,8 +123,8 @@ const CASES: &[(&str, &str, &[&str])] = &[
     // Shapes and what they are made of.
     (
         "<shape type=\"cube\" id=\"container\">",
-        "<shape type=\"cylinder\" id=\"container\">",
-        &["<shape type=\"cylinder\" id=\"container\">", "\"type\""],
+        "<shape type=\"torus\" id=\"container\">",
+        &["<shape type=\"torus\" id=\"container\">", "\"type\""],
     ),
     (
         "<float name=\"radius\" value=\"0.3\"/>\n    <bsdf type=\"conductor\">",

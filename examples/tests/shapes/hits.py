@@ -54,6 +54,19 @@ def meshes(rng):
         obj.writelines("vt %g %g\n" % (0.5 + 0.5 * p[0], 0.5 + 0.25 * p[1]) for p in points)
         obj.write("g left\n")
         obj.writelines("f " + " ".join("%d/%d" % (i + 1, i + 1) for i in f) + "\n" for f in faces)
+    parts = []
+    for number in range(2):
+        flags, real = (0x2003, "d") if number else (0x1000, "f")
+        data = struct.pack("<I", flags) + b"part\0" + struct.pack("<QQ", 9, 8)
+        lists = [points, [normal(p) for p in points], [(0.5 + 0.4 * p[0], 0.5 - 0.3 * p[1]) for p in points]]
+        for values in lists if number else lists[:1]:
+            data += b"".join(struct.pack("<%d%s" % (len(v), real), *v) for v in values)
+        data += b"".join(struct.pack("<3I", *f) for f in faces)
+        parts.append(struct.pack("<HH", 0x041C, 4) + zlib.compress(data, 9))
+    with open(os.path.join(HERE, "two.serialized"), "wb") as file:
+        file.write(b"".join(parts) + struct.pack("<QQI", 0, len(parts[0]), 2))
+    with open(os.path.join(HERE, "curve.txt"), "w") as file:
+        file.write("-1 0 0 0.1\n-0.5 0.5 0.2 0.2\n0.5 -0.5 0 0.2\n1 0 0.3 0.1\n1.2 0.4 0 0.1\n\n0 1 0 0.1\n0 1 1 0.2\n1 1 1 0.1\n1 2 1 0.1\n")
     with open(os.path.join(HERE, "fold.obj"), "w") as obj:
         obj.write("v -1 -1 0\nv 1 -1 0\nv 1 1 0.5\nv -1 1 0.5\nvn 0.3 0 1\nvn -0.3 0.1 1\ng quad\nf 1//1 2//2 3//2 4//1\n")
 
