@@ -28,6 +28,7 @@ mod sampling;
 mod scale;
 mod sh;
 mod shift;
+mod surfaces;
 mod threads;
 mod vpl;
 mod world;

@@ -8,7 +8,6 @@ use super::settings::BakeSettings;
 use crate::host::{Medium, Scene};
 use crate::math::Ray;
 use crate::sampling::{even2, warp};
-use crate::surface::Surface;
 use crate::transmittance::segments;
 use crate::world::{World, nearest_surface};
 
@@ -34,7 +33,7 @@ pub(super) fn state<M: Medium + ?Sized, S: Scene + ?Sized>(
         let direction = warp::uniform_sphere(even2(i + 1).into());
         let hit = nearest_surface(&Ray::new(point, direction), world.scene);
         let is_back = |hit: &crate::host::Hit| {
-            hit.normal.dot(direction) > 0.0 && !matches!(hit.surface, Surface::Dielectric { .. })
+            hit.normal.dot(direction) > 0.0 && !hit.surface.transmits()
         };
         behind += u32::from(hit.as_ref().is_some_and(is_back));
     }

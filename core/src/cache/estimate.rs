@@ -15,7 +15,7 @@ use crate::math::{Frame, Ray, float};
 use crate::multiple_scatter::{self, Cones, Incoming, Start, Walk};
 use crate::path;
 use crate::phase::{Phase, deflection};
-use crate::sampling::{Generator, uniform, uniform2, warp};
+use crate::sampling::{Generator, mis, uniform, uniform2, warp};
 use crate::sh::{Coefficient, MAX_DEGREE};
 use crate::single_scatter::{self, Arrival, Contribution, Directional, Sums, Towards};
 use crate::spectrum::{Gradient, Spectrum};
@@ -426,25 +426,27 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
         rng: &mut Generator,
     ) -> Spectrum {
         let origin = |to_light: Vec3| leave(point, hit.normal, to_light, hit.distance);
-        let cosine = |to_light: Vec3| Spectrum::splat(if hit.faces(to_light) { hit.cosine(to_light) } else { 0.0 });
+        let cosine =
+            |to_light: Vec3, _| Spectrum::splat(if hit.faces(to_light) { hit.cosine(to_light) } else { 0.0 });
         let weight = FromPoint { sky: with_sky, ..FromPoint::all(point) };
         self.connected(&weight, origin, cosine, random, rng)
     }
 
-    /// Light of one of the lights, chosen by `weight`, times `value(to_light)`. Transmittance is marched:
-    /// what ratio tracking adds in noise would rule pictures whose other parts have none.
+    /// Light of one of the lights, chosen by `weight`, times `value(to_light, pdf)` with the density (sr⁻¹) of that choice, 0 for
+    /// lights without extent. Transmittance is marched: what ratio tracking adds in noise would rule pictures whose other
+    /// parts have none.
     pub(super) fn connected(
         &self,
         weight: &FromPoint,
         origin: impl Fn(Vec3) -> Vec3,
-        value: impl Fn(Vec3) -> Spectrum,
+        value: impl Fn(Vec3, f32) -> Spectrum,
         random: (f32, Vec2),
         rng: &mut Generator,
     ) -> Spectrum {
         let World { medium, scene, lights } = self.world;
         let Some(chosen) = lights.pick(weight, random.0) else { return Spectrum::ZERO };
         let Some(sample) = lights[chosen.index].sample(weight.point, random.1) else { return Spectrum::ZERO };
-        let value = value(sample.incident.to_light);
+        let value = value(sample.incident.to_light, sample.pdf * chosen.probability);
         if value.is_black() {
             return Spectrum::ZERO;
         }
@@ -474,7 +476,8 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
         light * float::PI
     }
 
-    /// Radiance (W·m⁻²·sr⁻¹) that a surface of any kind sends `to_eye` from the lights, by one connection.
+    /// Radiance (W·m⁻²·sr⁻¹) that a surface of any kind sends `to_eye` from the lights, by one connection; weighed against
+    /// what a ray that follows the surface's lobes runs into, where there is one ([`Surface::is_followed`]).
     pub fn reflected(
         &self,
         point: Vec3,
@@ -484,7 +487,13 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
         rng: &mut Generator,
     ) -> Spectrum {
         let origin = |to_light: Vec3| leave(point, hit.normal, to_light, hit.distance);
-        let value = |to_light: Vec3| hit.value(to_eye, to_light) * hit.cosine(to_light).max(0.0);
+        let value = |to_light: Vec3, pdf: f32| {
+            let value = hit.value(to_eye, to_light) * hit.cosine(to_light).abs();
+            if !hit.surface.is_followed() || pdf <= 0.0 || value.is_black() {
+                return value;
+            }
+            value * mis::power(pdf, hit.pdf(to_eye, to_light))
+        };
         self.connected(&FromPoint::all(point), origin, value, random, rng)
     }
 

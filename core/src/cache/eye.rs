@@ -6,11 +6,12 @@ use super::estimate::Estimator;
 use super::lookup::{Basis, Reading};
 use super::store::{SurfaceCache, VolumeCache};
 use crate::host::{Hit, Medium, Properties, Rng, Scene};
-use crate::light::{Except, FromPoint, FromRay, LightSample, Survey};
+use crate::light::{Except, FromPoint, FromRay, Light, LightSample, Lights, Survey};
 use crate::march::scattering_points;
 use crate::math::{Frame, Ray};
 use crate::phase::deflection;
-use crate::sampling::{Generator, uniform, uniform2, warp};
+use crate::path::connection_pdf;
+use crate::sampling::{Generator, mis, uniform, uniform2, warp};
 use crate::spectrum::Spectrum;
 use crate::surface::{Surface, lambert};
 use crate::transmittance::thickness::{Marching, transmittance, until_the_end};
@@ -133,6 +134,46 @@ trait Sight {
     fn emitted(&mut self, _light: Spectrum) {}
 }
 
+/// How an eye ray came to go where it goes: what of the light that it runs into is not in a connection.
+#[derive(Clone, Copy)]
+enum Last {
+    /// By a mirror, through glass, or from the eye: all.
+    Discrete,
+    /// From a surface that was connected to all lights: nothing.
+    Connected,
+    /// By a lobe with a density (sr⁻¹), from a point: a share, by the power heuristic.
+    Lobe {
+        /// Where (m).
+        point: Vec3,
+        /// Density.
+        pdf: f32,
+    },
+}
+
+impl Last {
+    fn distance(&self, to: Vec3) -> f32 {
+        if let Self::Lobe { point, .. } = self { point.distance(to) } else { 0.0 }
+    }
+
+    /// Of the radiance of a light met at a distance (m) with a normal, what counts here.
+    fn share(
+        &self,
+        radiance: Spectrum,
+        lights: &Lights<'_>,
+        index: usize,
+        direction: Vec3,
+        (distance, normal): (f32, Vec3),
+    ) -> Spectrum {
+        match *self {
+            Self::Discrete => radiance,
+            Self::Connected => Spectrum::ZERO,
+            Self::Lobe { point, pdf } => {
+                radiance * mis::power(pdf, connection_pdf(lights, index, (point, false), direction, distance, normal))
+            }
+        }
+    }
+}
+
 /// Follows an eye ray through the medium and past mirrors and glass.
 fn look<M: Medium + ?Sized, S: Scene + ?Sized>(
     ray: &Ray,
@@ -142,8 +183,8 @@ fn look<M: Medium + ?Sized, S: Scene + ?Sized>(
     sight: &mut impl Sight,
 ) {
     let mut throughput = Spectrum::ONE;
-    // Until the first real scattering lights may be hidden; after a lobe they were connected to.
-    let (mut lights_visible, mut lights_done) = (settings.lights_visible, false);
+    // Until the first real scattering lights may be hidden; after a lobe they were connected to, but for a part.
+    let (mut lights_visible, mut last) = (settings.lights_visible, Last::Discrete);
     let mut bounced = false;
     let mut ray = *ray;
     let (mut bounces, mut interfaces) = (0, 0);
@@ -169,19 +210,27 @@ fn look<M: Medium + ?Sized, S: Scene + ?Sized>(
             return;
         }
         let Some(hit) = hit else {
-            if lights_visible && !lights_done {
-                let light = world.lights.distant().map(|(_, light)| light.background(ray.direction)).sum::<Spectrum>();
-                sight.emitted(throughput * light);
+            if lights_visible {
+                let of = |(index, light): (usize, &Light<'_>)| {
+                    let radiance = light.background(ray.direction);
+                    if radiance.is_black() {
+                        return radiance;
+                    }
+                    last.share(radiance, &world.lights, index, ray.direction, (f32::INFINITY, Vec3::ZERO))
+                };
+                sight.emitted(throughput * world.lights.distant().map(of).sum::<Spectrum>());
             }
             return;
         };
         let hidden = !lights_visible && hit.light.is_some();
         let point = segment.at(hit.distance);
         if !hidden
-            && !lights_done
-            && let Some(light) = hit.light.and_then(|i| world.lights.get(i as usize))
+            && let Some(index) = hit.light.map(|i| i as usize)
+            && let Some(light) = world.lights.get(index)
         {
-            sight.emitted(throughput * light.radiance(hit.normal, to_eye));
+            let radiance = light.radiance(hit.normal, to_eye);
+            let at = (last.distance(point), hit.normal);
+            sight.emitted(throughput * last.share(radiance, &world.lights, index, ray.direction, at));
         }
         if hidden || hit.surface == Surface::Null {
             ray = beyond(&ray, &hit);
@@ -191,13 +240,21 @@ fn look<M: Medium + ?Sized, S: Scene + ?Sized>(
         if scatters && !hit.surface.is_discrete() {
             sight.surface(&segment, &hit, throughput);
         }
-        let ends = !settings.indirect && (bounced || !hit.surface.is_discrete());
-        if ends || matches!(hit.surface, Surface::Lambert { .. }) {
+        if matches!(hit.surface, Surface::Lambert { .. }) {
             return;
         }
         let Some(sample) = hit.sample(to_eye, choice, turn) else { return };
+        let is_followed = hit.surface.is_followed();
+        // Without indirect light only what mirrors show of lights is seen, and that once.
+        if !settings.indirect && (bounced || !is_followed) {
+            return;
+        }
         (lights_visible, bounced) = (true, true);
-        lights_done = !hit.surface.is_discrete();
+        last = match sample.pdf {
+            _ if !is_followed => Last::Connected,
+            0.0 => Last::Discrete,
+            pdf => Last::Lobe { point, pdf },
+        };
         throughput *= sample.weight;
         ray = Ray::new(leave(point, hit.normal, sample.to_light, hit.distance), sample.to_light);
         (bounces, interfaces) = (bounces + 1, 0);
@@ -428,7 +485,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Gather<'_, M, S> {
             (x - libm::floorf(x)).min(1.0 - f32::EPSILON)
         });
         let weight = FromPoint { point, except: Except::Steep, sky: !self.settings.indirect };
-        let value = |to_light: Vec3| properties.phase.value(deflection(to_light, to_eye));
+        let value = |to_light: Vec3, _| properties.phase.value(deflection(to_light, to_eye));
         self.estimator.connected(&weight, |_| point, value, (choice, Vec2::new(u, v)), &mut self.rng)
     }
 

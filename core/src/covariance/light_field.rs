@@ -7,7 +7,7 @@ use super::matrix::{LIMIT, Symmetric4};
 use super::operators::phong_lobe;
 use crate::math::{Frame, Symmetric2, Symmetric3, float};
 use crate::phase::{self, Phase};
-use crate::surface::{Surface, lambert, phong};
+use crate::surface::Surface;
 
 /// The light field around a ray: the covariance of its spectrum, and the frame that its entries refer to.
 ///
@@ -220,8 +220,9 @@ impl LightField {
         let mut covariance = self.turned_to(tangent).covariance.projected(cos_in);
         covariance = covariance.curved(&patch.curvature.within(tangent, other), cos_in);
         covariance = covariance.masked(&patch.texture.bounded(LIMIT).within(tangent, other));
-        if let Some(lobe) = reflection_lobe(surface, n, -self.frame.w, outgoing) {
-            covariance = covariance.reflected_in_lobe(&lobe);
+        // Mirrors pass all; of several lobes each counts by what it sends this way.
+        if let Some(lobe) = surface.lobe(n, outgoing, -self.frame.w) {
+            covariance = covariance.reflected_in_lobe(&phong_lobe(lobe.exponent).times(lobe.share));
         }
         let tangent_out = across(outgoing, n).unwrap_or(tangent);
         covariance = covariance.rotated(tangent.dot(tangent_out), other.dot(tangent_out));
@@ -293,20 +294,5 @@ impl LightField {
     #[must_use]
     pub fn volumetric(&self) -> Symmetric3 {
         Symmetric3::embedded(&self.covariance.slice(), self.frame.u, self.frame.v)
-    }
-}
-
-/// Angular covariance (cycles²/rad²) of the lobe in which a surface reflects; `None` for mirrors, which pass all.
-fn reflection_lobe(surface: &Surface, normal: Vec3, to_light: Vec3, to_eye: Vec3) -> Option<Symmetric2> {
-    match *surface {
-        Surface::Lambert { .. } => Some(Symmetric2::ZERO),
-        Surface::Phong { diffuse, specular, exponent } => {
-            // Both parts by what they send this way.
-            let base = lambert::value(diffuse).mean();
-            let gloss = specular.mean() * phong::value(normal, to_eye, to_light, exponent);
-            let share = if gloss > 0.0 { gloss / (base + gloss) } else { 0.0 };
-            Some(phong_lobe(exponent).times(share))
-        }
-        Surface::Mirror { .. } | Surface::Dielectric { .. } | Surface::Null => None,
     }
 }

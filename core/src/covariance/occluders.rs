@@ -23,7 +23,6 @@ use super::operators::PER_HESSIAN;
 use crate::host::Scene;
 use crate::math::{Ray, Symmetric3, float};
 use crate::storage::{Full, List};
-use crate::surface::Surface;
 
 /// Least distance to an occluder, in cells. Smaller: rays that graze a surface decide everything. Larger:
 /// shadow borders are taken for softer than the lattice could tell.
@@ -222,7 +221,7 @@ pub(super) fn scan(
         let mut rest = Ray { origin, direction, length: extent[axis] + 2.0 * margin };
         for _ in 0..MAX_HITS {
             let Some(hit) = scene.closest_hit(&rest) else { break };
-            let stops_light = !matches!(hit.surface, Surface::Null | Surface::Dielectric { .. });
+            let stops_light = !hit.surface.transmits();
             if stops_light && hit.light.is_none() {
                 visit(rest.at(hit.distance), hit.normal);
             }

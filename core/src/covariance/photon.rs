@@ -17,7 +17,7 @@ use super::occluders::Occluders;
 use crate::host::{Hit, Medium, Scene};
 use crate::math::{Ray, Symmetric3, float};
 use crate::photon::Event;
-use crate::surface::Surface;
+use crate::surface::{RoughDielectric, Surface};
 use crate::world::World;
 
 /// What frequency photons fly through and where they leave what they carry.
@@ -158,7 +158,8 @@ impl<'a, M: Medium + ?Sized, S: Scene + ?Sized> FrequencyPhotons<'a, M, S> {
         let passes = incoming.dot(hit.shading) * outgoing.dot(hit.shading) > 0.0;
         match hit.surface {
             Surface::Null => *light,
-            Surface::Dielectric { eta, .. } if passes => {
+            Surface::ThinDielectric { .. } if passes => *light,
+            Surface::Dielectric { eta, .. } | Surface::RoughDielectric(RoughDielectric { eta, .. }) if passes => {
                 let indices = if incoming.dot(hit.shading) < 0.0 { (1.0, eta) } else { (eta, 1.0) };
                 light.refracted(outgoing, &patch, indices)
             }

@@ -226,6 +226,63 @@ pub fn cbrt(x: f32) -> f32 {
     libm::cbrtf(x)
 }
 
+/// Error function `2/√π ∫₀ˣ e^{−t²} dt`.
+///
+/// ```
+/// # use fogbow::math::float::erf;
+/// assert!((erf(0.5) - 0.520_499_9).abs() < 1e-6 && erf(-0.5) == -erf(0.5));
+/// assert_eq!(erf(f32::INFINITY), 1.0);
+/// ```
+#[inline]
+#[must_use]
+pub fn erf(x: f32) -> f32 {
+    libm::erff(x)
+}
+
+/// Inverse of [`erf`] within (−1, 1): Giles 2010, "Approximating the erfinv function". Infinite at the ends, NaN beyond.
+///
+/// ```
+/// # use fogbow::math::float::{erf, erf_inv};
+/// for x in [-2.5, -0.3, 0.0, 1e-3, 1.0, 3.0] {
+///     assert!((erf_inv(erf(x)) - x).abs() < 1e-3 * (1.0 + x * x), "{x}");
+/// }
+/// ```
+#[inline]
+#[must_use]
+pub fn erf_inv(x: f32) -> f32 {
+    const CENTRE: [f32; 9] = [
+        2.810_226_4e-8,
+        3.432_739_4e-7,
+        -3.523_387_7e-6,
+        -4.391_506_5e-6,
+        2.185_808_7e-4,
+        -1.253_725_03e-3,
+        -4.177_681_64e-3,
+        0.246_640_73,
+        1.501_409_4,
+    ];
+    const TAIL: [f32; 9] = [
+        -2.002_142_6e-4,
+        1.009_505_6e-4,
+        1.349_343_2e-3,
+        -3.673_428_4e-3,
+        5.739_507_7e-3,
+        -7.622_461_3e-3,
+        9.438_870_5e-3,
+        1.001_674_06,
+        2.832_976_8,
+    ];
+    let w = -ln((1.0 - x) * (1.0 + x));
+    let polynomial = |coefficients: [f32; 9], w: f32| coefficients.into_iter().fold(0.0, |sum, c| sum * w + c);
+    if w < 5.0 {
+        polynomial(CENTRE, w - 2.5) * x
+    } else if w < f32::INFINITY {
+        polynomial(TAIL, sqrt(w) - 3.0) * x
+    } else {
+        x * f32::INFINITY
+    }
+}
+
 /// The smaller of two numbers; `b` if either is NaN. One instruction, where `f32::min` with its
 /// care for NaN is three.
 ///

@@ -36,6 +36,27 @@ impl Frame {
         }
     }
 
+    /// A frame around the unit vector `w` whose first axis points towards `along`, as far as that lies across `w`;
+    /// [`Frame::around`] where it does not.
+    ///
+    /// ```
+    /// # use fogbow::math::{Frame, Vec3};
+    /// let frame = Frame::along(Vec3::Z, Vec3::new(0.0, 3.0, 4.0));
+    /// assert_eq!((frame.u, frame.v), (Vec3::Y, Vec3::NEG_X));
+    /// assert_eq!(Frame::along(Vec3::Z, Vec3::ZERO), Frame::around(Vec3::Z));
+    /// ```
+    #[inline]
+    #[must_use]
+    pub fn along(w: Vec3, along: Vec3) -> Self {
+        if along == Vec3::ZERO {
+            return Self::around(w);
+        }
+        match (along - w * w.dot(along)).try_normalize() {
+            Some(u) => Self { u, v: w.cross(u), w },
+            None => Self::around(w),
+        }
+    }
+
     /// From frame coordinates to the world.
     ///
     /// ```

@@ -29,7 +29,7 @@ fn is_near(light: &Light<'_>, point: Vec3) -> bool {
 /// For points in the near field the distance's density is left out on both sides: weights may be
 /// any partition of 1.
 #[inline]
-pub(super) fn pdf(
+pub(crate) fn pdf(
     lights: &Lights<'_>,
     index: usize,
     vertex: (Vec3, bool),

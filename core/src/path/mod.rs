@@ -24,6 +24,7 @@ mod connect;
 mod in_scatter;
 pub mod trace;
 
+pub(crate) use connect::pdf as connection_pdf;
 pub use in_scatter::in_scattered;
 pub(crate) use in_scatter::{arriving, direct};
 pub use trace::{Delegate, radiance, radiance_beyond};

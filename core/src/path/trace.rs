@@ -275,7 +275,7 @@ fn walk<const BEYOND: bool, M: Medium + ?Sized, S: Scene + ?Sized>(
                 break;
             }
             let to_eye = -ray.direction;
-            let seen_surface = is_seen && !hit.surface.is_discrete();
+            let seen_surface = is_seen && !hit.surface.is_followed();
             let left = max_scatterings - path.scatterings;
             if seen_surface && let Some(light) = delegate.reflected(&segment, &hit, path.throughput, left, &mut child) {
                 path.add(path.throughput * light, path.first, path.scatterings + 1);
@@ -302,7 +302,7 @@ fn walk<const BEYOND: bool, M: Medium + ?Sized, S: Scene + ?Sized>(
                 break;
             };
             path.throughput *= sample.weight;
-            is_seen &= surface.is_discrete();
+            is_seen &= sample.pdf == 0.0;
             path.last = Some(Vertex { point, in_medium: false, pdf: sample.pdf });
             Ray::new(leave(point, hit.normal, sample.to_light, hit.distance), sample.to_light)
         } else {

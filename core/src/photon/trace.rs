@@ -6,7 +6,7 @@ use crate::math::{Bounds, Ray};
 use crate::path::Settings;
 use crate::sampling::{Generator, uniform, uniform2};
 use crate::spectrum::Spectrum;
-use crate::surface::{Surface, SurfaceSample};
+use crate::surface::SurfaceSample;
 use crate::transmittance::flight;
 use crate::world::{World, leave, nearest_surface};
 
@@ -148,12 +148,7 @@ pub fn trace<M: Medium + ?Sized, S: Scene + ?Sized>(
 /// What a surface does to power, where a [`SurfaceSample`] says what it does to radiance.
 #[inline]
 fn weight_of_power(hit: &Hit, sample: &SurfaceSample, to_eye: glam::Vec3) -> Spectrum {
-    let weight = match hit.surface {
-        Surface::Dielectric { transmittance, .. } if hit.cosine(to_eye) * hit.cosine(sample.to_light) < 0.0 => {
-            transmittance
-        }
-        _ => sample.weight,
-    };
+    let weight = hit.surface.power_weight(hit.shading, to_eye, sample);
     if hit.shading == hit.normal {
         return weight;
     }

@@ -6,16 +6,30 @@
 //! | [`lambert`] | ideal diffuse reflection |
 //! | [`phong`] | energy-normalised Phong lobe over a Lambertian base |
 //! | [`specular`] | mirror directions, Snell's law, Fresnel reflectance |
+//! | `microfacet` | [`Roughness`]: distributions of small facets, masking, visible normals |
+//! | `conductor` | [`Conductor`], [`RoughConductor`]: metals by complex indices |
+//! | `dielectric` | [`RoughDielectric`]; thin panes |
+//! | `plastic` | [`Plastic`], [`RoughPlastic`]: a diffuse base under a coat |
 //!
-//! `normal` is the geometric normal; one-sided surfaces (all but the dielectric and the null
-//! interface) are black from behind. All directions leave the surface.
+//! `normal` is the geometric normal; one-sided surfaces (all that light does not pass) are black from behind. All directions
+//! leave the surface.
 
+mod conductor;
+mod dielectric;
 pub mod lambert;
+mod microfacet;
 pub mod phong;
+mod plastic;
 pub mod specular;
 
 use glam::{Vec2, Vec3};
 
+pub use conductor::{Conductor, RoughConductor};
+pub use dielectric::RoughDielectric;
+pub use microfacet::{Distribution, Roughness};
+pub use plastic::{Plastic, RoughPlastic, diffuse_reflectance};
+
+use crate::math::Frame;
 use crate::spectrum::Spectrum;
 
 /// What a surface does to light.
@@ -50,6 +64,25 @@ pub enum Surface {
         /// Factor on transmitted light.
         transmittance: Spectrum,
     },
+    /// A thin pane of glass: both its faces, reflecting back and forth, as one. What passes goes straight on.
+    ThinDielectric {
+        /// Index of refraction of the glass over the one outside (> 0).
+        eta: f32,
+        /// Factor on reflected light.
+        reflectance: Spectrum,
+        /// Factor on transmitted light.
+        transmittance: Spectrum,
+    },
+    /// A smooth metal, on the side of the normal.
+    Conductor(Conductor),
+    /// A rough metal, on the side of the normal.
+    RoughConductor(RoughConductor),
+    /// A rough interface between two dielectrics.
+    RoughDielectric(RoughDielectric),
+    /// A diffuse base under a smooth coat, on the side of the normal: a mirror direction and all others.
+    Plastic(Plastic),
+    /// A diffuse base under a rough coat, on the side of the normal.
+    RoughPlastic(RoughPlastic),
     /// An interface that light passes unchanged.
     Null,
 }
@@ -66,6 +99,20 @@ pub struct SurfaceSample {
     pub pdf: f32,
 }
 
+/// How much of what arrives keeps its direction, about.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Gloss {
+    /// Exponent of a Phong lobe as wide as this one.
+    pub exponent: f32,
+    /// What part of the light sent on is in it, in [0, 1]; the rest is diffuse.
+    pub share: f32,
+}
+
+impl Gloss {
+    /// All is diffuse.
+    pub const NONE: Self = Self { exponent: 0.0, share: 0.0 };
+}
+
 impl Surface {
     /// Reflects nothing.
     pub const BLACK: Self = Self::Lambert { reflectance: Spectrum::ZERO };
@@ -80,7 +127,113 @@ impl Surface {
     #[inline]
     #[must_use]
     pub fn is_discrete(&self) -> bool {
-        matches!(self, Self::Mirror { .. } | Self::Dielectric { .. } | Self::Null)
+        matches!(
+            self,
+            Self::Mirror { .. }
+                | Self::Dielectric { .. }
+                | Self::ThinDielectric { .. }
+                | Self::Conductor(_)
+                | Self::Null
+        )
+    }
+
+    /// Whether light may leave on the other side.
+    ///
+    /// ```
+    /// # use fogbow::{spectrum::Spectrum, surface::Surface};
+    /// assert!(Surface::Null.transmits() && !Surface::Mirror { reflectance: Spectrum::ONE }.transmits());
+    /// ```
+    #[inline]
+    #[must_use]
+    pub fn transmits(&self) -> bool {
+        match self {
+            Self::Dielectric { .. } | Self::ThinDielectric { .. } | Self::RoughDielectric(_) | Self::Null => true,
+            Self::Lambert { .. } | Self::Phong { .. } | Self::Mirror { .. } => false,
+            Self::Conductor(_) | Self::RoughConductor(_) | Self::Plastic(_) | Self::RoughPlastic(_) => false,
+        }
+    }
+
+    /// Whether methods that gather light at surfaces follow it past this one instead: where a part leaves in discrete
+    /// directions, in lobes that may be narrow, or on the other side.
+    ///
+    /// ```
+    /// # use fogbow::{spectrum::Spectrum, surface::Surface};
+    /// assert!(Surface::Mirror { reflectance: Spectrum::ONE }.is_followed() && Surface::Null.is_followed());
+    /// assert!(!Surface::Lambert { reflectance: Spectrum::ONE }.is_followed());
+    /// ```
+    #[inline]
+    #[must_use]
+    pub fn is_followed(&self) -> bool {
+        !matches!(self, Self::Lambert { .. } | Self::Phong { .. })
+    }
+
+    /// What [`Surface::sample`] does to power that comes from `to_eye` and leaves towards `to_light`, where the sample's
+    /// weight says what happens to radiance: without the `1/η²` of refraction (Veach 1997, chapter 5).
+    ///
+    /// ```
+    /// # use fogbow::{math::{Vec2, Vec3}, spectrum::Spectrum, surface::Surface};
+    /// let glass = Surface::Dielectric { eta: 1.5, reflectance: Spectrum::ONE, transmittance: Spectrum::splat(0.9) };
+    /// let sample = glass.sample(Vec3::Z, Vec3::Z, 0.5, Vec2::ZERO).unwrap();
+    /// assert!((sample.weight[0] - 0.9 / 2.25).abs() < 1e-6);
+    /// assert_eq!(glass.power_weight(Vec3::Z, Vec3::Z, &sample), Spectrum::splat(0.9));
+    /// ```
+    #[inline]
+    #[must_use]
+    pub fn power_weight(&self, normal: Vec3, to_eye: Vec3, sample: &SurfaceSample) -> Spectrum {
+        let cosine = normal.dot(to_eye);
+        if cosine * normal.dot(sample.to_light) >= 0.0 {
+            return sample.weight;
+        }
+        match self {
+            Self::Dielectric { transmittance, .. } => *transmittance,
+            Self::RoughDielectric(RoughDielectric { eta, .. }) => {
+                sample.weight * if cosine > 0.0 { eta * eta } else { 1.0 / (eta * eta) }
+            }
+            _ => sample.weight,
+        }
+    }
+
+    /// The lobe in which light from `to_light` is sent `to_eye`, for how much of its detail is left; `None` where that is a
+    /// mirror's direction, which keeps all.
+    ///
+    /// ```
+    /// # use fogbow::{math::Vec3, spectrum::Spectrum, surface::{Conductor, Distribution, RoughConductor, Roughness, Surface}};
+    /// let (grey, up) = (Spectrum::splat(0.5), Vec3::Z);
+    /// assert_eq!(Surface::Lambert { reflectance: grey }.lobe(up, up, up).unwrap().share, 0.0);
+    /// assert!(Surface::Mirror { reflectance: grey }.lobe(up, up, up).is_none());
+    /// let roughness = Roughness::even(Distribution::Ggx, 0.1);
+    /// let metal = RoughConductor { conductor: Conductor::mirror(grey), roughness };
+    /// assert!((Surface::RoughConductor(metal).lobe(up, up, up).unwrap().exponent - 50.0).abs() < 1e-3);
+    /// ```
+    #[inline]
+    #[must_use]
+    pub fn lobe(&self, normal: Vec3, to_eye: Vec3, to_light: Vec3) -> Option<Gloss> {
+        let share = |gloss: f32, rest: f32| if gloss > 0.0 { gloss / (rest + gloss) } else { 0.0 };
+        match *self {
+            Self::Lambert { .. } => Some(Gloss::NONE),
+            Self::Phong { diffuse, specular, exponent } => {
+                let base = lambert::value(diffuse).mean();
+                let gloss = specular.mean() * phong::value(normal, to_eye, to_light, exponent);
+                Some(Gloss { exponent, share: share(gloss, base) })
+            }
+            Self::Mirror { .. } | Self::Conductor(_) | Self::Dielectric { .. } | Self::ThinDielectric { .. } | Self::Null => {
+                None
+            }
+            Self::RoughConductor(RoughConductor { roughness, .. })
+            | Self::RoughDielectric(RoughDielectric { roughness, .. }) => {
+                Some(Gloss { exponent: roughness.exponent(), share: 1.0 })
+            }
+            Self::Plastic(_) => {
+                let is_mirrored = specular::mirrored(to_eye, normal).distance_squared(to_light) < 1e-8;
+                if is_mirrored { None } else { Some(Gloss::NONE) }
+            }
+            Self::RoughPlastic(plastic) => {
+                let frame = Frame::around(normal);
+                let (eye, light) = (frame.to_local(to_eye), frame.to_local(to_light));
+                let (all, base) = (plastic.value(eye, light).mean(), plastic.diffuse_value(eye, light).mean());
+                Some(Gloss { exponent: plastic.roughness().exponent(), share: share(all - base, base) })
+            }
+        }
     }
 
     /// Bidirectional scattering function (sr⁻¹), without the cosine; 0 for discrete surfaces.
@@ -94,15 +247,31 @@ impl Surface {
     #[inline]
     #[must_use]
     pub fn value(&self, normal: Vec3, to_eye: Vec3, to_light: Vec3) -> Spectrum {
+        if let Self::RoughDielectric(glass) = self {
+            let frame = glass.roughness.frame(normal);
+            return glass.value(frame.to_local(to_eye), frame.to_local(to_light));
+        }
         if normal.dot(to_eye) <= 0.0 || normal.dot(to_light) <= 0.0 {
             return Spectrum::ZERO;
         }
-        match *self {
-            Self::Lambert { reflectance } => lambert::value(reflectance),
+        match self {
+            Self::Lambert { reflectance } => lambert::value(*reflectance),
             Self::Phong { diffuse, specular, exponent } => {
-                lambert::value(diffuse) + specular * phong::value(normal, to_eye, to_light, exponent)
+                lambert::value(*diffuse) + *specular * phong::value(normal, to_eye, to_light, *exponent)
             }
-            Self::Mirror { .. } | Self::Dielectric { .. } | Self::Null => Spectrum::ZERO,
+            Self::RoughConductor(metal) => {
+                let frame = metal.roughness.frame(normal);
+                metal.value(frame.to_local(to_eye), frame.to_local(to_light))
+            }
+            Self::Plastic(plastic) => {
+                let frame = Frame::around(normal);
+                plastic.value(frame.to_local(to_eye), frame.to_local(to_light))
+            }
+            Self::RoughPlastic(plastic) => {
+                let frame = Frame::around(normal);
+                plastic.value(frame.to_local(to_eye), frame.to_local(to_light))
+            }
+            _ => Spectrum::ZERO,
         }
     }
 
@@ -120,6 +289,10 @@ impl Surface {
     #[inline]
     #[must_use]
     pub fn pdf(&self, normal: Vec3, to_eye: Vec3, to_light: Vec3) -> f32 {
+        if let Self::RoughDielectric(glass) = self {
+            let frame = glass.roughness.frame(normal);
+            return glass.pdf(frame.to_local(to_eye), frame.to_local(to_light));
+        }
         let cosine = normal.dot(to_light);
         if normal.dot(to_eye) <= 0.0 || cosine <= 0.0 {
             return 0.0;
@@ -130,7 +303,19 @@ impl Surface {
                 let share = phong::lobe_share(diffuse, specular);
                 share * phong::pdf(normal, to_eye, to_light, exponent) + (1.0 - share) * lambert::pdf(cosine)
             }
-            Self::Mirror { .. } | Self::Dielectric { .. } | Self::Null => 0.0,
+            Self::RoughConductor(metal) => {
+                let frame = metal.roughness.frame(normal);
+                metal.pdf(frame.to_local(to_eye), frame.to_local(to_light))
+            }
+            Self::Plastic(plastic) => {
+                let frame = Frame::around(normal);
+                plastic.pdf(frame.to_local(to_eye), frame.to_local(to_light))
+            }
+            Self::RoughPlastic(plastic) => {
+                let frame = Frame::around(normal);
+                plastic.pdf(frame.to_local(to_eye), frame.to_local(to_light))
+            }
+            _ => 0.0,
         }
     }
 
@@ -154,7 +339,31 @@ impl Surface {
             Self::Dielectric { eta, reflectance, transmittance } => {
                 specular::sample_dielectric(normal, to_eye, eta, reflectance, transmittance, choice)
             }
+            Self::ThinDielectric { eta, reflectance, transmittance } => {
+                dielectric::sample_thin(normal, to_eye, eta, reflectance, transmittance, choice)
+            }
+            Self::RoughDielectric(glass) => {
+                let frame = glass.roughness.frame(normal);
+                within(&frame, glass.sample(frame.to_local(to_eye), choice, u))
+            }
             _ if normal.dot(to_eye) <= 0.0 => None,
+            Self::Conductor(metal) => {
+                let weight = metal.fresnel(normal.dot(to_eye));
+                let to_light = specular::mirrored(to_eye, normal);
+                (!weight.is_black()).then_some(SurfaceSample { to_light, weight, pdf: 0.0 })
+            }
+            Self::RoughConductor(metal) => {
+                let frame = metal.roughness.frame(normal);
+                within(&frame, metal.sample(frame.to_local(to_eye), u))
+            }
+            Self::Plastic(plastic) => {
+                let frame = Frame::around(normal);
+                within(&frame, plastic.sample(frame.to_local(to_eye), choice, u))
+            }
+            Self::RoughPlastic(plastic) => {
+                let frame = Frame::around(normal);
+                within(&frame, plastic.sample(frame.to_local(to_eye), choice, u))
+            }
             Self::Lambert { reflectance } => lambert::sample(normal, reflectance, u),
             Self::Mirror { reflectance } => (!reflectance.is_black()).then(|| SurfaceSample {
                 to_light: specular::mirrored(to_eye, normal),
@@ -192,8 +401,21 @@ impl Surface {
         match *self {
             Self::Lambert { reflectance } | Self::Mirror { reflectance } => reflectance,
             Self::Phong { diffuse, specular, .. } => diffuse + specular,
-            Self::Dielectric { reflectance, transmittance, .. } => reflectance.max(transmittance),
+            Self::Dielectric { reflectance, transmittance, .. } | Self::ThinDielectric { reflectance, transmittance, .. } => {
+                reflectance.max(transmittance)
+            }
+            Self::Conductor(metal) => metal.reflectance,
+            Self::RoughConductor(metal) => metal.conductor.reflectance,
+            Self::RoughDielectric(glass) => glass.reflectance.max(glass.transmittance),
+            Self::Plastic(plastic) => plastic.diffuse.max(plastic.specular),
+            Self::RoughPlastic(plastic) => plastic.plastic().diffuse.max(plastic.plastic().specular),
             Self::Null => Spectrum::ONE,
         }
     }
+}
+
+/// A sample from the frame of the surface in the world.
+#[inline]
+fn within(frame: &Frame, sample: Option<SurfaceSample>) -> Option<SurfaceSample> {
+    sample.map(|sample| SurfaceSample { to_light: frame.to_world(sample.to_light).normalize(), ..sample })
 }

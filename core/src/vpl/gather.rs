@@ -4,7 +4,7 @@ use super::bound::Bound;
 use super::compensate::{Compensation, next_vertex};
 use super::light::VirtualLight;
 use super::scatterer::{Receiver, Scatterer};
-use crate::host::{Medium, Scene};
+use crate::host::{Hit, Medium, Scene};
 use crate::math::{Ray, float};
 use crate::path;
 use crate::sampling::{Generator, uniform, uniform2};
@@ -219,9 +219,12 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Gatherer<'_, M, S> {
             return Spectrum::ZERO;
         };
         let way = Ray::new(receiver.origin(direction), direction);
-        let Some(hit) = nearest_surface(&way, self.world.scene).filter(|hit| hit.surface.is_discrete()) else {
+        let Some(hit) = nearest_surface(&way, self.world.scene).filter(|hit| hit.surface.is_followed()) else {
             return Spectrum::ZERO;
         };
+        if !hit.surface.is_discrete() {
+            return self.followed(&way, &hit, scattered / receiver.scatterer.unit(), most, rng) * receiver.scatterer.unit();
+        }
         let Some(sample) = hit.sample(-direction, uniform(rng), uniform2(rng)) else {
             return Spectrum::ZERO;
         };
@@ -236,5 +239,19 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Gatherer<'_, M, S> {
         let settings = path::Settings { max_scatterings: most - 1, ..path::Settings::default() };
         let seen = path::radiance(&Ray::new(origin, sample.to_light), &self.world, &settings, rng);
         weight * seen.total() * (1.0 / survives)
+    }
+
+    /// Light that a surface with lobes sends back along `way`, but for its own emission, times `weight`: by a path, with
+    /// connections from the surface to the lights.
+    fn followed(&self, way: &Ray, hit: &Hit, weight: Spectrum, most: u32, rng: &mut Generator) -> Spectrum {
+        let weight = weight * transmittance(self.world.medium, &way.with_length(hit.distance), rng);
+        let survives = float::min((weight * hit.surface.albedo()).max_element(), 1.0);
+        if !(survives > 0.0) || uniform(rng) >= survives {
+            return Spectrum::ZERO;
+        }
+        let origin = leave(way.at(hit.distance), hit.normal, -way.direction, hit.distance);
+        let settings = path::Settings { max_scatterings: most, ..path::Settings::default() };
+        let seen = path::radiance(&Ray::new(origin, way.direction), &self.world, &settings, rng);
+        weight * (seen.total() - seen.emitted) * (1.0 / survives)
     }
 }

@@ -66,7 +66,8 @@ impl VirtualLight {
         light
     }
 
-    /// On a surface, where `flux` (W) arrives. `None` for surfaces that send light on in discrete directions.
+    /// On a surface, where `flux` (W) arrives. `None` for surfaces that light is followed past
+    /// ([`Surface::is_followed`]).
     ///
     /// ```
     /// # use fogbow::{math::Vec3, spectrum::Spectrum, surface::Surface, vpl::{Scatterer, VirtualLight}};
@@ -88,7 +89,7 @@ impl VirtualLight {
         let (kind, diffuse, specular, exponent) = match *surface {
             Surface::Lambert { reflectance } => (kind::LAMBERT, reflectance, Spectrum::ZERO, 0.0),
             Surface::Phong { diffuse, specular, exponent } => (kind::PHONG, diffuse, specular, exponent),
-            Surface::Mirror { .. } | Surface::Dielectric { .. } | Surface::Null => return None,
+            _ => return None,
         };
         let mut scatterer = [0.0; WORDS];
         scatterer[..3].copy_from_slice(&normal.to_array());

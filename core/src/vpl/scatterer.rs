@@ -120,7 +120,7 @@ impl Receiver {
         })
     }
 
-    /// A point of a surface; `None` for surfaces that send light on in discrete directions, and for black ones.
+    /// A point of a surface; `None` for surfaces that light is followed past ([`Surface::is_followed`]), and for black ones.
     ///
     /// ```
     /// # use fogbow::{host::Hit, math::Vec3, spectrum::Spectrum, surface::Surface, vpl::Receiver};
@@ -133,7 +133,7 @@ impl Receiver {
     #[inline]
     #[must_use]
     pub fn on_surface(point: Vec3, to_eye: Vec3, hit: &Hit) -> Option<Self> {
-        let scatters = !hit.surface.is_discrete() && !hit.surface.albedo().is_black();
+        let scatters = !hit.surface.is_followed() && !hit.surface.albedo().is_black();
         (scatters && hit.faces(to_eye)).then_some(Self {
             point,
             to_eye,

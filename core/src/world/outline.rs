@@ -8,7 +8,6 @@ use crate::light::Light;
 use crate::math::{Bounds, Ray};
 use crate::phase::Phase;
 use crate::sampling::{Generator, uniform, uniform2, warp};
-use crate::surface::Surface;
 
 /// Points along each side of the bounds at which a medium is looked at. Fewer: small clouds are missed. More:
 /// longer, by the third power.
@@ -157,8 +156,7 @@ impl Outline {
             let ray = Ray::new(first + size * at, warp::uniform_sphere(uniform2(&mut rng)));
             let end = nearest_surface(&ray, world.scene);
             has_surfaces |= end.is_some();
-            has_mirrors |=
-                end.is_some_and(|hit| matches!(hit.surface, Surface::Mirror { .. } | Surface::Dielectric { .. }));
+            has_mirrors |= end.is_some_and(|hit| hit.surface.is_followed());
             let leaves = Bounds { min: first, max: first + size }.intersect(&ray).map_or(0.0, |(_, far)| far);
             let length = end.map_or(f32::INFINITY, |hit| hit.distance).min(leaves);
             is_constant = is_constant && is_constant_along(medium, &ray.with_length(length));
@@ -253,6 +251,7 @@ fn is_constant_along(medium: &(impl Medium + ?Sized), ray: &Ray) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::surface::Surface;
     use crate::host::{Empty, Hit, MajorantSegment, Properties};
     use crate::medium::{Homogeneous, Placed, Region};
     use crate::phase::Lobe;

@@ -8,11 +8,12 @@ use fogbow::surface::Surface;
 use super::description::{Material, Slot};
 use super::element::Element;
 use super::plugin::Plugin;
-use super::textures;
+use super::{bsdfs, textures};
 use crate::error::SceneError;
 use crate::texture::Texture;
 
-const KNOWN: &str = "diffuse, twosided, bumpmap, normalmap, null, conductor, dielectric, phong";
+const KNOWN: &str = "diffuse, twosided, bumpmap, normalmap, null, conductor, roughconductor, dielectric, roughdielectric, \
+    thindielectric, plastic, roughplastic, phong";
 
 /// What a shape without a `<bsdf>` reflects; one that shines reflects nothing.
 pub(super) fn default_material(is_emitter: bool) -> Material {
@@ -35,7 +36,7 @@ pub(super) fn read(element: &Element<'_>) -> Result<Material, SceneError> {
     let material = if plugin.kind == "twosided" {
         let inner = plugin.nested("bsdf").ok_or_else(|| element.error("a <bsdf> is missing inside"))?;
         let material = read(&inner)?;
-        if matches!(material.surface, Surface::Dielectric { .. } | Surface::Null) {
+        if material.surface.transmits() {
             return Err(inner.error("light passes through it, so it cannot be made two-sided"));
         }
         if material.is_two_sided {
@@ -66,23 +67,6 @@ fn read_surface(plugin: &Plugin<'_>, textures: &mut Textures) -> Result<Surface,
     match plugin.kind.as_str() {
         "diffuse" => Ok(Surface::Lambert { reflectance: share("reflectance", Spectrum::splat(0.5), Slot::Diffuse)? }),
         "null" => Ok(Surface::Null),
-        "conductor" => {
-            match plugin.string("material")? {
-                Some((name, _)) if name == "none" => {}
-                Some((name, element)) => {
-                    return Err(element.attribute_error(
-                        "value",
-                        format!("\"{name}\" is not known; only the perfect mirror \"none\" is"),
-                    ));
-                }
-                None => {
-                    return Err(plugin.element.error(
-                        "only the perfect mirror is known: <string name=\"material\" value=\"none\"/> is missing",
-                    ));
-                }
-            }
-            Ok(Surface::Mirror { reflectance: share("specular_reflectance", Spectrum::ONE, Slot::Specular)? })
-        }
         "dielectric" => {
             let inside = index_of_refraction(plugin, "int_ior", 1.5046)?;
             let outside = index_of_refraction(plugin, "ext_ior", 1.000_277)?;
@@ -101,12 +85,18 @@ fn read_surface(plugin: &Plugin<'_>, textures: &mut Textures) -> Result<Surface,
             }
             Ok(Surface::Phong { diffuse, specular, exponent })
         }
-        _ => Err(plugin.unknown_type(KNOWN)),
+        kind => match bsdfs::read(plugin, &mut share)? {
+            Some(surface) => Ok(surface),
+            None => Err(match bsdfs::reason(kind) {
+                Some(reason) => plugin.element.attribute_error("type", reason),
+                None => plugin.unknown_type(KNOWN),
+            }),
+        },
     }
 }
 
 /// An index of refraction as a number or the name of a substance.
-fn index_of_refraction(plugin: &Plugin<'_>, name: &str, default: f64) -> Result<f64, SceneError> {
+pub(super) fn index_of_refraction(plugin: &Plugin<'_>, name: &str, default: f64) -> Result<f64, SceneError> {
     // Names and values of Mitsuba 3's table.
     const SUBSTANCES: [(&str, f64); 18] = [
         ("vacuum", 1.0),

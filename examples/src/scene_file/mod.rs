@@ -9,7 +9,7 @@
 //! | `medium` | `homogeneous` (`sigma_t` and `albedo`, or `sigma_a` and `sigma_s`; `scale`), `heterogeneous` (`sigma_t` as `gridvolume` or `constvolume`) |
 //! | `phase` | `isotropic`, `hg`, `rayleigh`, `blendphase` |
 //! | `shape` | `rectangle`, `cube`, `sphere`, `disk`, `cylinder`, `ply`, `obj`, `serialized`, `linearcurve`, `bsplinecurve` (tubes of triangles), `shapegroup`, `instance`, `merge` |
-//! | `bsdf` | `diffuse`, `twosided`, `null`, `conductor` with material `none`, `dielectric`; and `phong`, which Mitsuba 3 does not know |
+//! | `bsdf` | `diffuse`, `twosided`, `null`, `conductor`, `roughconductor`, `dielectric`, `roughdielectric`, `thindielectric`, `plastic`, `roughplastic`; and `phong`, which Mitsuba 3 does not know |
 //! | `texture` | `bitmap`, `checkerboard`, `mesh_attribute`, `volume`, `uniform`, `rawconstant`: on reflectances |
 //! | `emitter` | `point`, `spot`, `area`, `directional`, `constant`, `envmap` |
 //!
@@ -17,6 +17,7 @@
 //! version 0.6 are upgraded. A medium fills the cube or sphere whose `interior` it is. What has no effect here is a
 //! [`Note`]; anything else is a [`SceneError`]: nothing is skipped in silence.
 
+mod bsdfs;
 mod description;
 mod element;
 mod emitters;
@@ -24,6 +25,7 @@ mod fingerprint;
 mod groups;
 mod materials;
 mod media;
+mod metals;
 mod notes;
 mod places;
 mod plugin;

@@ -44,7 +44,7 @@ pub(super) fn read<'a>(
         let is_clear = source
             .shape
             .as_ref()
-            .is_none_or(|s| matches!(s.material.surface, fogbow::surface::Surface::Dielectric { .. }));
+            .is_none_or(|s| s.material.surface.transmits());
         if !is_clear {
             if interior.is_some() {
                 return Err(source.element.error("light never reaches the medium inside an opaque shape"));

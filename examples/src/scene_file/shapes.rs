@@ -87,7 +87,7 @@ fn check(
     is_flipped: bool,
     has_media: bool,
 ) -> Result<(), SceneError> {
-    let is_clear = matches!(material.surface, Surface::Null | Surface::Dielectric { .. });
+    let is_clear = material.surface.transmits();
     if is_emitter && is_clear {
         return Err(element.error("an area light needs a bsdf that light cannot pass through"));
     }

@@ -170,8 +170,7 @@ impl<'a> World<'a> {
     /// Whether any surface is a mirror or glass.
     #[must_use]
     pub fn has_mirrors(&self) -> bool {
-        let sends_on = |surface| matches!(surface, Surface::Mirror { .. } | Surface::Dielectric { .. });
-        self.materials.iter().any(|material| sends_on(material.surface))
+        self.materials.iter().any(|material| material.surface.is_followed() && material.surface != Surface::Null)
     }
 
     /// Whether there is light that caches can hold: scattered by a medium, or by a surface that is no mirror and no glass.

@@ -1,0 +1,133 @@
+//! Kinds of `<bsdf>` with facets, coats and metals, and what of their names is known but not read.
+
+use fogbow::spectrum::Spectrum;
+use fogbow::surface::{Conductor, Distribution, Plastic, RoughConductor, RoughDielectric, RoughPlastic, Roughness, Surface};
+
+use super::description::Slot;
+use super::materials::index_of_refraction;
+use super::metals::METALS;
+use super::plugin::Plugin;
+use crate::error::SceneError;
+
+/// Asks for a colour within [0, 1] by name, with a default; a texture may stand there.
+pub(super) type Share<'s> = dyn FnMut(&str, Spectrum, Slot) -> Result<Spectrum, SceneError> + 's;
+
+/// Index of refraction of what coats plastic: polypropylene.
+const COAT: f64 = 1.49;
+
+/// Index of refraction of glass: BK7.
+const GLASS: f64 = 1.5046;
+
+/// The surface of a `<bsdf>` of one of these kinds; `None` for others.
+pub(super) fn read(plugin: &Plugin<'_>, share: &mut Share<'_>) -> Result<Option<Surface>, SceneError> {
+    let (one, half) = (Spectrum::ONE, Spectrum::splat(0.5));
+    Ok(Some(match plugin.kind.as_str() {
+        "conductor" => {
+            let metal = metal(plugin, share)?;
+            if metal == Conductor::mirror(metal.reflectance) {
+                Surface::Mirror { reflectance: metal.reflectance }
+            } else {
+                Surface::Conductor(metal)
+            }
+        }
+        "roughconductor" => {
+            let (conductor, roughness) = (metal(plugin, share)?, roughness(plugin)?);
+            Surface::RoughConductor(RoughConductor { conductor, roughness })
+        }
+        "roughdielectric" => {
+            let roughness = roughness(plugin)?;
+            let eta = relative_index(plugin, GLASS)?;
+            let reflectance = share("specular_reflectance", one, Slot::Specular)?;
+            let transmittance = share("specular_transmittance", one, Slot::Transmitted)?;
+            if eta == 1.0 {
+                return Err(plugin.element.error("int_ior and ext_ior are the same: nothing would be refracted"));
+            }
+            Surface::RoughDielectric(RoughDielectric { eta, reflectance, transmittance, roughness })
+        }
+        "thindielectric" => Surface::ThinDielectric {
+            eta: relative_index(plugin, GLASS)?,
+            reflectance: share("specular_reflectance", one, Slot::Specular)?,
+            transmittance: share("specular_transmittance", one, Slot::Transmitted)?,
+        },
+        kind @ ("plastic" | "roughplastic" | "pplastic") => {
+            let plastic = Plastic {
+                eta: relative_index(plugin, COAT)?,
+                diffuse: share("diffuse_reflectance", half, Slot::Diffuse)?,
+                specular: share("specular_reflectance", one, Slot::Specular)?,
+                nonlinear: kind != "pplastic" && plugin.boolean("nonlinear", false)?,
+            };
+            if kind == "plastic" {
+                return Ok(Some(Surface::Plastic(plastic)));
+            }
+            let Roughness { distribution, alpha: [u, v], .. } = roughness(plugin)?;
+            if u != v {
+                return Err(plugin.element.error("rough plastic is as rough along as across: alpha_u and alpha_v differ"));
+            }
+            Surface::RoughPlastic(RoughPlastic::new(plastic, distribution, u))
+        }
+        _ => return Ok(None),
+    }))
+}
+
+/// The index inside over that outside.
+fn relative_index(plugin: &Plugin<'_>, inside: f64) -> Result<f32, SceneError> {
+    let inside = index_of_refraction(plugin, "int_ior", inside)?;
+    Ok((inside / index_of_refraction(plugin, "ext_ior", 1.000_277)?) as f32)
+}
+
+/// `material`, or `eta` and `k`; a perfect mirror if there is neither.
+fn metal(plugin: &Plugin<'_>, share: &mut Share<'_>) -> Result<Conductor, SceneError> {
+    let reflectance = share("specular_reflectance", Spectrum::ONE, Slot::Specular)?;
+    let mirror = Conductor::mirror(reflectance);
+    let (eta, k) = (plugin.colour("eta")?, plugin.colour("k")?);
+    let named = plugin.string("material")?.filter(|(name, _)| name != "none");
+    let metal = match named {
+        Some((_, element)) if eta.is_some() || k.is_some() => {
+            return Err(element.error("a material is named; \"eta\" and \"k\" cannot be given, too"));
+        }
+        Some((name, element)) => {
+            let Some((_, eta, k)) = METALS.iter().find(|(known, ..)| *known == name) else {
+                let known: Vec<_> = METALS.iter().map(|(known, ..)| *known).collect();
+                return Err(element.attribute_error("value", format!("\"{name}\" is none of: none, {}", known.join(", "))));
+            };
+            Conductor { eta: Spectrum(*eta), k: Spectrum(*k), reflectance }
+        }
+        None => {
+            let or = |given: Option<(Spectrum, _)>, default| given.map_or(default, |(value, _)| value);
+            Conductor { eta: or(eta, mirror.eta), k: or(k, mirror.k), reflectance }
+        }
+    };
+    // The index of what is outside divides both.
+    let outside = index_of_refraction(plugin, "ext_eta", 1.0)? as f32;
+    Ok(Conductor { eta: metal.eta / outside, k: metal.k / outside, ..metal })
+}
+
+/// `distribution`, and `alpha` or `alpha_u` and `alpha_v`.
+fn roughness(plugin: &Plugin<'_>) -> Result<Roughness, SceneError> {
+    let distribution = match plugin.word("distribution", &["beckmann", "ggx"])? {
+        "ggx" => Distribution::Ggx,
+        _ => Distribution::Beckmann,
+    };
+    // Normals are drawn as they are seen, whatever this says: it changes noise alone.
+    plugin.boolean("sample_visible", true)?;
+    let alpha = |name| plugin.number_in(name, 0.1, 0.0..=10.0);
+    let (u, v) = (plugin.get("alpha_u").is_some(), plugin.get("alpha_v").is_some());
+    if u != v {
+        return Err(plugin.element.error("alpha_u and alpha_v must both be given, or neither"));
+    }
+    if u && plugin.get("alpha").is_some() {
+        return Err(plugin.element.error("either alpha can be given, or alpha_u and alpha_v"));
+    }
+    let alpha = if u { [alpha("alpha_u")?, alpha("alpha_v")?] } else { [alpha("alpha")?; 2] };
+    Ok(Roughness { alpha: alpha.map(|a| a as f32), ..Roughness::even(distribution, 0.0) })
+}
+
+/// Why a kind of `<bsdf>` that other programs know is not read.
+pub(super) fn reason(kind: &str) -> Option<&'static str> {
+    Some(match kind {
+        "measured" | "measured_polarized" => "measured materials are not read: \"roughconductor\" or \"principled\" may come near",
+        "polarizer" | "retarder" | "circular" => "light is not polarised here, so there is nothing that this could change rightly",
+        "hair" => "hair is not read: it needs curves, and a model of their fibres",
+        _ => return None,
+    })
+}
