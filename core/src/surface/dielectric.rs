@@ -65,12 +65,13 @@ impl RoughDielectric {
         let (m, rough) = (facing.m, &self.roughness);
         let fresnel = refract(eye, m, self.eta).reflectance;
         let shadowing = rough.masking(eye, m) * rough.masking(light, m);
-        let common = rough.density(m) * shadowing * facing.jacobian(eye, light) * (eye.dot(m) / (eye.z * light.z)).abs();
+        let common = rough.density(m) * shadowing / (eye.z * light.z).abs();
         if facing.reflects {
-            self.reflectance * (common * fresnel)
-        } else {
-            self.transmittance * (common * (1.0 - fresnel) / (facing.eta * facing.eta))
+            // The cosines to the facet are equal: without them, nothing cancels at grazing angles.
+            return self.reflectance * (0.25 * common * fresnel);
         }
+        let bent = facing.jacobian(eye, light) * eye.dot(m).abs() / (facing.eta * facing.eta);
+        self.transmittance * (common * (1.0 - fresnel) * bent)
     }
 
     #[inline]

@@ -111,7 +111,8 @@ const STEEP: f32 = 0.3;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RoughPlastic {
     plastic: Plastic,
-    roughness: Roughness,
+    distribution: Distribution,
+    alpha: f32,
     /// Share of diffuse light reflected back from inside.
     internal: f32,
     /// Chebyshev series of the transmittance from outside, in `(1 + s) μ/(μ + s)`.
@@ -138,7 +139,7 @@ impl RoughPlastic {
         for (k, sample) in samples.iter_mut().enumerate() {
             let (_, cos) = float::sin_cos(PI * (k as f32 + 0.5) / TERMS as f32);
             let t = 0.5 * (cos + 1.0);
-            *sample = 1.0 - reflectance(&roughness, STEEP * t / (1.0 + STEEP - t), plastic.eta, 8);
+            *sample = sent(&roughness, STEEP * t / (1.0 + STEEP - t), plastic.eta, true, 8);
         }
         let transmittance = core::array::from_fn(|n| {
             let term = |(k, sample): (usize, &f32)| sample * float::sin_cos(PI * n as f32 * (k as f32 + 0.5) / TERMS as f32).1;
@@ -147,8 +148,8 @@ impl RoughPlastic {
         // The mean over as many angles as the model was defined with: 1.5 % less than the integral.
         const ANGLES: u32 = 64;
         let at = |i: u32| float::max(i as f32 / (ANGLES - 1) as f32, GRAZING);
-        let sum: f32 = (0..ANGLES).map(|i| at(i) * reflectance(&roughness, at(i), 1.0 / plastic.eta, 3)).sum();
-        Self { plastic, roughness, internal: 2.0 * sum / ANGLES as f32, transmittance }
+        let sum: f32 = (0..ANGLES).map(|i| at(i) * sent(&roughness, at(i), 1.0 / plastic.eta, false, 3)).sum();
+        Self { plastic, distribution, alpha, internal: 2.0 * sum / ANGLES as f32, transmittance }
     }
 
     /// The same with other colours: [`Plastic::diffuse`] and [`Plastic::specular`].
@@ -186,7 +187,7 @@ impl RoughPlastic {
     /// ```
     #[must_use]
     pub fn roughness(&self) -> Roughness {
-        self.roughness
+        Roughness::even(self.distribution, self.alpha)
     }
 
     /// Share of light that the coat lets pass into the base.
@@ -209,7 +210,7 @@ impl RoughPlastic {
 
     #[inline]
     pub(super) fn value(&self, eye: Vec3, light: Vec3) -> Spectrum {
-        let Some((m, coat)) = reflection(&self.roughness, eye, light) else { return Spectrum::ZERO };
+        let Some((m, coat)) = reflection(&self.roughness(), eye, light) else { return Spectrum::ZERO };
         let reflected = fresnel(eye.dot(m).min(1.0), self.plastic.eta);
         self.plastic.specular * (coat * reflected) + self.diffuse_value(eye, light)
     }
@@ -217,14 +218,14 @@ impl RoughPlastic {
     #[inline]
     pub(super) fn pdf(&self, eye: Vec3, light: Vec3) -> f32 {
         let share = coat_share(&self.plastic, 1.0 - self.passes(eye.z));
-        share * reflection_pdf(&self.roughness, eye, light) + (1.0 - share) * cosine_hemisphere_pdf(light.z)
+        share * reflection_pdf(&self.roughness(), eye, light) + (1.0 - share) * cosine_hemisphere_pdf(light.z)
     }
 
     #[inline]
     pub(super) fn sample(&self, eye: Vec3, choice: f32, u: Vec2) -> Option<SurfaceSample> {
         let share = coat_share(&self.plastic, 1.0 - self.passes(eye.z));
         let to_light =
-            if choice < share { mirrored(eye, self.roughness.sample(eye, u)) } else { cosine_hemisphere(u) };
+            if choice < share { mirrored(eye, self.roughness().sample(eye, u)) } else { cosine_hemisphere(u) };
         if !(to_light.z > GRAZING && eye.z > GRAZING) {
             return None;
         }
@@ -233,9 +234,9 @@ impl RoughPlastic {
     }
 }
 
-/// Share of light that a rough interface reflects, once, at an angle of incidence with `cosine`: an integral over the
-/// normals that are seen, by `panels`² rules of 8 × 8 points.
-fn reflectance(rough: &Roughness, cosine: f32, eta: f32, panels: u32) -> f32 {
+/// Share of light that a rough interface sends on, by one reflection or, where `transmits`, one refraction, at an angle of
+/// incidence with `cosine`: an integral over the normals that are seen, by `panels`² rules of 8 × 8 points.
+fn sent(rough: &Roughness, cosine: f32, eta: f32, transmits: bool, panels: u32) -> f32 {
     let cosine = float::max(cosine, GRAZING);
     let eye = Vec3::new(float::safe_sqrt(1.0 - cosine * cosine), 0.0, cosine);
     let width = 1.0 / panels as f32;
@@ -244,10 +245,15 @@ fn reflectance(rough: &Roughness, cosine: f32, eta: f32, panels: u32) -> f32 {
     for (x, weight_x) in nodes() {
         for (y, weight_y) in nodes() {
             let m = rough.sample(eye, Vec2::new(x, y));
-            let to_light = mirrored(eye, m);
-            if to_light.z > 0.0 {
-                sum += weight_x * weight_y * refract(eye, m, eta).reflectance * rough.masking(to_light, m);
-            }
+            let refraction = refract(eye, m, eta);
+            let share = if transmits {
+                let through = refraction.transmitted.filter(|through| through.z < 0.0);
+                through.map_or(0.0, |through| (1.0 - refraction.reflectance) * rough.masking(through, m))
+            } else {
+                let to_light = mirrored(eye, m);
+                if to_light.z > 0.0 { refraction.reflectance * rough.masking(to_light, m) } else { 0.0 }
+            };
+            sum += weight_x * weight_y * share;
         }
     }
     sum
