@@ -32,9 +32,7 @@ pub(super) fn state<M: Medium + ?Sized, S: Scene + ?Sized>(
     for i in 0..RAYS {
         let direction = warp::uniform_sphere(even2(i + 1).into());
         let hit = nearest_surface(&Ray::new(point, direction), world.scene);
-        let is_back = |hit: &crate::host::Hit| {
-            hit.normal.dot(direction) > 0.0 && !hit.surface.transmits()
-        };
+        let is_back = |hit: &crate::host::Hit| hit.normal.dot(direction) > 0.0 && !hit.surface.transmits();
         behind += u32::from(hit.as_ref().is_some_and(is_back));
     }
     if behind as f32 > MOST_BEHIND * RAYS as f32 {

@@ -216,9 +216,11 @@ impl Surface {
                 let gloss = specular.mean() * phong::value(normal, to_eye, to_light, exponent);
                 Some(Gloss { exponent, share: share(gloss, base) })
             }
-            Self::Mirror { .. } | Self::Conductor(_) | Self::Dielectric { .. } | Self::ThinDielectric { .. } | Self::Null => {
-                None
-            }
+            Self::Mirror { .. }
+            | Self::Conductor(_)
+            | Self::Dielectric { .. }
+            | Self::ThinDielectric { .. }
+            | Self::Null => None,
             Self::RoughConductor(RoughConductor { roughness, .. })
             | Self::RoughDielectric(RoughDielectric { roughness, .. }) => {
                 Some(Gloss { exponent: roughness.exponent(), share: 1.0 })
@@ -401,9 +403,8 @@ impl Surface {
         match *self {
             Self::Lambert { reflectance } | Self::Mirror { reflectance } => reflectance,
             Self::Phong { diffuse, specular, .. } => diffuse + specular,
-            Self::Dielectric { reflectance, transmittance, .. } | Self::ThinDielectric { reflectance, transmittance, .. } => {
-                reflectance.max(transmittance)
-            }
+            Self::Dielectric { reflectance, transmittance, .. }
+            | Self::ThinDielectric { reflectance, transmittance, .. } => reflectance.max(transmittance),
             Self::Conductor(metal) => metal.reflectance,
             Self::RoughConductor(metal) => metal.conductor.reflectance,
             Self::RoughDielectric(glass) => glass.reflectance.max(glass.transmittance),

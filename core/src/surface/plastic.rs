@@ -142,7 +142,8 @@ impl RoughPlastic {
             *sample = sent(&roughness, STEEP * t / (1.0 + STEEP - t), plastic.eta, true, 8);
         }
         let transmittance = core::array::from_fn(|n| {
-            let term = |(k, sample): (usize, &f32)| sample * float::sin_cos(PI * n as f32 * (k as f32 + 0.5) / TERMS as f32).1;
+            let term =
+                |(k, sample): (usize, &f32)| sample * float::sin_cos(PI * n as f32 * (k as f32 + 0.5) / TERMS as f32).1;
             samples.iter().enumerate().map(term).sum::<f32>() * if n == 0 { 1.0 } else { 2.0 } / TERMS as f32
         });
         // The mean over as many angles as the model was defined with: 1.5 % less than the integral.

@@ -223,7 +223,8 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Gatherer<'_, M, S> {
             return Spectrum::ZERO;
         };
         if !hit.surface.is_discrete() {
-            return self.followed(&way, &hit, scattered / receiver.scatterer.unit(), most, rng) * receiver.scatterer.unit();
+            return self.followed(&way, &hit, scattered / receiver.scatterer.unit(), most, rng)
+                * receiver.scatterer.unit();
         }
         let Some(sample) = hit.sample(-direction, uniform(rng), uniform2(rng)) else {
             return Spectrum::ZERO;

@@ -251,11 +251,11 @@ fn is_constant_along(medium: &(impl Medium + ?Sized), ray: &Ray) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::surface::Surface;
     use crate::host::{Empty, Hit, MajorantSegment, Properties};
     use crate::medium::{Homogeneous, Placed, Region};
     use crate::phase::Lobe;
     use crate::spectrum::Spectrum;
+    use crate::surface::Surface;
 
     const BOX: Bounds = Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE };
 

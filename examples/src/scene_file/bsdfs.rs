@@ -1,7 +1,9 @@
 //! Kinds of `<bsdf>` with facets, coats and metals, and what of their names is known but not read.
 
 use fogbow::spectrum::Spectrum;
-use fogbow::surface::{Conductor, Distribution, Plastic, RoughConductor, RoughDielectric, RoughPlastic, Roughness, Surface};
+use fogbow::surface::{
+    Conductor, Distribution, Plastic, RoughConductor, RoughDielectric, RoughPlastic, Roughness, Surface,
+};
 
 use super::description::Slot;
 use super::materials::index_of_refraction;
@@ -61,7 +63,9 @@ pub(super) fn read(plugin: &Plugin<'_>, share: &mut Share<'_>) -> Result<Option<
             }
             let Roughness { distribution, alpha: [u, v], .. } = roughness(plugin)?;
             if u != v {
-                return Err(plugin.element.error("rough plastic is as rough along as across: alpha_u and alpha_v differ"));
+                return Err(plugin
+                    .element
+                    .error("rough plastic is as rough along as across: alpha_u and alpha_v differ"));
             }
             Surface::RoughPlastic(RoughPlastic::new(plastic, distribution, u))
         }
@@ -88,7 +92,9 @@ fn metal(plugin: &Plugin<'_>, share: &mut Share<'_>) -> Result<Conductor, SceneE
         Some((name, element)) => {
             let Some((_, eta, k)) = METALS.iter().find(|(known, ..)| *known == name) else {
                 let known: Vec<_> = METALS.iter().map(|(known, ..)| *known).collect();
-                return Err(element.attribute_error("value", format!("\"{name}\" is none of: none, {}", known.join(", "))));
+                return Err(
+                    element.attribute_error("value", format!("\"{name}\" is none of: none, {}", known.join(", ")))
+                );
             };
             Conductor { eta: Spectrum(*eta), k: Spectrum(*k), reflectance }
         }
@@ -125,8 +131,12 @@ fn roughness(plugin: &Plugin<'_>) -> Result<Roughness, SceneError> {
 /// Why a kind of `<bsdf>` that other programs know is not read.
 pub(super) fn reason(kind: &str) -> Option<&'static str> {
     Some(match kind {
-        "measured" | "measured_polarized" => "measured materials are not read: \"roughconductor\" or \"principled\" may come near",
-        "polarizer" | "retarder" | "circular" => "light is not polarised here, so there is nothing that this could change rightly",
+        "measured" | "measured_polarized" => {
+            "measured materials are not read: \"roughconductor\" or \"principled\" may come near"
+        }
+        "polarizer" | "retarder" | "circular" => {
+            "light is not polarised here, so there is nothing that this could change rightly"
+        }
         "hair" => "hair is not read: it needs curves, and a model of their fibres",
         _ => return None,
     })

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use fogbow::phase::Phase;
 use fogbow::spectrum::Spectrum;
-use fogbow::surface::Surface;
+use fogbow::surface::{Conductor, RoughConductor, RoughDielectric, Surface};
 
 use crate::mesh::Mesh;
 use crate::picture::Picture;
@@ -263,8 +263,29 @@ impl Slot {
     pub fn put(self, surface: &mut Surface, value: Spectrum) {
         let share = value.max(Spectrum::ZERO).min(Spectrum::ONE);
         match (self, surface) {
-            (Self::Diffuse, Surface::Lambert { reflectance }) | (Self::Specular, Surface::Mirror { reflectance }) => {
-                *reflectance = share;
+            (Self::Diffuse, Surface::Lambert { reflectance }) => *reflectance = share,
+            (
+                Self::Specular,
+                Surface::Mirror { reflectance }
+                | Surface::Dielectric { reflectance, .. }
+                | Surface::ThinDielectric { reflectance, .. }
+                | Surface::Conductor(Conductor { reflectance, .. })
+                | Surface::RoughConductor(RoughConductor { conductor: Conductor { reflectance, .. }, .. })
+                | Surface::RoughDielectric(RoughDielectric { reflectance, .. }),
+            ) => *reflectance = share,
+            (
+                Self::Transmitted,
+                Surface::Dielectric { transmittance, .. }
+                | Surface::ThinDielectric { transmittance, .. }
+                | Surface::RoughDielectric(RoughDielectric { transmittance, .. }),
+            ) => *transmittance = share,
+            (Self::Diffuse, Surface::Plastic(plastic)) => plastic.diffuse = share,
+            (Self::Specular, Surface::Plastic(plastic)) => plastic.specular = share,
+            (Self::Diffuse, Surface::RoughPlastic(rough)) => {
+                *rough = rough.with_colours(share, rough.plastic().specular)
+            }
+            (Self::Specular, Surface::RoughPlastic(rough)) => {
+                *rough = rough.with_colours(rough.plastic().diffuse, share)
             }
             // Both together must not reflect more than all light.
             (Self::Diffuse, Surface::Phong { diffuse, specular, .. }) => {
@@ -273,8 +294,6 @@ impl Slot {
             (Self::Specular, Surface::Phong { diffuse, specular, .. }) => {
                 *specular = share.min(Spectrum::ONE - *diffuse)
             }
-            (Self::Specular, Surface::Dielectric { reflectance, .. }) => *reflectance = share,
-            (Self::Transmitted, Surface::Dielectric { transmittance, .. }) => *transmittance = share,
             _ => {}
         }
     }

@@ -41,10 +41,7 @@ pub(super) fn read<'a>(
     for source in shapes {
         let mut side = |element: &Option<Element<'a>>| element.map(|e| found.index_of(&e)).transpose();
         let (interior, exterior) = (side(&source.interior)?, side(&source.exterior)?);
-        let is_clear = source
-            .shape
-            .as_ref()
-            .is_none_or(|s| s.material.surface.transmits());
+        let is_clear = source.shape.as_ref().is_none_or(|s| s.material.surface.transmits());
         if !is_clear {
             if interior.is_some() {
                 return Err(source.element.error("light never reaches the medium inside an opaque shape"));
