@@ -426,8 +426,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
         rng: &mut Generator,
     ) -> Spectrum {
         let origin = |to_light: Vec3| leave(point, hit.normal, to_light, hit.distance);
-        let cosine =
-            |to_light: Vec3, _| Spectrum::splat(if hit.faces(to_light) { hit.cosine(to_light) } else { 0.0 });
+        let cosine = |to_light: Vec3, _| Spectrum::splat(if hit.faces(to_light) { hit.cosine(to_light) } else { 0.0 });
         let weight = FromPoint { sky: with_sky, ..FromPoint::all(point) };
         self.connected(&weight, origin, cosine, random, rng)
     }
