@@ -5,7 +5,7 @@
 //! | [`scene_file`] | reads Mitsuba 3 scenes into a checked description |
 //! | [`mesh`], [`volume`], [`picture`] | the files scenes name |
 //! | [`world`] | the host: surfaces, lights and media, ready for rays |
-//! | [`camera`] | the pinhole camera |
+//! | [`camera`], [`filter`] | where eye rays start, and how much they count for a pixel |
 //! | [`bake`] | files of baked light |
 //! | [`plume`] | an animation of smoke |
 //! | [`figures`] | figures of papers, rebuilt |
@@ -24,6 +24,7 @@ pub mod compare;
 pub mod derivatives;
 pub mod error;
 pub mod figures;
+pub mod filter;
 pub mod mesh;
 pub mod picture;
 pub mod plume;

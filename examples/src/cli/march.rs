@@ -16,7 +16,7 @@ use fogbow_std::tiles::{self, Outcome};
 use super::Failure;
 use super::bake::is_made_for;
 use super::covariance::MarchArguments;
-use super::render::{LAYERS, Shot, write_layers};
+use super::render::{LAYERS, Shot, weigh, write_layers};
 use super::scene::SceneArguments;
 use crate::error::read_file;
 use crate::world::{WithMedium, World};
@@ -84,7 +84,7 @@ impl WithMedium for MarchJob<'_> {
                 scene: &CountingScene { scene: shot.world, tally: sample.tally },
                 lights: shot.lights,
             };
-            let ray = shot.eye_ray(sample, (width, height), rng);
+            let (ray, weight) = shot.eye_ray(sample, (width, height), rng);
             let mut count = 0_u32;
             let seen =
                 path::radiance_beyond(&ray, &world, &shot.paths, rng, |segment: &Ray, most, rng: &mut Generator| {
@@ -123,6 +123,7 @@ impl WithMedium for MarchJob<'_> {
             if let Some(steps) = layers.get_mut(LAYERS.len()) {
                 *steps = Spectrum::splat(count as f32);
             }
+            weigh(layers, weight);
         })?;
         Ok(outcome)
     }

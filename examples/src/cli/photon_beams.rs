@@ -16,7 +16,7 @@ use fogbow_std::threads::{self, Threads};
 use fogbow_std::tiles::{Outcome, Passes};
 
 use super::defaults::{unit_outline, with_default};
-use super::render::{Shot, write_layers};
+use super::render::{Shot, weigh, write_layers};
 use super::{Failure, output};
 use crate::world::WithMedium;
 
@@ -151,11 +151,12 @@ impl WithMedium for BeamJob<'_> {
                     scene: &CountingScene { scene: shot.world, tally: sample.tally },
                     lights: shot.lights,
                 };
-                let ray = shot.eye_ray(sample, (width, height), rng);
+                let (ray, weight) = shot.eye_ray(sample, (width, height), rng);
                 let share = if shot.is_computed(sample, width) { settings.share(sample.index) } else { 0.0 };
                 let seen = beams.radiance(&ray, &world, &settings.walk, share, rng);
                 sample.tally.collide(seen.collisions);
                 write_layers(&seen, layers);
+                weigh(layers, weight);
             },
         )?;
         Ok(outcome)

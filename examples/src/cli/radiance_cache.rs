@@ -15,7 +15,6 @@ use fogbow::light::Lights;
 use fogbow::math::{Ray, Vec2};
 use fogbow::path;
 use fogbow::picture::LEAST_SAMPLES;
-use fogbow::sampling::uniform2;
 use fogbow::sh;
 use fogbow::work::Rounds;
 use fogbow::world::{Outline, World as LitWorld};
@@ -31,10 +30,12 @@ use super::covariance::Stopped;
 use super::defaults::{unit_outline, with_default};
 use super::image_sampling::is_computed;
 use super::keep::{Keeper, Measured};
+use super::render::weigh;
 use super::scene::SceneArguments;
 use super::{Failure, output};
-use crate::camera::Camera;
+use crate::camera::{Camera, Eye};
 use crate::error::SceneError;
+use crate::filter::FilterTable;
 use crate::world::{WithMedium, World};
 
 /// Of `--method radiance-cache`.
@@ -229,6 +230,7 @@ pub(super) struct CacheJob<'a> {
     pub(super) world: &'a World<'a>,
     pub(super) lights: Lights<'a>,
     pub(super) camera: Camera,
+    pub(super) filter: &'a FilterTable,
     pub(super) paths: path::Settings,
     pub(super) film: &'a mut Film,
     pub(super) settings: &'a tiles::Settings,
@@ -459,22 +461,21 @@ impl<M: Medium + Sync> Stages<'_, '_, M> {
     ) -> Result<Outcome, Failure> {
         let job = self.job;
         let has_layers = film.layers().len() > 1;
-        let (width, height) = (film.width() as f32, film.height() as f32);
+        let (width, height) = (film.width(), film.height());
         Ok(tiles::render(film, settings, job.control, |sample, rng, layers| {
             let world = LitWorld {
                 medium: &CountingMedium { medium: self.medium, tally: sample.tally },
                 scene: &CountingScene { scene: job.world, tally: sample.tally },
                 lights: job.lights,
             };
-            let jitter = uniform2(rng);
-            let film = Vec2::new((sample.x as f32 + jitter.x) / width, (sample.y as f32 + jitter.y) / height);
-            let ray = job.camera.ray(film);
+            let eye = Eye { camera: job.camera, filter: job.filter };
+            let (ray, weight) = eye.ray([sample.x, sample.y], [width, height], rng);
             let seen = if job.paths.max_scatterings == 0 {
                 CachedRadiance {
                     emitted: path::radiance(&ray, &world, &job.paths, rng).emitted,
                     ..CachedRadiance::default()
                 }
-            } else if is_computed(job.plan, sample, width as u32) {
+            } else if is_computed(job.plan, sample, width) {
                 caches.radiance(&ray, &world, rng)
             } else {
                 caches.radiance_beyond(&ray, &world, rng)
@@ -494,6 +495,7 @@ impl<M: Medium + Sync> Stages<'_, '_, M> {
             } else if let Some(total) = layers.first_mut() {
                 *total = seen.total();
             }
+            weigh(layers, weight);
         })?)
     }
 

@@ -18,6 +18,7 @@ use super::report::{Bar, Voice};
 use super::scene::SceneArguments;
 use super::{Ending, Failure, output};
 use crate::camera::Camera;
+use crate::filter::FilterTable;
 use crate::world::{Storage, World, light_tree, view};
 
 /// Draws where the records of radiance caches lie.
@@ -92,6 +93,7 @@ pub(super) fn run(arguments: &RecordsArguments) -> Result<Ending, Failure> {
     let world = World::new(&scene, &mut storage)?;
     let (width, height) = arguments.size.unwrap_or((scene.sensor.width, scene.sensor.height));
     let camera = world.camera_for(width, height);
+    let filter = FilterTable::new(world.sensor().filter);
     let lights = world.lights();
     let tree = light_tree(&lights);
     let mut film = Film::new(width, height, &["total"])?;
@@ -109,6 +111,7 @@ pub(super) fn run(arguments: &RecordsArguments) -> Result<Ending, Failure> {
     let cached = world.media().with(CacheJob {
         world: &world,
         lights: view(&lights, tree.as_ref()),
+        filter: &filter,
         camera,
         paths,
         film: &mut film,

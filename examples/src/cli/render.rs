@@ -11,10 +11,10 @@ use fogbow::covariance::image_sampling::Plan;
 use fogbow::covariance::{CovarianceGrid, GridView};
 use fogbow::host::Medium;
 use fogbow::light::Lights;
-use fogbow::math::{Ray, Vec2};
+use fogbow::math::Ray;
 use fogbow::path::{self, InScattered, Radiance};
 use fogbow::picture;
-use fogbow::sampling::{Generator, uniform2};
+use fogbow::sampling::Generator;
 use fogbow::spectrum::Spectrum;
 use fogbow::vpl::VirtualLight;
 use fogbow::world::World as LitWorld;
@@ -39,7 +39,8 @@ use super::report::{Bar, Report, Voice};
 use super::scene::SceneArguments;
 use super::vpl::{self, Audit, VplArguments, VplJob};
 use super::{Ending, Failure, bias_layers, ellipsoids, output};
-use crate::camera::Camera;
+use crate::camera::{Camera, Eye};
+use crate::filter::FilterTable;
 use crate::scene_file::SceneFile;
 use crate::statistics::Statistics;
 use crate::world::{Storage, WithMedium, World, light_tree, view};
@@ -344,6 +345,7 @@ pub(crate) fn render(arguments: &RenderArguments) -> Result<Rendered, Failure> {
     let tree = light_tree(&lights);
     let lights = view(&lights, tree.as_ref());
     let camera = world.camera_for(width, height);
+    let filter = FilterTable::new(world.sensor().filter);
     let covariances = if arguments.needs_grid() {
         Some(world.media().with(GridJob {
             arguments: &arguments.covariance,
@@ -373,6 +375,7 @@ pub(crate) fn render(arguments: &RenderArguments) -> Result<Rendered, Failure> {
         world: &world,
         lights,
         camera,
+        filter: &filter,
         paths,
         settings: &settings,
         control: &control,
@@ -401,6 +404,7 @@ pub(crate) fn render(arguments: &RenderArguments) -> Result<Rendered, Failure> {
                 world: &world,
                 lights,
                 camera,
+                filter: &filter,
                 paths,
                 film: &mut film,
                 settings: &settings,
@@ -572,6 +576,7 @@ pub(super) struct Shot<'a> {
     pub(super) world: &'a World<'a>,
     pub(super) lights: Lights<'a>,
     pub(super) camera: Camera,
+    pub(super) filter: &'a FilterTable,
     pub(super) paths: path::Settings,
     pub(super) settings: &'a tiles::Settings,
     pub(super) control: &'a Control<'a>,
@@ -580,11 +585,11 @@ pub(super) struct Shot<'a> {
 }
 
 impl Shot<'_> {
-    /// The eye ray of a sample, somewhere in its pixel, of a film of this size.
+    /// The eye ray of a sample, where the film's filter wants it, of a film of this size, and how much what it sees counts.
     #[inline]
-    pub(super) fn eye_ray(&self, sample: &Sample<'_>, (width, height): (u32, u32), rng: &mut SampleRng) -> Ray {
-        let at = Vec2::new(sample.x as f32, sample.y as f32) + uniform2(rng);
-        self.camera.ray(at / Vec2::new(width as f32, height as f32))
+    pub(super) fn eye_ray(&self, sample: &Sample<'_>, (width, height): (u32, u32), rng: &mut SampleRng) -> (Ray, f32) {
+        let eye = Eye { camera: self.camera, filter: self.filter };
+        eye.ray([sample.x, sample.y], [width, height], rng)
     }
 
     /// Whether the medium's light is wanted at a pixel, or filled in from others.
@@ -612,7 +617,7 @@ impl WithMedium for Job<'_> {
                 scene: &CountingScene { scene: shot.world, tally: sample.tally },
                 lights: shot.lights,
             };
-            let ray = shot.eye_ray(sample, (width, height), rng);
+            let (ray, weight) = shot.eye_ray(sample, (width, height), rng);
             let seen = if shot.is_computed(sample, width) {
                 path::radiance(&ray, &world, &shot.paths, rng)
             } else {
@@ -622,7 +627,16 @@ impl WithMedium for Job<'_> {
             };
             sample.tally.collide(seen.collisions);
             write_layers(&seen, layers);
+            weigh(layers, weight);
         })
+    }
+}
+
+/// What was seen counts so much for its pixel.
+#[inline]
+pub(super) fn weigh(layers: &mut [Spectrum], weight: f32) {
+    if weight != 1.0 {
+        layers.iter_mut().for_each(|layer| *layer = *layer * weight);
     }
 }
 

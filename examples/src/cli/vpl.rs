@@ -19,7 +19,7 @@ use fogbow_std::tiles::{Outcome, Passes};
 
 use super::Failure;
 use super::defaults::{unit_outline, with_default};
-use super::render::{LAYERS, Shot, write_layers};
+use super::render::{LAYERS, Shot, weigh, write_layers};
 use crate::world::WithMedium;
 
 /// Options of `--method vpl`.
@@ -246,12 +246,13 @@ impl WithMedium for VplJob<'_> {
                     scene: &CountingScene { scene: shot.world, tally: sample.tally },
                     lights: shot.lights,
                 };
-                let ray = shot.eye_ray(sample, (width, height), rng);
+                let (ray, weight) = shot.eye_ray(sample, (width, height), rng);
                 let eye = EyeSettings { sees_medium: shot.is_computed(sample, width), ..usual.eye() };
                 let (part, share) = usual.part(lights.as_slice(), sample.index);
                 let seen = vpl::radiance(&ray, &usual.gatherer(&world), part, share, &eye, rng);
                 sample.tally.collide(seen.radiance.collisions);
                 write(&seen, layers);
+                weigh(layers, weight);
             },
         )?;
         Ok((outcome, usual))

@@ -7,6 +7,7 @@ use fogbow::phase::Phase;
 use fogbow::spectrum::Spectrum;
 use fogbow::surface::{Conductor, RoughConductor, RoughDielectric, Surface};
 
+use crate::filter::Filter;
 use crate::mesh::Mesh;
 use crate::picture::Picture;
 use crate::texture::{self, Texture};
@@ -63,9 +64,32 @@ pub enum FovAxis {
     Diagonal,
 }
 
-/// `<sensor type="perspective">`.
+/// How rays leave a camera.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Projection {
+    /// From a point: `perspective`.
+    Pinhole,
+    /// From a lens: `thinlens`.
+    Lens {
+        /// Radius of the lens (m).
+        radius: f64,
+        /// Distance (m) along the axis of what is sharp.
+        focus: f64,
+    },
+    /// All in one direction, from the image of `[−1, 1]²` under `to_world`: `orthographic`.
+    Parallel,
+}
+
+/// `<sensor>` with its film and sampler.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sensor {
+    /// How rays leave.
+    pub projection: Projection,
+    /// What part of the film is seen, as shares of its width and height from the upper left: two corners. The whole film is
+    /// from 0 to 1; a shifted principal point lies beyond.
+    pub window: [[f64; 2]; 2],
+    /// How samples count for pixels.
+    pub filter: Filter,
     /// Full angle of view (degrees), in (0, 180).
     pub fov: f64,
     /// Across which the angle is measured.
@@ -74,7 +98,7 @@ pub struct Sensor {
     pub near: f64,
     /// Distance (m) along the axis where rays would end; never within the scene.
     pub far: f64,
-    /// Rigid; local +z looks forward, +y up, +x left.
+    /// Rigid, or scaled where the projection is parallel; local +z looks forward, +y up, +x left.
     pub to_world: Transform,
     /// Pixels across.
     pub width: u32,
@@ -82,6 +106,26 @@ pub struct Sensor {
     pub height: u32,
     /// Samples per pixel.
     pub samples: u32,
+}
+
+impl Default for Sensor {
+    /// What Mitsuba takes for what is not said of a `perspective`.
+    fn default() -> Self {
+        Self {
+            projection: Projection::Pinhole,
+            window: [[0.0; 2], [1.0; 2]],
+            filter: Filter::USUAL,
+            // 50 mm on a film of 36 mm × 24 mm.
+            fov: 2.0 * (36.0_f64.hypot(24.0) / 100.0).atan().to_degrees(),
+            fov_axis: FovAxis::Diagonal,
+            near: 1e-2,
+            far: 1e4,
+            to_world: Transform::IDENTITY,
+            width: 768,
+            height: 576,
+            samples: 4,
+        }
+    }
 }
 
 /// A medium and where it fills space.

@@ -2,9 +2,10 @@
 //!
 //! | element | types |
 //! |---|---|
-//! | `integrator` | `path`, `volpath`, `volpathmis`: `max_depth`, `rr_depth`, `hide_emitters` |
-//! | `sensor` | `perspective`: `fov`, `fov_axis`, `near_clip`, `far_clip`, `to_world`, `<ref name="medium">` |
-//! | `film` | `hdrfilm`: `width`, `height`; `rfilter` `box` |
+//! | `integrator` | `path`, `volpath`, `volpathmis`: `max_depth`, `rr_depth`, `hide_emitters`; `direct`; those that find the same picture in other ways; inside `moment`, `aov`, `stokes` |
+//! | `sensor` | `perspective`, `thinlens`, `orthographic`: field of view or focal length, clip planes, `to_world`, principal point, medium |
+//! | `film` | `hdrfilm`: size, crop |
+//! | `rfilter` | `box`, `tent`, `gaussian`, `mitchell`, `catmullrom`, `lanczos` |
 //! | `sampler` | any of Mitsuba's: `sample_count` |
 //! | `medium` | `homogeneous` (`sigma_t` and `albedo`, or `sigma_a` and `sigma_s`; `scale`), `heterogeneous` (`sigma_t` as `gridvolume` or `constvolume`) |
 //! | `phase` | `isotropic`, `hg`, `rayleigh`, `blendphase` |
@@ -21,6 +22,7 @@ mod bsdfs;
 mod description;
 mod element;
 mod emitters;
+mod film;
 mod fingerprint;
 mod groups;
 mod materials;
@@ -41,12 +43,12 @@ use std::collections::HashSet;
 use std::path::Path;
 
 pub use description::{
-    Container, Emitter, FovAxis, Geometry, Integrator, Material, Matter, MediumDescription, Place, Relief, SceneFile,
-    Sensor, Shape, Slot,
+    Container, Emitter, FovAxis, Geometry, Integrator, Material, Matter, MediumDescription, Place, Projection, Relief,
+    SceneFile, Sensor, Shape, Slot,
 };
+pub use film::MAX_PIXELS;
 pub use fingerprint::{fingerprint, fingerprint_with};
 pub use notes::{Note, NoteKind};
-pub use sensor::MAX_PIXELS;
 
 use crate::error::SceneError;
 use element::{Context, Element};
@@ -172,18 +174,25 @@ fn read_scene(scene: &Element<'_>, options: &ReadOptions) -> Result<SceneFile, S
         Some(element) => element.keep(sensor::read_integrator(element)),
         None => Some(Integrator::default()),
     };
-    let sensor_element = match (sensors.get(options.sensor), sensors.len()) {
-        (Some(sensor), _) => *sensor,
-        (None, 0) => return Err(scene.error("a <sensor> is missing")),
-        (None, count) => return Err(scene.error(format!("sensor {} of {count}, counted from 0", options.sensor))),
+    let (sensor_element, (sensor, sensor_medium)) = match (sensors.get(options.sensor), sensors.len()) {
+        (Some(element), _) => (*element, sensor::read(element)?),
+        (None, 0) => {
+            scene.suspicious("there is no <sensor>: the camera looks at everything along +z");
+            (*scene, (sensor::around(shapes.iter().filter_map(|s| s.shape.as_ref())), None))
+        }
+        (None, count) => {
+            let reason = format!("there is no sensor {}: it has {count}, counted from 0", options.sensor);
+            return Err(scene.error(reason));
+        }
     };
-    let (sensor, sensor_medium) = sensor::read(&sensor_element)?;
     let media = places::read(&media, &shapes, &sensor, &sensor_element, sensor_medium)?;
     let shapes = shapes.into_iter().filter_map(|s| s.shape).collect();
     let file = scene.context.tree.file(scene.node).to_owned();
     let integrator = integrator.unwrap_or_default();
     let scene_file = SceneFile { file, integrator, sensor, media, shapes, emitters };
-    places::check_far_plane(&scene_file, &sensor_element)?;
+    if let Err(error) = places::check_far_plane(&scene_file, &sensor_element) {
+        sensor_element.instead(error, "nothing is cut off", || ())?;
+    }
     Ok(scene_file)
 }
 

@@ -115,6 +115,11 @@ impl<'a> Plugin<'a> {
         }
     }
 
+    /// The same for all that nobody asked for.
+    pub(super) fn skip_rest(&self) {
+        self.children.iter().for_each(|child| child.is_used.set(true));
+    }
+
     /// The named child.
     pub(super) fn get(&self, name: &str) -> Option<Element<'a>> {
         let child = self.children.iter().find(|c| c.name == Some(name));

@@ -14,7 +14,7 @@ const CASES: &[(&str, &str, &[&str])] = &[
     ("<default name=\"spp\"", "<textur/><default name=\"spp\"", &["<textur>", "unknown element inside <scene>"]),
     ("<default name=\"spp\"", "hello <default name=\"spp\"", &["<scene>", "unexpected text \"hello\""]),
     // Elements, properties and their types.
-    ("type=\"volpath\"", "type=\"bdpt\"", &["scene.xml:3: <integrator type=\"bdpt\">", "\"type\"", "volpath"]),
+    ("type=\"volpath\"", "type=\"guess\"", &["scene.xml:3: <integrator type=\"guess\">", "\"type\"", "volpath"]),
     ("name=\"max_depth\" value=\"8\"", "name=\"max_depth\" value=\"-2\"", &["<integer name=\"max_depth\">", "-2"]),
     ("name=\"max_depth\" value=\"8\"", "name=\"max_depth\" value=\"1.5\"", &["max_depth", "not a whole number"]),
     ("name=\"max_depth\"", "name=\"max_dept\"", &["<integer name=\"max_dept\">", "no property \"max_dept\""]),
@@ -35,7 +35,11 @@ const CASES: &[(&str, &str, &[&str])] = &[
     ),
     ("<float name=\"fov\" value=\"36\"/>", "<float name=\"fov\"/>", &["<float name=\"fov\">", "\"value\"", "missing"]),
     ("<float name=\"fov\" value=\"36\"/>", "<float value=\"36\"/>", &["<float>", "\"name\"", "missing"]),
-    ("<float name=\"fov\" value=\"36\"/>", "", &["<sensor type=\"perspective\">", "fov"]),
+    (
+        "<float name=\"fov\" value=\"36\"/>",
+        "<string name=\"focal_length\" value=\"long\"/>",
+        &["<string name=\"focal_length\">", "50mm"],
+    ),
     ("name=\"fov\" value=\"36\"", "name=\"fov\" value=\"180\"", &["<float name=\"fov\">", "180", "(0, 180)"]),
     ("name=\"fov\" value=\"36\"", "name=\"fov\" value=\"0\"", &["<float name=\"fov\">", "(0, 180)"]),
     ("name=\"fov\" value=\"36\"", "name=\"fov\" value=\"nan\"", &["<float name=\"fov\">", "not a finite number"]),
@@ -65,13 +69,8 @@ const CASES: &[(&str, &str, &[&str])] = &[
         "\"width\" value=\"60000\"/><integer name=\"height\" value=\"60000\"",
         &["<film type=\"hdrfilm\">", "pixels"],
     ),
-    ("<rfilter type=\"box\"/>", "<rfilter type=\"gaussian\"/>", &["<rfilter type=\"gaussian\">", "box"]),
-    ("<rfilter type=\"box\"/>", "", &["<film type=\"hdrfilm\">", "rfilter"]),
-    (
-        "<sensor type=\"perspective\">",
-        "<sensor type=\"thinlens\">",
-        &["<sensor type=\"thinlens\">", "\"type\"", "perspective"],
-    ),
+    ("<rfilter type=\"box\"/>", "<rfilter type=\"gauss\"/>", &["<rfilter type=\"gauss\">", "\"gaussian\" meant"]),
+    ("<sensor type=\"perspective\">", "<sensor type=\"thinlens\">", &["<sensor type=\"thinlens\">", "aperture_radius"]),
     // Media.
     ("value=\"0.9 0.8 0.7\"", "value=\"2 2 2\"", &["<rgb name=\"albedo\">", "2 is outside [0, 1]"]),
     ("value=\"0.9 0.8 0.7\"", "value=\"0.9 0.8\"", &["<rgb name=\"albedo\">", "2 numbers"]),
