@@ -3,7 +3,7 @@
 //! | module | holds |
 //! |---|---|
 //! | [`scene_file`] | reads Mitsuba 3 scenes into a checked description |
-//! | [`mesh`], [`volume`], [`picture`] | the files scenes name |
+//! | [`mesh`], [`volume`], [`vdb`], [`picture`] | the files scenes name |
 //! | [`world`] | the host: surfaces, lights and media, ready for rays |
 //! | [`camera`], [`filter`] | where eye rays start, and how much they count for a pixel |
 //! | [`bake`] | files of baked light |
@@ -32,5 +32,6 @@ pub mod scene_file;
 pub mod statistics;
 pub mod texture;
 pub mod transform;
+pub mod vdb;
 pub mod volume;
 pub mod world;

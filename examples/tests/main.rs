@@ -2,5 +2,7 @@
 
 mod broken;
 mod caches;
+mod gltf;
 mod program;
 mod shapes;
+mod vdb;

@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use super::{DensityGrid, Homogeneous, Noise};
+use super::{DensityGrid, Homogeneous, Noise, SparseGrid};
 use crate::host::{Face, Gradients, MajorantSegment, Medium, Properties};
 use crate::math::Ray;
 use crate::phase::Phase;
@@ -18,12 +18,13 @@ use crate::spectrum::{Gradient, Hessian, Spectrum};
 /// assert_eq!(fog.phase(), Phase::ISOTROPIC);
 /// ```
 #[derive(Debug, Clone, Copy)]
-#[expect(clippy::large_enum_variant, reason = "lent or few; there is no box to put a variant in")]
 pub enum AnyMedium<'a> {
     /// The same everywhere.
     Homogeneous(Homogeneous),
     /// A voxel grid.
     Grid(DensityGrid<'a>),
+    /// A sparse voxel grid.
+    Sparse(SparseGrid<'a>),
     /// Fractal noise.
     Noise(Noise),
 }
@@ -33,6 +34,7 @@ macro_rules! each {
         match $self {
             Self::Homogeneous($medium) => $answer,
             Self::Grid($medium) => $answer,
+            Self::Sparse($medium) => $answer,
             Self::Noise($medium) => $answer,
         }
     };
@@ -100,6 +102,12 @@ impl From<Homogeneous> for AnyMedium<'_> {
 impl<'a> From<DensityGrid<'a>> for AnyMedium<'a> {
     fn from(medium: DensityGrid<'a>) -> Self {
         Self::Grid(medium)
+    }
+}
+
+impl<'a> From<SparseGrid<'a>> for AnyMedium<'a> {
+    fn from(medium: SparseGrid<'a>) -> Self {
+        Self::Sparse(medium)
     }
 }
 

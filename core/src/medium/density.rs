@@ -1,8 +1,9 @@
 //! Densities on a lattice, trilinear between cell centres.
 
-use glam::Vec3;
+use glam::{Mat3, Vec3};
 
 use super::MediumError;
+use crate::spectrum::{Hessian, Spectrum};
 
 /// Densities of the cells of a grid, x fastest: cell `(x, y, z)` of `(nx, ny, nz)` has index
 /// `(z·ny + y)·nx + x`.
@@ -153,4 +154,23 @@ impl Cell {
 #[inline]
 fn lerp(a: f32, b: f32, t: f32) -> f32 {
     a + (b - a) * t
+}
+
+/// Central differences over one cell along the axes of a lattice, carried into the world; `at` tells extinction at an offset in cells.
+pub(super) fn central_hessian(cells_from_world: &Mat3, at: impl Fn(Vec3) -> Spectrum) -> Hessian {
+    let here = at(Vec3::ZERO);
+    let second = |a: Vec3| at(a) + at(-a) - here * 2.0;
+    let mixed = |a: Vec3, b: Vec3| (at(a + b) + at(-a - b) - at(a - b) - at(b - a)) * 0.25;
+    let (x, y, z) = (Vec3::X, Vec3::Y, Vec3::Z);
+    let local =
+        Hessian { xx: second(x), xy: mixed(x, y), xz: mixed(x, z), yy: second(y), yz: mixed(y, z), zz: second(z) };
+    let (x, y, z) = (cells_from_world.x_axis, cells_from_world.y_axis, cells_from_world.z_axis);
+    Hessian {
+        xx: local.between(x, x),
+        xy: local.between(x, y),
+        xz: local.between(x, z),
+        yy: local.between(y, y),
+        yz: local.between(y, z),
+        zz: local.between(z, z),
+    }
 }

@@ -21,6 +21,10 @@ pub enum MediumError {
     Means,
     /// Densities must be finite and not negative.
     Density,
+    /// Outermost cells of a sparse grid that are not empty.
+    Border,
+    /// A node of a sparse grid that is not there, beside a cell that is not empty.
+    Nodes,
     /// A parameter of procedural noise out of its range.
     Noise,
     /// Overlapping media with too many different lobes.
@@ -38,6 +42,8 @@ impl core::fmt::Display for MediumError {
             Self::Blocks => "the room lent for block bounds is not of the size `DensityGrid::block_count` states",
             Self::Means => "the room lent for means is not of the size `Pyramid::cell_count` states",
             Self::Density => "densities must be finite and not negative",
+            Self::Border => "the outermost cells of a sparse grid must be empty",
+            Self::Nodes => "a node of the sparse grid is not there, but a cell beside it is not empty",
             Self::Noise => "a parameter of the noise is out of range",
             Self::TooManyLobes => "overlapping media have too many different phase functions",
         })

@@ -2,7 +2,7 @@
 
 use glam::{Affine3, Mat3, Vec3};
 
-use super::density::{Cell, Density, cell_count};
+use super::density::{Cell, Density, cell_count, central_hessian};
 use super::grid_bounds::Joining;
 use super::majorant::{Field, MinMax, Reach, blocks_along};
 use super::region::BoxRegion;
@@ -350,22 +350,7 @@ impl Medium for DensityGrid<'_> {
         }
         let centre = self.shifted_from_world.transform_point3(point);
         let at = |offset: Vec3| self.extinction_in(&Cell::at(centre + offset, self.size));
-        let here = at(Vec3::ZERO);
-        let second = |a: Vec3| at(a) + at(-a) - here * 2.0;
-        let mixed = |a: Vec3, b: Vec3| (at(a + b) + at(-a - b) - at(a - b) - at(b - a)) * 0.25;
-        let (x, y, z) = (Vec3::X, Vec3::Y, Vec3::Z);
-        let local =
-            Hessian { xx: second(x), xy: mixed(x, y), xz: mixed(x, z), yy: second(y), yz: mixed(y, z), zz: second(z) };
-        let m = &self.cells_from_world.matrix3;
-        let (x, y, z) = (m.x_axis, m.y_axis, m.z_axis);
-        Hessian {
-            xx: local.between(x, x),
-            xy: local.between(x, y),
-            xz: local.between(x, z),
-            yy: local.between(y, y),
-            yz: local.between(y, z),
-            zz: local.between(z, z),
-        }
+        central_hessian(&self.cells_from_world.matrix3, at)
     }
 
     /// From about one point per cell that the ball spans, between 32 and 900; outside the grid

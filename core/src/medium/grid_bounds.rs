@@ -10,13 +10,13 @@ use crate::spectrum::Spectrum;
 /// Expected null collisions a joined segment may add over its blocks by themselves: asking for a
 /// segment costs some three collisions. With 0 a ray through thin smoke takes twice the time; with
 /// more, the bounds of thick clouds get loose.
-const WASTE: f32 = 1.0;
+pub(super) const WASTE: f32 = 1.0;
 
 /// Majorant thickness of a segment at which no more is joined: a walk has most likely ended by then.
-const ENOUGH: f32 = 2.0;
+pub(super) const ENOUGH: f32 = 2.0;
 
 /// Constant blocks that a ray crosses on fewer cells than this are marched with those around them.
-const SHORT: f32 = 4.0;
+pub(super) const SHORT: f32 = 4.0;
 
 /// What bounds are for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -25,7 +25,7 @@ pub struct MinMax {
 
 impl MinMax {
     /// The bounds of nothing.
-    const NONE: Self = Self { min: f32::INFINITY, max: 0.0 };
+    pub(super) const NONE: Self = Self { min: f32::INFINITY, max: 0.0 };
 
     /// Bounds of both.
     #[inline]
@@ -34,7 +34,7 @@ impl MinMax {
     }
 
     /// Bounds with room for the rounding of an interpolation between different values.
-    fn padded(self) -> Self {
+    pub(super) fn padded(self) -> Self {
         const ROOM: f32 = 8.0 * f32::EPSILON;
         if self.min == self.max {
             return self;
@@ -210,6 +210,11 @@ impl Reach {
         // Cells that a metre may span in the worst direction; positions inside lie a diameter
         // farther than where the line is asked.
         Self((FAR - offset) / per_metre - diameter)
+    }
+
+    /// Whether rounding is small at such a distance (m).
+    pub(super) fn holds(&self, distance: f32) -> bool {
+        distance <= self.0
     }
 }
 

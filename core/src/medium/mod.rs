@@ -17,6 +17,8 @@
 //! | [`grid`] | voxels, trilinear between cell centres |
 //! | [`density`] | its storage and interpolation |
 //! | [`majorant`], `grid_bounds` | its blocks of bounds and the walk through them; how they are joined |
+//! | [`sparse`], `sparse_bounds` | voxels where there are any |
+//! | [`bricks`] | their storage |
 //! | [`noise`], `perlin` | fractal noise |
 //! | [`region`] | parts of space: boxes, balls |
 //! | [`placed`] | a medium in a region, with holes |
@@ -28,6 +30,7 @@
 
 pub mod any;
 mod ball;
+pub mod bricks;
 pub mod density;
 pub mod error;
 pub mod grid;
@@ -40,8 +43,11 @@ mod perlin;
 pub mod placed;
 pub mod pyramid;
 pub mod region;
+pub mod sparse;
+mod sparse_bounds;
 
 pub use any::AnyMedium;
+pub use bricks::Bricks;
 pub use density::Density;
 pub use error::MediumError;
 pub use grid::DensityGrid;
@@ -52,3 +58,4 @@ pub use overlap::Overlap;
 pub use placed::Placed;
 pub use pyramid::Pyramid;
 pub use region::{BoxRegion, Crossing, Region, SphereRegion};
+pub use sparse::SparseGrid;

@@ -25,12 +25,15 @@ pub struct ReadArguments {
     /// Value of a parameter ($NAME) of the scene, before the one the scene has for it; may be repeated.
     #[arg(short = 'D', long = "define", value_name = "NAME=VALUE", value_parser = definition)]
     pub define: Vec<(String, String)>,
-    /// Which of the scene's sensors, counted from 0.
+    /// Which of the scene's sensors (glTF: cameras), counted from 0.
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub sensor: usize,
     /// Takes the nearest there is in place of what cannot be rendered, and lists it.
     #[arg(long)]
     pub lenient: bool,
+    /// Fog for a glTF scene, in TOML [default: SCENE.fog.toml beside it, if there is one].
+    #[arg(long, value_name = "FILE.toml")]
+    pub fog: Option<PathBuf>,
 }
 
 fn definition(text: &str) -> Result<(String, String), String> {
@@ -43,12 +46,12 @@ fn definition(text: &str) -> Result<(String, String), String> {
 impl SceneArguments {
     /// A scene that is read as it stands.
     pub(crate) fn plain(file: PathBuf) -> Self {
-        Self { file, reading: ReadArguments { define: Vec::new(), sensor: 0, lenient: false } }
+        Self { file, reading: ReadArguments { define: Vec::new(), sensor: 0, lenient: false, fog: None } }
     }
 
     fn options(&self) -> ReadOptions {
-        let ReadArguments { define, sensor, lenient } = &self.reading;
-        ReadOptions { parameters: define.clone(), sensor: *sensor, is_lenient: *lenient }
+        let ReadArguments { define, sensor, lenient, fog } = &self.reading;
+        ReadOptions { parameters: define.clone(), sensor: *sensor, is_lenient: *lenient, fog: fog.clone() }
     }
 
     /// All that is in the scene, or wrong with it.

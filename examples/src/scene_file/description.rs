@@ -12,6 +12,7 @@ use crate::mesh::Mesh;
 use crate::picture::Picture;
 use crate::texture::{self, Texture};
 use crate::transform::Transform;
+use crate::vdb::BrickStorage;
 use crate::volume::Volume;
 
 /// A scene as its file describes it: checked, with all files it names loaded.
@@ -156,6 +157,19 @@ pub enum Matter {
         /// The densities.
         volume: Arc<Volume>,
         /// From the unit cube `[0, 1]³` of the grid to the world.
+        to_world: Transform,
+        /// σₐ (m⁻¹) at density 1.
+        absorption: Spectrum,
+        /// σₛ (m⁻¹) at density 1.
+        scattering: Spectrum,
+        /// Angular law.
+        phase: Phase,
+    },
+    /// Density on a sparse voxel grid.
+    Sparse {
+        /// The densities.
+        bricks: Arc<BrickStorage>,
+        /// From the unit cube `[0, 1]³` of the bricks' box to the world.
         to_world: Transform,
         /// σₐ (m⁻¹) at density 1.
         absorption: Spectrum,

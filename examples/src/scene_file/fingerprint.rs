@@ -7,7 +7,7 @@ use fogbow::bytes::Crc;
 use super::element::{Context, Element};
 use super::notes::Sink;
 use super::tree::Node;
-use super::{ReadOptions, preprocess};
+use super::{ReadOptions, gltf_scene, preprocess};
 use crate::error::{SceneError, read_file};
 
 /// The same number for two scenes whose light is the same everywhere: it depends on all elements in their order
@@ -24,6 +24,9 @@ pub fn fingerprint(file: &Path) -> Result<u64, SceneError> {
 /// # Errors
 /// A file that cannot be read.
 pub fn fingerprint_with(file: &Path, options: &ReadOptions) -> Result<u64, SceneError> {
+    if gltf_scene::is_named(file) {
+        return gltf_scene::fingerprint(file, options);
+    }
     let sink = Sink::new(options.is_lenient);
     let tree = preprocess::read(file, &preprocess::text_of(file)?, &options.parameters, &sink)?;
     let context = Context { tree, sink };

@@ -1,5 +1,6 @@
 //! `<medium>`, `<volume>` and `<phase>`.
 
+use std::path::Path;
 use std::sync::Arc;
 
 use fogbow::phase::{Lobe, Phase};
@@ -10,6 +11,7 @@ use super::element::Element;
 use super::plugin::{Plugin, is_share};
 use crate::error::SceneError;
 use crate::transform::Transform;
+use crate::vdb::{self, BrickStorage};
 use crate::volume::Volume;
 
 /// The matter of a `<medium>`.
@@ -32,6 +34,7 @@ pub(super) fn read(element: &Element<'_>) -> Result<Matter, SceneError> {
     Ok(match field {
         Field::Constant => Matter::Homogeneous { absorption, scattering, phase },
         Field::Grid { volume, to_world } => Matter::Grid { volume, to_world, absorption, scattering, phase },
+        Field::Sparse { bricks, to_world } => Matter::Sparse { bricks, to_world, absorption, scattering, phase },
     })
 }
 
@@ -39,6 +42,7 @@ pub(super) fn read(element: &Element<'_>) -> Result<Matter, SceneError> {
 enum Field {
     Constant,
     Grid { volume: Arc<Volume>, to_world: Transform },
+    Sparse { bricks: Arc<BrickStorage>, to_world: Transform },
 }
 
 /// The field, and σₐ and σₛ where it is 1.
@@ -101,6 +105,9 @@ fn grid_volume(plugin: &Plugin<'_>) -> Result<Field, SceneError> {
     plugin.boolean("raw", true)?;
     plugin.boolean("accel", true)?;
     let (file, source) = plugin.path("filename")?;
+    if vdb::is_named(&file) {
+        return sparse_volume(plugin, &file, &source);
+    }
     if plugin.boolean("use_grid_bbox", false)? {
         return Err(plugin.element.error("use_grid_bbox is not supported: place the grid with to_world"));
     }
@@ -108,6 +115,19 @@ fn grid_volume(plugin: &Plugin<'_>) -> Result<Field, SceneError> {
     plugin.finish()?;
     let volume = Volume::read(&file).map_err(|e| source.data_error(&e))?;
     Ok(Field::Grid { volume: Arc::new(volume), to_world })
+}
+
+/// An OpenVDB or NanoVDB file: as a grid of the box of its active voxels, or with `use_grid_bbox` where the file itself says.
+fn sparse_volume(plugin: &Plugin<'_>, file: &Path, source: &Element<'_>) -> Result<Field, SceneError> {
+    let name = plugin.string("grid")?.map(|(name, _)| name);
+    let is_in_file = plugin.boolean("use_grid_bbox", false)?;
+    let to_world = plugin.to_world()?.map_or(Transform::IDENTITY, |(t, _)| t);
+    plugin.finish()?;
+    let bricks = vdb::Grid::read(file, name.as_deref()).and_then(|grid| grid.into_bricks(file));
+    let bricks = bricks.map_err(|e| source.data_error(&e))?;
+    let place = if is_in_file { bricks.in_file() } else { bricks.in_active_box() };
+    let to_world = place.then(&to_world);
+    Ok(Field::Sparse { bricks: Arc::new(bricks), to_world })
 }
 
 /// Blends within blends, and no further.

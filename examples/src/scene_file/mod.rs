@@ -1,4 +1,4 @@
-//! Reads the scene files of Mitsuba 3: a subset of version 3.0.0, with the same meaning.
+//! Reads the scene files of Mitsuba 3, a subset of version 3.0.0 with the same meaning; and glTF 2.0, see below the table.
 //!
 //! | element | types |
 //! |---|---|
@@ -8,6 +8,7 @@
 //! | `rfilter` | `box`, `tent`, `gaussian`, `mitchell`, `catmullrom`, `lanczos` |
 //! | `sampler` | any of Mitsuba's: `sample_count` |
 //! | `medium` | `homogeneous` (`sigma_t` and `albedo`, or `sigma_a` and `sigma_s`; `scale`), `heterogeneous` (`sigma_t` as `gridvolume` or `constvolume`) |
+//! | `volume` | `gridvolume` (`.vol`; `.vdb` and `.nvdb` with `grid`, `use_grid_bbox`), `constvolume` |
 //! | `phase` | `isotropic`, `hg`, `rayleigh`, `blendphase` |
 //! | `shape` | `rectangle`, `cube`, `sphere`, `disk`, `cylinder`, `ply`, `obj`, `serialized`, `linearcurve`, `bsplinecurve` (tubes of triangles), `shapegroup`, `instance`, `merge` |
 //! | `bsdf` | `diffuse`, `twosided`, `null`, `conductor`, `roughconductor`, `dielectric`, `roughdielectric`, `thindielectric`, `plastic`, `roughplastic`; and `phong`, which Mitsuba 3 does not know |
@@ -17,6 +18,11 @@
 //! `<include>`, `<path>`, `<default>` with `$name`, `<alias>`, `<ref>` to anything, and all transforms are understood; files of
 //! version 0.6 are upgraded. A medium fills the cube or sphere whose `interior` it is. What has no effect here is a
 //! [`Note`]; anything else is a [`SceneError`]: nothing is skipped in silence.
+//!
+//! Of glTF are read: nodes with their transforms, triangles with normals and one set of texture coordinates, perspective cameras, base
+//! colour and emission (`KHR_materials_emissive_strength`), textures of base colour (PNG, JPEG; `KHR_texture_transform`), metal and glass
+//! (`KHR_materials_transmission`, `volume`, `ior`), and points, spots and suns of `KHR_lights_punctual`. Fog stands in a TOML file
+//! beside the scene, `SCENE.fog.toml`: boxes, balls, height fog, grids, and a sky.
 
 mod bsdfs;
 mod description;
@@ -24,6 +30,7 @@ mod element;
 mod emitters;
 mod film;
 mod fingerprint;
+mod gltf_scene;
 mod groups;
 mod materials;
 mod media;
@@ -40,7 +47,7 @@ mod tree;
 mod upgrade;
 
 use std::collections::HashSet;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 pub use description::{
     Container, Emitter, FovAxis, Geometry, Integrator, Material, Matter, MediumDescription, Place, Projection, Relief,
@@ -63,6 +70,8 @@ pub struct ReadOptions {
     pub sensor: usize,
     /// Whether what is missing here may be replaced by the nearest there is.
     pub is_lenient: bool,
+    /// Fog for a glTF scene, where it is not in the file beside it.
+    pub fog: Option<PathBuf>,
 }
 
 /// What was found in a scene file.
@@ -85,6 +94,12 @@ impl SceneFile {
         Self::read_with(file, &ReadOptions::default()).into_scene()
     }
 
+    /// Reads the bytes of a glTF scene, text or binary, and all files it names, as [`SceneFile::read_with`].
+    #[must_use]
+    pub fn from_gltf(file: &Path, bytes: &[u8], options: &ReadOptions) -> Findings {
+        gltf_scene::from_bytes(file, bytes, options)
+    }
+
     /// Reads a scene from the text of `file`.
     ///
     /// # Errors
@@ -96,6 +111,14 @@ impl SceneFile {
     /// Reads a scene file and all files it names, and goes on after errors to find them all.
     #[must_use]
     pub fn read_with(file: &Path, options: &ReadOptions) -> Findings {
+        if gltf_scene::is_named(file) {
+            return gltf_scene::read(file, options);
+        }
+        if options.fog.is_some() {
+            let reason = "--fog is for glTF scenes; here fog is a <medium>".to_owned();
+            let error = SceneError { file: file.to_owned(), reason, ..SceneError::default() };
+            return Findings { scene: None, errors: vec![error], notes: Vec::new() };
+        }
         match preprocess::text_of(file) {
             Ok(text) => Self::parse_with(file, &text, options),
             Err(error) => Findings { scene: None, errors: vec![error], notes: Vec::new() },

@@ -227,6 +227,7 @@ impl MediumDescription {
         match &self.matter {
             Matter::Homogeneous { .. } => 0,
             Matter::Grid { volume, .. } => volume.bytes(),
+            Matter::Sparse { bricks, .. } => bricks.bytes(),
         }
     }
 }

@@ -2,7 +2,9 @@
 
 use fogbow::host::{Medium, Properties};
 use fogbow::math::Affine3;
-use fogbow::medium::{AnyMedium, Density, DensityGrid, Homogeneous, MediumError, MinMax, Overlap, Placed, Region};
+use fogbow::medium::{
+    AnyMedium, Density, DensityGrid, Homogeneous, MediumError, MinMax, Overlap, Placed, Region, SparseGrid,
+};
 
 use fogbow::phase::Phase;
 
@@ -32,6 +34,9 @@ impl MediumTable {
 pub(super) fn tables(scene: &SceneFile) -> Vec<MediumTable> {
     let table = |medium: &MediumDescription| match &medium.matter {
         Matter::Homogeneous { .. } => MediumTable::default(),
+        Matter::Sparse { bricks, .. } => {
+            MediumTable { blocks: vec![MinMax::default(); bricks.bricks().slots.len()], ..MediumTable::default() }
+        }
         Matter::Grid { volume, to_world, .. } => {
             let padded = shows_border(volume, to_world, &medium.places)
                 .then(|| Padded::new(volume, to_world, &medium.places))
@@ -103,7 +108,7 @@ impl<'a> Media<'a> {
             ([one], [holes]) => match *one.medium() {
                 AnyMedium::Homogeneous(fog) => Self::Homogeneous(moved(one, holes, fog)),
                 AnyMedium::Grid(grid) => Self::Grid(moved(one, holes, grid)),
-                AnyMedium::Noise(_) => Self::Several(placed),
+                AnyMedium::Sparse(_) | AnyMedium::Noise(_) => Self::Several(placed),
             },
             _ => Self::Several(placed),
         })
@@ -175,6 +180,11 @@ fn place<'a>(medium: &'a MediumDescription, table: &'a mut MediumTable) -> Resul
             let properties = Properties { absorption, scattering, phase, ..Properties::VACUUM };
             AnyMedium::from(DensityGrid::new(volume.size, density, &properties, placement, blocks)?)
         }
+        Matter::Sparse { bricks, to_world, absorption, scattering, phase } => {
+            let (absorption, scattering, phase) = (*absorption, *scattering, *phase);
+            let properties = Properties { absorption, scattering, phase, ..Properties::VACUUM };
+            AnyMedium::from(SparseGrid::new(bricks.bricks(), &properties, to_world.to_affine(), blocks)?)
+        }
     };
     for place in &medium.places {
         holes.push(place.holes.iter().map(region).collect::<Result<_, _>>()?);
@@ -227,7 +237,7 @@ pub(super) fn region(container: &Container) -> Result<Region, MediumError> {
 
 /// The container; all of space for a grid that lies inside it, because a grid ends by itself.
 fn region_of(medium: &MediumDescription, place: &Place) -> Result<Region, MediumError> {
-    if let Matter::Grid { to_world, .. } = &medium.matter {
+    if let Matter::Grid { to_world, .. } | Matter::Sparse { to_world, .. } = &medium.matter {
         let corner = |i: u32| [1, 2, 4].map(|bit| if i & bit == 0 { 0.0 } else { 1.0 });
         if (0..8).all(|i| place.container.contains(to_world.point(corner(i)))) {
             return Ok(Region::Everywhere);

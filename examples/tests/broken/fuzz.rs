@@ -11,6 +11,7 @@ use fogbow_examples::mesh::Mesh;
 use fogbow_examples::picture::Picture;
 use fogbow_examples::scene_file::SceneFile;
 use fogbow_examples::transform::Transform;
+use fogbow_examples::vdb::Grid;
 use fogbow_examples::volume::Volume;
 use fogbow_examples::world::{Storage, World};
 
@@ -141,6 +142,19 @@ fn fuzz_volumes() {
         volume([1, 1, 8], 3, 1, &[9; 8]),
     ];
     fuzz(&seeds, |bytes| drop(Volume::from_bytes(Path::new("g.vol"), bytes)));
+}
+
+/// Files of both kinds, packed in every way; what is read is made into bricks, too.
+#[test]
+fn fuzz_sparse_volumes() {
+    let names = ["odd_zip.vdb", "blosc.vdb", "half.vdb", "several.vdb", "fp4.nvdb", "fpN.nvdb", "blosc.nvdb"];
+    let mut sound = 0;
+    fuzz(&names.map(crate::vdb::file), |bytes| {
+        let Ok(grid) = Grid::from_bytes(Path::new("g.vdb"), bytes.to_vec(), None) else { return };
+        sound += usize::from(grid.into_bricks(Path::new("g.vdb")).is_ok());
+    });
+    println!("{sound} were sound");
+    assert!(sound > 0);
 }
 
 #[test]

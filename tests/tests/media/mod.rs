@@ -9,4 +9,5 @@ mod mistakes;
 mod others;
 mod pyramid;
 mod refusals;
+mod sparse;
 mod speed;

@@ -1,0 +1,322 @@
+//! Fog beside a scene: a file in TOML.
+//!
+//! ```toml
+//! [sky]
+//! radiance = [0.4, 0.5, 0.7]        # or image = "sky.hdr"
+//!
+//! [[fog]]
+//! shape = "box"                     # or "sphere", "height", "grid"
+//! min = [-2, 0, -2]
+//! max = [2, 3, 2]
+//! visibility = 40                   # m; or extinction = 0.1 (1/m), a number or three
+//! albedo = 0.95
+//! g = 0.6
+//!
+//! [[fog]]
+//! shape = "grid"
+//! file = "cloud.nvdb"               # or .vdb, .vol
+//! grid = "density"
+//! extinction = 20                   # where density is 1
+//! ```
+
+use std::path::Path;
+use std::sync::Arc;
+
+use fogbow::math::Bounds;
+use fogbow::phase::{Lobe, Phase};
+use fogbow::spectrum::Spectrum;
+use serde::Deserialize;
+
+use crate::error::{SceneError, read_file};
+use crate::picture::Picture;
+use crate::scene_file::description::{Container, Emitter, Matter, MediumDescription, Place, SceneFile};
+use crate::transform::{Transform, to_vec3};
+use crate::vdb;
+use crate::volume::{Values, Volume};
+
+/// All of a file.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct FogFile {
+    sky: Option<Sky>,
+    #[serde(default)]
+    fog: Vec<toml::Spanned<Fog>>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Sky {
+    radiance: Option<Colour>,
+    image: Option<String>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+enum Form {
+    Box,
+    Sphere,
+    Height,
+    Grid,
+}
+
+#[derive(Debug, Clone, Copy, Deserialize)]
+#[serde(untagged)]
+enum Colour {
+    Grey(f32),
+    Three([f32; 3]),
+}
+
+impl Colour {
+    fn spectrum(self) -> Spectrum {
+        match self {
+            Self::Grey(value) => Spectrum::splat(value),
+            Self::Three(values) => Spectrum(values),
+        }
+    }
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Fog {
+    shape: Form,
+    min: Option<[f64; 3]>,
+    max: Option<[f64; 3]>,
+    centre: Option<[f64; 3]>,
+    radius: Option<f64>,
+    /// Height (m) at which fog has its extinction, and the height over which it falls to 1/e of that.
+    ground: Option<f64>,
+    fall_off: Option<f64>,
+    file: Option<String>,
+    grid: Option<String>,
+    /// Of grids, in this order.
+    scale: Option<f64>,
+    rotate: Option<Rotation>,
+    translate: Option<[f64; 3]>,
+    extinction: Option<Colour>,
+    visibility: Option<f32>,
+    albedo: Option<Colour>,
+    g: Option<f32>,
+}
+
+#[derive(Debug, Clone, Copy, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Rotation {
+    axis: [f64; 3],
+    degrees: f64,
+}
+
+/// Contrast at which a black thing is still told from the sky, −ln of it: Koschmieder's 2 %.
+const VISIBLE: f32 = 3.912;
+
+/// Cells of the grid that height fog is made of: between their centres it is off by (1/128)²/8 at most where it falls to 1/e over half of
+/// its height.
+const LAYERS: u32 = 256;
+
+/// Reads a file of fog, and adds what is in it to a scene.
+///
+/// # Errors
+/// A file that is missing, is no TOML, or says something that cannot be.
+pub(super) fn read(file: &Path, scene: &mut SceneFile) -> Result<(), SceneError> {
+    let whole = |reason: String| SceneError { file: file.to_owned(), reason, ..SceneError::default() };
+    let bytes = read_file(file).map_err(|e| whole(e.reason))?;
+    let text = String::from_utf8(bytes).map_err(|e| whole(format!("is not UTF-8 text: {e}")))?;
+    let line_of = |at: usize| text.as_bytes().iter().take(at).filter(|byte| **byte == b'\n').count() as u32 + 1;
+    let fog: FogFile = toml::from_str(&text)
+        .map_err(|e| SceneError { line: e.span().map(|span| line_of(span.start)), ..whole(e.message().to_owned()) })?;
+    if let Some(sky) = fog.sky {
+        let error = |reason: String| SceneError { element: "[sky]".to_owned(), ..whole(reason) };
+        scene.emitters.push(read_sky(file, &sky).map_err(error)?);
+    }
+    for (number, one) in fog.fog.iter().enumerate() {
+        let error = |reason: String| SceneError {
+            line: Some(line_of(one.span().start)),
+            element: format!("[[fog]] {}", number + 1),
+            ..whole(reason)
+        };
+        let (matter, container) = medium(file, one.get_ref()).map_err(error)?;
+        let places = vec![Place { container, holes: Vec::new() }];
+        scene.media.push(MediumDescription { id: format!("fog {}", number + 1), matter, places });
+    }
+    Ok(())
+}
+
+/// Hands out the bytes of all files that a file of fog names, as far as they can be read.
+pub(super) fn each_file(file: &Path, each: &mut impl FnMut(&[u8])) {
+    let text = read_file(file).ok().and_then(|bytes| String::from_utf8(bytes).ok()).unwrap_or_default();
+    let Ok(fog) = toml::from_str::<FogFile>(&text) else { return };
+    let named = fog.fog.iter().filter_map(|fog| fog.get_ref().file.as_ref());
+    for name in named.chain(fog.sky.iter().filter_map(|sky| sky.image.as_ref())) {
+        if let Ok(bytes) = read_file(&beside(file, name)) {
+            each(&bytes);
+        }
+    }
+}
+
+fn beside(file: &Path, name: &str) -> std::path::PathBuf {
+    file.parent().unwrap_or("".as_ref()).join(name)
+}
+
+fn read_sky(file: &Path, sky: &Sky) -> Result<Emitter, String> {
+    match (&sky.radiance, &sky.image) {
+        (Some(radiance), None) => {
+            let radiance = radiance.spectrum();
+            if !radiance.is_valid() {
+                return Err("\"radiance\" is negative or not finite".to_owned());
+            }
+            Ok(Emitter::Constant { radiance })
+        }
+        (None, Some(image)) => {
+            let picture = Picture::read(&beside(file, image)).map_err(|e| e.to_string())?;
+            let is_usable = |p: &[f32; 3]| p.iter().all(|c| c.is_finite() && *c >= 0.0);
+            if picture.width < 2 || picture.height < 2 || !picture.pixels.iter().all(is_usable) {
+                return Err(format!("\"{image}\" needs at least 2 x 2 pixels, none of them negative or not finite"));
+            }
+            Ok(Emitter::Environment { picture, to_world: Transform::IDENTITY })
+        }
+        _ => Err("needs \"radiance\" or \"image\", and not both".to_owned()),
+    }
+}
+
+fn medium(file: &Path, fog: &Fog) -> Result<(Matter, Container), String> {
+    check_names(fog)?;
+    let extinction = match (fog.extinction, fog.visibility) {
+        (Some(extinction), None) => extinction.spectrum(),
+        (None, Some(visibility)) => Spectrum::splat(VISIBLE / visibility),
+        (None, None) if fog.shape == Form::Grid => Spectrum::ONE,
+        _ => return Err("needs \"extinction\" or \"visibility\", and not both".to_owned()),
+    };
+    let albedo = fog.albedo.map_or(Spectrum::ONE, Colour::spectrum);
+    if !extinction.is_valid() {
+        return Err("its extinction is negative or not finite".to_owned());
+    }
+    if !albedo.0.iter().all(|c| (0.0..=1.0).contains(c)) {
+        return Err("\"albedo\" is outside [0, 1]".to_owned());
+    }
+    let scattering = extinction * albedo;
+    let absorption = (extinction - scattering).max(Spectrum::ZERO);
+    let phase = match fog.g {
+        None => Phase::ISOTROPIC,
+        Some(g) => Phase::from(Lobe::HenyeyGreenstein { g }.check().map_err(|e| e.to_string())?),
+    };
+    match fog.shape {
+        Form::Box => Ok((Matter::Homogeneous { absorption, scattering, phase }, cube(corners(fog)?))),
+        Form::Sphere => {
+            let centre = fog.centre.ok_or("a sphere needs \"centre\"")?;
+            let radius = fog.radius.ok_or("a sphere needs \"radius\"")?;
+            if !(radius > 1e-18 && radius < 1e18 && centre.iter().all(|c| c.abs() < 1e18)) {
+                return Err("its radius must be greater than 0, and all of it within reach".to_owned());
+            }
+            Ok((Matter::Homogeneous { absorption, scattering, phase }, Container::Sphere { centre, radius }))
+        }
+        Form::Height => {
+            let [low, high] = corners(fog)?;
+            let ground = fog.ground.unwrap_or(low[1]);
+            let fall_off = fog.fall_off.ok_or("height fog needs \"fall_off\"")?;
+            if !(fall_off > 0.0 && fall_off.is_finite() && ground.is_finite()) {
+                return Err("\"fall_off\" must be greater than 0".to_owned());
+            }
+            let layer = |i: u32| {
+                let height = low[1] + (high[1] - low[1]) * (f64::from(i) + 0.5) / f64::from(LAYERS);
+                (-((height - ground) / fall_off).max(0.0)).exp() as f32
+            };
+            let values = Values::F32((0..LAYERS).map(layer).collect());
+            let volume = Arc::new(Volume { size: [1, LAYERS, 1], values });
+            let to_world = Transform::scaling([0, 1, 2].map(|i| high[i] - low[i])).then(&Transform::translation(low));
+            Ok((Matter::Grid { volume, to_world, absorption, scattering, phase }, cube([low, high])))
+        }
+        Form::Grid => {
+            let name = fog.file.as_ref().ok_or("a grid needs \"file\"")?;
+            let path = beside(file, name);
+            let is_boxed = fog.min.is_some() || fog.max.is_some();
+            // From the unit cube to the place that was named.
+            let into_box = || -> Result<Transform, String> {
+                let [low, high] = corners(fog)?;
+                Ok(Transform::scaling([0, 1, 2].map(|i| high[i] - low[i])).then(&Transform::translation(low)))
+            };
+            let moved = moved(fog)?;
+            if vdb::is_named(&path) {
+                let bricks = vdb::Grid::read(&path, fog.grid.as_deref()).and_then(|grid| grid.into_bricks(&path));
+                let bricks = bricks.map_err(|e| e.to_string())?;
+                let place = if is_boxed { bricks.in_active_box().then(&into_box()?) } else { *bricks.in_file() };
+                let to_world = place.then(&moved);
+                check_place(&to_world)?;
+                let matter = Matter::Sparse { bricks: Arc::new(bricks), to_world, absorption, scattering, phase };
+                return Ok((matter, around(&to_world)));
+            }
+            if fog.grid.is_some() {
+                return Err("\"grid\" names a grid of a .vdb or .nvdb file".to_owned());
+            }
+            let volume = Volume::read(&path).map_err(|e| e.to_string())?;
+            let to_world = into_box()?.then(&moved);
+            check_place(&to_world)?;
+            let matter = Matter::Grid { volume: Arc::new(volume), to_world, absorption, scattering, phase };
+            Ok((matter, around(&to_world)))
+        }
+    }
+}
+
+/// What a form has no use for is a mistake.
+fn check_names(fog: &Fog) -> Result<(), String> {
+    use Form::{Box, Grid, Height, Sphere};
+    let given: [(&str, bool, &[Form]); 11] = [
+        ("min", fog.min.is_some(), &[Box, Height, Grid]),
+        ("max", fog.max.is_some(), &[Box, Height, Grid]),
+        ("centre", fog.centre.is_some(), &[Sphere]),
+        ("radius", fog.radius.is_some(), &[Sphere]),
+        ("ground", fog.ground.is_some(), &[Height]),
+        ("fall_off", fog.fall_off.is_some(), &[Height]),
+        ("file", fog.file.is_some(), &[Grid]),
+        ("grid", fog.grid.is_some(), &[Grid]),
+        ("scale", fog.scale.is_some(), &[Grid]),
+        ("rotate", fog.rotate.is_some(), &[Grid]),
+        ("translate", fog.translate.is_some(), &[Grid]),
+    ];
+    match given.iter().find(|(_, is_given, forms)| *is_given && !forms.contains(&fog.shape)) {
+        Some((name, ..)) => Err(format!("\"{name}\" has no meaning for this shape")),
+        None => Ok(()),
+    }
+}
+
+fn corners(fog: &Fog) -> Result<[[f64; 3]; 2], String> {
+    let (low, high) = (fog.min.ok_or("needs \"min\"")?, fog.max.ok_or("needs \"max\"")?);
+    let is_box = (0..3).all(|i| low[i] < high[i] && low[i] > -1e18 && high[i] < 1e18);
+    if is_box { Ok([low, high]) } else { Err(format!("\"max\" {high:?} must be greater than \"min\" {low:?}")) }
+}
+
+/// A box as a container.
+fn cube([low, high]: [[f64; 3]; 2]) -> Container {
+    let half = [0, 1, 2].map(|i| 0.5 * (high[i] - low[i]));
+    let middle = [0, 1, 2].map(|i| 0.5 * (high[i] + low[i]));
+    Container::Cube(Transform::scaling(half).then(&Transform::translation(middle)))
+}
+
+/// How a grid is moved from where it would stand.
+fn moved(fog: &Fog) -> Result<Transform, String> {
+    let scaled = Transform::scaling([fog.scale.unwrap_or(1.0); 3]);
+    let turned = match fog.rotate {
+        Some(Rotation { axis, degrees }) => {
+            Transform::rotation(axis, degrees).ok_or("\"rotate\": the axis has no length")?
+        }
+        None => Transform::IDENTITY,
+    };
+    Ok(scaled.then(&turned).then(&Transform::translation(fog.translate.unwrap_or_default())))
+}
+
+fn check_place(to_world: &Transform) -> Result<(), String> {
+    if to_world.is_regular() { Ok(()) } else { Err("its place is no volume".to_owned()) }
+}
+
+/// A container just around the image of the unit cube: a grid ends by itself.
+fn around(to_world: &Transform) -> Container {
+    const ROOM: f64 = 0.5 + 1e-6;
+    let unit = Transform::scaling([ROOM; 3]).then(&Transform::translation([0.5; 3]));
+    Container::Cube(unit.then(to_world))
+}
+
+/// The smallest boxes around the places of a medium.
+pub(super) fn bounds(medium: &MediumDescription) -> impl Iterator<Item = Bounds> + '_ {
+    medium.places.iter().map(|place| {
+        let [low, high] = place.container.bounds();
+        Bounds { min: to_vec3(low), max: to_vec3(high) }
+    })
+}

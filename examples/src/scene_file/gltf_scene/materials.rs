@@ -1,0 +1,163 @@
+//! Materials: what a surface does to light, and what it sends out.
+
+use std::collections::HashMap;
+use std::sync::Arc;
+
+use ::gltf::Document;
+use ::gltf::material::AlphaMode;
+use ::gltf::texture::{MagFilter, WrappingMode};
+use fogbow::spectrum::Spectrum;
+use fogbow::surface::Surface;
+
+use super::data::Data;
+use super::{Source, label};
+use crate::picture::Picture;
+use crate::scene_file::description::{Material, Slot};
+use crate::scene_file::notes::NoteKind;
+use crate::texture::{Texture, ToUv, Wrap};
+
+/// A material, ready for shapes.
+#[derive(Debug, Clone)]
+pub(super) struct Ready {
+    pub(super) surface: Material,
+    pub(super) radiance: Option<Spectrum>,
+    /// Which of the texture coordinates of a mesh its textures are looked up with.
+    pub(super) texcoords: Option<u32>,
+}
+
+/// All materials of a document.
+pub(super) struct Materials {
+    all: HashMap<Option<usize>, Ready>,
+}
+
+impl Materials {
+    pub(super) fn new(source: &Source<'_>, document: &Document, data: &Data) -> Self {
+        let mut reader = Reader { source, data, pictures: HashMap::new() };
+        let all = document.materials().map(|material| (material.index(), reader.material(&material))).collect();
+        Self { all }
+    }
+
+    /// The one of a primitive; white where it has none.
+    pub(super) fn of(&self, material: &::gltf::Material<'_>) -> Ready {
+        self.all.get(&material.index()).cloned().unwrap_or_else(|| Ready {
+            surface: Material {
+                surface: Surface::Lambert { reflectance: Spectrum::ONE },
+                is_two_sided: true,
+                textures: Vec::new(),
+                relief: None,
+            },
+            radiance: None,
+            texcoords: None,
+        })
+    }
+}
+
+struct Reader<'a> {
+    source: &'a Source<'a>,
+    data: &'a Data,
+    /// Pictures by their index.
+    pictures: HashMap<usize, Option<Arc<Picture>>>,
+}
+
+/// Share of transmitted light, and of metal, from which a surface counts as glass or as metal.
+const MOSTLY: f32 = 0.5;
+
+impl Reader<'_> {
+    fn material(&mut self, material: &::gltf::Material<'_>) -> Ready {
+        let element = label("material", material.index().unwrap_or_default(), material.name());
+        let source = self.source;
+        let note = |kind: NoteKind, reason: &str| source.note(kind, &*element, reason);
+        let pbr = material.pbr_metallic_roughness();
+        let [r, g, b, _] = pbr.base_color_factor();
+        let base = Spectrum([r, g, b]).max(Spectrum::ZERO).min(Spectrum::ONE);
+        let (metallic, roughness) = (pbr.metallic_factor(), pbr.roughness_factor());
+        if material.alpha_mode() != AlphaMode::Opaque {
+            note(NoteKind::Replaced, "alpha has no effect: it is opaque");
+        }
+        for (name, is_there) in [
+            ("normalTexture", material.normal_texture().is_some()),
+            ("occlusionTexture", material.occlusion_texture().is_some()),
+            ("metallicRoughnessTexture", pbr.metallic_roughness_texture().is_some()),
+        ] {
+            if is_there {
+                note(NoteKind::Ignored, &format!("{name} has no effect"));
+            }
+        }
+        let mut texcoords = None;
+        let texture = pbr.base_color_texture().and_then(|info| {
+            texcoords = Some(info.tex_coord());
+            self.texture(&info)
+        });
+        let mean = texture.as_ref().map_or(Spectrum::ONE, |texture| texture.mean());
+        let colour = base * mean.max(Spectrum::ZERO).min(Spectrum::ONE);
+        let scaled = |slot: Slot| texture.clone().map(|t| (slot, Arc::new(Texture::Scaled(t, base))));
+        let transmission = material.transmission().map_or(0.0, |t| t.transmission_factor());
+        let (surface, textures, is_two_sided) = if transmission > MOSTLY {
+            if roughness > 0.0 {
+                note(NoteKind::Replaced, "rough glass: smooth");
+            }
+            let thickness = material.volume().map_or(0.0, |volume| volume.thickness_factor());
+            if material.volume().is_some_and(|volume| volume.attenuation_distance().is_finite()) {
+                note(NoteKind::Replaced, "attenuation within glass: clear");
+            }
+            // A sheet without thickness bends no light.
+            let eta = if thickness > 0.0 { material.ior().unwrap_or(1.5).max(1e-3) } else { 1.0 };
+            let surface = Surface::Dielectric { eta, reflectance: Spectrum::ONE, transmittance: colour };
+            (surface, scaled(Slot::Transmitted), false)
+        } else if metallic > MOSTLY && pbr.metallic_roughness_texture().is_none() && roughness < MOSTLY {
+            if roughness > 0.0 {
+                note(NoteKind::Replaced, "rough metal: a mirror of its colour");
+            }
+            (Surface::Mirror { reflectance: colour }, scaled(Slot::Specular), true)
+        } else {
+            if metallic < 1.0 && roughness < 1.0 || metallic > 0.0 {
+                note(NoteKind::Replaced, "a glossy surface: one that scatters evenly, of its base colour");
+            }
+            (Surface::Lambert { reflectance: colour }, scaled(Slot::Diffuse), true)
+        };
+        let emitted = Spectrum(material.emissive_factor()) * material.emissive_strength().unwrap_or(1.0);
+        let emitted = match material.emissive_texture().and_then(|info| self.texture(&info)) {
+            Some(texture) => {
+                note(NoteKind::Replaced, "emissiveTexture: its mean, everywhere");
+                emitted * texture.mean().max(Spectrum::ZERO)
+            }
+            None => emitted,
+        };
+        let radiance = (emitted.is_valid() && !emitted.is_black()).then_some(emitted);
+        // What shines and lets light pass is something no light here is.
+        let surface =
+            if radiance.is_some() && matches!(surface, Surface::Dielectric { .. }) { Surface::BLACK } else { surface };
+        Ready {
+            surface: Material { surface, is_two_sided, textures: textures.into_iter().collect(), relief: None },
+            radiance,
+            texcoords,
+        }
+    }
+
+    /// A texture; `None`, and a kept error, where its picture cannot be read.
+    fn texture(&mut self, info: &::gltf::texture::Info<'_>) -> Option<Arc<Texture>> {
+        let texture = info.texture();
+        let image = texture.source();
+        let (source, data) = (self.source, self.data);
+        let picture = self.pictures.entry(image.index());
+        let picture =
+            picture.or_insert_with(|| source.sink.keep(data.picture(source, &image)).map(Arc::new)).clone()?;
+        let sampler = texture.sampler();
+        let wrap = match sampler.wrap_s() {
+            WrappingMode::Repeat => Wrap::Repeat,
+            WrappingMode::MirroredRepeat => Wrap::Mirror,
+            WrappingMode::ClampToEdge => Wrap::Clamp,
+        };
+        if sampler.wrap_s() != sampler.wrap_t() {
+            let element = label("texture", texture.index(), texture.name());
+            source.note(NoteKind::Replaced, element, "wraps in two ways: as along u");
+        }
+        let to_uv = info.texture_transform().map_or(ToUv::IDENTITY, |t| {
+            // Scaled, turned, moved.
+            let ([x, y], [dx, dy], (sin, cos)) = (t.scale(), t.offset(), t.rotation().sin_cos());
+            ToUv { rows: [[cos * x, sin * y, dx], [-sin * x, cos * y, dy]] }
+        });
+        let is_smooth = sampler.mag_filter() != Some(MagFilter::Nearest);
+        Some(Arc::new(Texture::Bitmap { picture, wrap, is_smooth, to_uv }))
+    }
+}
