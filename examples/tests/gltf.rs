@@ -57,7 +57,7 @@ fn corners([corner, u, v]: Quad) -> [[f32; 3]; 4] {
 const SIDES: [u16; 6] = [0, 1, 2, 0, 2, 3];
 
 /// The box as a binary file.
-fn binary_box() -> Vec<u8> {
+pub(crate) fn binary_box() -> Vec<u8> {
     let mut data: Vec<u8> = SIDES.iter().flat_map(|i| i.to_le_bytes()).collect();
     data.extend(QUADS.iter().flat_map(|q| corners(*q)).flatten().flat_map(f32::to_le_bytes));
     let accessors: Vec<String> = (0..QUADS.len())
@@ -101,7 +101,7 @@ fn binary_box() -> Vec<u8> {
     glb(&text, &data)
 }
 
-pub(crate) fn glb(text: &str, data: &[u8]) -> Vec<u8> {
+fn glb(text: &str, data: &[u8]) -> Vec<u8> {
     let padded = |bytes: &[u8], with: u8| {
         let mut bytes = bytes.to_vec();
         bytes.resize(bytes.len().next_multiple_of(4), with);
@@ -175,7 +175,7 @@ fn read(text: &str) -> Findings {
 }
 
 /// A triangle in a text file, with `more` in its primitive and `rest` beside it; its points are (0,0,0), (1,0,0), (0,1,0), (1,1,0).
-fn triangle(more: &str, rest: &str) -> String {
+pub(crate) fn triangle(more: &str, rest: &str) -> String {
     let data = "AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAAAACAPwAAgD8AAAAA";
     format!(
         "{{\"asset\":{{\"version\":\"2.0\"}},\"scenes\":[{{\"nodes\":[0]}}],\
@@ -279,12 +279,14 @@ fn with_fog(name: &str, fog: &str) -> Result<SceneFile, String> {
     findings.into_scene().map_err(|e| e.to_string())
 }
 
-#[test]
-fn fog_comes_in_all_forms() {
-    let fog = "sky.radiance = 0.5\n[[fog]]\nshape = \"sphere\"\ncentre = [0, 1, 2]\nradius = 3\nvisibility = 39.12\nalbedo = [1, 0.5, 0]\n\
+/// A file of fog with every form.
+pub(crate) const ALL_FORMS: &str = "sky.radiance = 0.5\n[[fog]]\nshape = \"sphere\"\ncentre = [0, 1, 2]\nradius = 3\nvisibility = 39.12\nalbedo = [1, 0.5, 0]\n\
         [[fog]]\nshape = \"height\"\nmin = [-1, 0, -1]\nmax = [1, 4, 1]\nground = 1\nfall_off = 0.5\nextinction = 2\n\
         [[fog]]\nshape = \"grid\"\nfile = \"cloud.nvdb\"\nextinction = 20\nscale = 2\nrotate = { axis = [0, 1, 0], degrees = 90 }\ntranslate = [1, 0, 0]\n";
-    let scene = with_fog("forms", fog).unwrap();
+
+#[test]
+fn fog_comes_in_all_forms() {
+    let scene = with_fog("forms", ALL_FORMS).unwrap();
     assert!(matches!(scene.emitters[..], [Emitter::Constant { radiance }] if radiance == Spectrum::splat(0.5)));
     let [ball, layers, cloud] = &scene.media[..] else { panic!("{} media", scene.media.len()) };
     let Matter::Homogeneous { absorption, scattering, .. } = ball.matter else { panic!("{ball:?}") };

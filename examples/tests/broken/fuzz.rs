@@ -9,7 +9,7 @@ use fogbow::host::Scene;
 use fogbow::math::{Ray, Vec2, Vec3};
 use fogbow_examples::mesh::Mesh;
 use fogbow_examples::picture::Picture;
-use fogbow_examples::scene_file::SceneFile;
+use fogbow_examples::scene_file::{ReadOptions, SceneFile};
 use fogbow_examples::transform::Transform;
 use fogbow_examples::vdb::Grid;
 use fogbow_examples::volume::Volume;
@@ -155,6 +155,42 @@ fn fuzz_sparse_volumes() {
     });
     println!("{sound} were sound");
     assert!(sound > 0);
+}
+
+/// Text and binary; what is read is built, too.
+#[test]
+fn fuzz_gltf() {
+    let (mut built, file) = (0, Path::new("none/room.gltf"));
+    let seeds = [crate::gltf::binary_box(), crate::gltf::triangle("", ",\"nodes\":[{\"mesh\":0}]").into_bytes()];
+    fuzz(&seeds, |bytes| {
+        let findings = SceneFile::from_gltf(file, bytes, &ReadOptions::default());
+        let Some(scene) = findings.scene else { return assert!(!findings.errors.is_empty()) };
+        let mut storage = Storage::new(&scene);
+        let Ok(world) = World::new(&scene, &mut storage) else { return };
+        built += 1;
+        let hit = world.closest_hit(&world.camera().ray(Vec2::splat(0.5)));
+        assert!(hit.is_none_or(|hit| hit.distance > 0.0 && (hit.normal.length() - 1.0).abs() < 1e-3), "{hit:?}");
+    });
+    println!("{built} scenes were sound");
+    assert!(built > 0);
+}
+
+#[test]
+fn fuzz_fog() {
+    let folder = Folder::new("fuzz-fog");
+    folder.write("cloud.nvdb", &crate::vdb::file("fp4.nvdb"));
+    let file = folder.path("fog.toml");
+    let options = ReadOptions { fog: Some(file.clone()), ..ReadOptions::default() };
+    let (mut built, scene) = (0, crate::gltf::triangle("", ",\"nodes\":[{\"mesh\":0}]"));
+    fuzz(&[crate::gltf::ALL_FORMS.as_bytes().to_vec()], |bytes| {
+        std::fs::write(&file, bytes).unwrap();
+        let findings = SceneFile::from_gltf(&folder.path("room.gltf"), scene.as_bytes(), &options);
+        let Some(scene) = findings.scene else { return assert!(!findings.errors.is_empty()) };
+        let mut storage = Storage::new(&scene);
+        built += usize::from(World::new(&scene, &mut storage).is_ok());
+    });
+    println!("{built} scenes were sound");
+    assert!(built > 0);
 }
 
 #[test]

@@ -19,26 +19,31 @@ pub(super) struct Data {
     files: Vec<PathBuf>,
 }
 
-/// The bytes of an address: `data:…` or a file beside the scene. With the kind of data, if the address says so.
-fn resolve(
-    source: &Source<'_>,
-    element: &str,
-    uri: &str,
-) -> Result<(Vec<u8>, Option<String>, Option<PathBuf>), SceneError> {
+/// The bytes of an address.
+struct Resolved {
+    bytes: Vec<u8>,
+    /// The kind of data, if the address says so.
+    kind: Option<String>,
+    /// The file they came from.
+    file: Option<PathBuf>,
+}
+
+/// Reads `data:…` or a file beside the scene.
+fn resolve(source: &Source<'_>, element: &str, uri: &str) -> Result<Resolved, SceneError> {
     if let Some(rest) = uri.strip_prefix("data:") {
-        let (kind, text) =
-            rest.split_once(";base64,").ok_or_else(|| source.error(element, "holds data that are not base64"))?;
+        let parts = rest.split_once(";base64,");
+        let (kind, text) = parts.ok_or_else(|| source.error(element, "holds data that are not base64"))?;
         let bytes = base64::engine::general_purpose::STANDARD
             .decode(text)
             .map_err(|e| source.error(element, format!("holds data that are not base64: {e}")))?;
-        return Ok((bytes, Some(kind.to_owned()), None));
+        return Ok(Resolved { bytes, kind: Some(kind.to_owned()), file: None });
     }
     if uri.contains("://") {
         return Err(source.error(element, format!("\"{uri}\" does not lie beside the scene")));
     }
     let path = source.file.parent().unwrap_or("".as_ref()).join(unescaped(uri));
     let bytes = read_file(&path).map_err(|e| source.error(element, e.to_string()))?;
-    Ok((bytes, None, Some(path)))
+    Ok(Resolved { bytes, kind: None, file: Some(path) })
 }
 
 /// `%20` is a space.
@@ -70,9 +75,9 @@ impl Data {
             let mut bytes = match buffer.source() {
                 BufferSource::Bin => blob.take().ok_or_else(|| source.error(&element, "is not in the file"))?,
                 BufferSource::Uri(uri) => {
-                    let (bytes, _, file) = resolve(source, &element, uri)?;
-                    data.files.extend(file);
-                    bytes
+                    let found = resolve(source, &element, uri)?;
+                    data.files.extend(found.file);
+                    found.bytes
                 }
             };
             if bytes.len() < buffer.length() {
@@ -111,8 +116,8 @@ impl Data {
                 (bytes.to_vec(), Some(mime_type.to_owned()))
             }
             ImageSource::Uri { uri, mime_type } => {
-                let (bytes, kind, _) = resolve(source, &element, uri)?;
-                (bytes, mime_type.map(str::to_owned).or(kind))
+                let found = resolve(source, &element, uri)?;
+                (found.bytes, mime_type.map(str::to_owned).or(found.kind))
             }
         };
         let extension = match bytes.get(..4) {
