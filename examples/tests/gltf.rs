@@ -251,6 +251,7 @@ fn broken_files_say_what_is_wrong() {
         ("\"byteLength\":48,\"uri\"", "\"byteLength\":49,\"uri\"", &["buffer 0", "holds 48 bytes where 49 are due"]),
         ("base64,", "base65,", &["buffer 0", "base64"]),
         ("\"mesh\":0}", "\"mesh\":7}", &["not usable glTF"]),
+        ("\"POSITION\":0", "\"POSITION\":4294967295", &["accessor 4294967295 does not exist: there are 1"]),
         ("\"componentType\":5126", "\"componentType\":5125", &["POSITION", "holds indices"]),
         ("\"VEC3\"", "\"VEC2\"", &["POSITION", "where 3 numbers are due"]),
         ("\"nodes\":[{\"mesh\":0}]", "\"nodes\":[{\"mesh\":0,\"children\":[0]}]", &["node 0", "without end"]),

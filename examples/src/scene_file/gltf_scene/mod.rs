@@ -154,6 +154,13 @@ fn document(source: &Source<'_>, bytes: &[u8]) -> Result<(Document, Option<Vec<u
         missing = missing.and(replaced);
     }
     missing?;
+    // The check of the document takes this for granted.
+    let attributes = root.meshes.iter().flat_map(|mesh| &mesh.primitives).flat_map(|p| p.attributes.values());
+    if let Some(bad) = attributes.map(json::Index::value).find(|index| *index >= root.accessors.len()) {
+        return Err(
+            source.error("meshes", format!("accessor {bad} does not exist: there are {}", root.accessors.len()))
+        );
+    }
     for name in root.extensions_used.iter().filter(|name| !KNOWN.contains(&name.as_str())) {
         source.note(NoteKind::Ignored, format!("extension {name}"), "is not supported; what it says is left out");
     }
