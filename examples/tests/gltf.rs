@@ -124,7 +124,7 @@ fn written_box(folder: &Folder) -> PathBuf {
         "<scene version=\"3.0.0\"><integrator type=\"volpath\"/><sensor type=\"perspective\"><float name=\"fov\" value=\"{fov}\"/>\
         <string name=\"fov_axis\" value=\"y\"/><float name=\"near_clip\" value=\"0.5\"/>\
         <transform name=\"to_world\"><lookat origin=\"0, 1, 4\" target=\"0, 1, 0\" up=\"0, 1, 0\"/></transform>\
-        <film type=\"hdrfilm\"><integer name=\"width\" value=\"1280\"/><integer name=\"height\" value=\"720\"/><rfilter type=\"box\"/></film></sensor>\n"
+        <film type=\"hdrfilm\"><integer name=\"width\" value=\"1280\"/><integer name=\"height\" value=\"720\"/></film></sensor>\n"
     );
     for (i, quad) in QUADS.iter().enumerate() {
         let points: String = corners(*quad).iter().map(|[x, y, z]| format!("{x} {y} {z}\n")).collect();

@@ -636,7 +636,7 @@ impl WithMedium for Job<'_> {
 #[inline]
 pub(super) fn weigh(layers: &mut [Spectrum], weight: f32) {
     if weight != 1.0 {
-        layers.iter_mut().for_each(|layer| *layer = *layer * weight);
+        layers.iter_mut().for_each(|layer| *layer *= weight);
     }
 }
 

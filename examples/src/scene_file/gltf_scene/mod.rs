@@ -27,7 +27,7 @@ use fogbow::bytes::Crc;
 use fogbow::math::Bounds;
 use fogbow::spectrum::Spectrum;
 
-use super::description::{Emitter, FovAxis, Integrator, SceneFile, Sensor};
+use super::description::{Emitter, FovAxis, Integrator, Projection as View, SceneFile, Sensor};
 use super::notes::{NoteKind, Sink};
 use super::{Findings, ReadOptions};
 use crate::error::{SceneError, read_file};
@@ -299,6 +299,7 @@ fn default_sensor(bounds: Bounds) -> Sensor {
         width: WIDTH,
         height: HEIGHT,
         samples: SAMPLES,
+        ..Sensor::default()
     }
 }
 
@@ -326,13 +327,19 @@ fn sensor(
         return Ok(default_sensor(bounds));
     };
     let error = |reason: String| source.error(label("camera", camera.index(), camera.name()), reason);
-    let Projection::Perspective(lens) = camera.projection() else {
-        return Err(error("is orthographic, which is not supported".to_owned()));
+    let (fov, aspect, near, half_width) = match camera.projection() {
+        Projection::Perspective(lens) => {
+            let aspect = f64::from(lens.aspect_ratio().unwrap_or(WIDTH as f32 / HEIGHT as f32));
+            (f64::from(lens.yfov()).to_degrees(), aspect, lens.znear(), None)
+        }
+        Projection::Orthographic(lens) => {
+            let (across, up) = (f64::from(lens.xmag()).abs(), f64::from(lens.ymag()).abs());
+            (40.0, across / up, lens.znear(), Some(across))
+        }
     };
-    let aspect = f64::from(lens.aspect_ratio().unwrap_or(WIDTH as f32 / HEIGHT as f32));
-    let fov = f64::from(lens.yfov()).to_degrees();
-    let near = f64::from(lens.znear()).max(1e-9);
-    if !(fov > 0.0 && fov < 180.0 && aspect > 1e-2 && aspect < 1e2 && near.is_finite()) {
+    let near = f64::from(near).max(1e-9);
+    let is_view = fov > 0.0 && fov < 180.0 && aspect > 1e-2 && aspect < 1e2 && near < 1e18;
+    if !(is_view && half_width.is_none_or(|half| half > 1e-18 && half < 1e18)) {
         return Err(error(format!("an angle of {fov} degrees, with sides of ratio {aspect}, is not a view")));
     }
     // It looks along −z, and is not scaled with what it hangs on.
@@ -347,5 +354,24 @@ fn sensor(
     }
     let width = ((f64::from(HEIGHT) * aspect).round() as u32).max(1);
     let far = 2.0 * reach(eye).max(near) + 1.0;
-    Ok(Sensor { fov, fov_axis: FovAxis::Y, near, far, to_world, width, height: HEIGHT, samples: SAMPLES })
+    let sensor = Sensor {
+        fov,
+        fov_axis: FovAxis::Y,
+        near,
+        far,
+        to_world,
+        width,
+        height: HEIGHT,
+        samples: SAMPLES,
+        ..Sensor::default()
+    };
+    Ok(match half_width {
+        None => sensor,
+        // What is seen is the image of two units across.
+        Some(half) => Sensor {
+            projection: View::Parallel,
+            to_world: Transform::scaling([half, half, 1.0]).then(&to_world),
+            ..sensor
+        },
+    })
 }
