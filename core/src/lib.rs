@@ -91,6 +91,7 @@ pub mod phase;
 pub mod photon;
 pub mod picture;
 pub mod sampling;
+pub mod sent;
 pub mod sh;
 pub mod single_scatter;
 pub mod spectrum;

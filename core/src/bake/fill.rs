@@ -31,9 +31,9 @@ const LEAST_PASSES: u32 = 8;
 #[derive(Debug)]
 #[cfg_attr(feature = "alloc", derive(Default))]
 pub struct BakedProbes<'o> {
-    values: List<'o, Spectrum>,
-    probes: List<'o, Probe>,
-    is_cut: bool,
+    pub(super) values: List<'o, Spectrum>,
+    pub(super) probes: List<'o, Probe>,
+    pub(super) is_cut: bool,
 }
 
 impl<'o> BakedProbes<'o> {

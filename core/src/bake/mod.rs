@@ -25,6 +25,7 @@
 //! | `grid` | [`ProbeGrid`]: what was baked; look-ups, dilation |
 //! | `froxels` | [`Froxels`]: fog before a camera in cells of its frustum, as engines show it |
 //! | `one_light` | [`OneLight`]: a layer of light for each lamp |
+//! | `output_bytes` | what jobs leave, as bytes |
 //! | [`bytes`] | grids as bytes, to be saved |
 
 mod arriving;
@@ -34,6 +35,7 @@ mod fill;
 mod froxels;
 mod grid;
 mod one_light;
+mod output_bytes;
 mod places;
 mod settings;
 #[cfg(all(test, feature = "alloc"))]

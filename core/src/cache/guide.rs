@@ -3,6 +3,7 @@
 use glam::{Vec2, Vec3};
 
 use crate::math::float::{self, PI};
+use crate::sent::packed;
 
 const ROWS: usize = 8;
 const COLUMNS: usize = 16;
@@ -30,6 +31,15 @@ pub struct Guide {
     /// [`Place::to_eye`](super::Place::to_eye) of the record.
     pub(super) to_eye: Option<Vec3>,
 }
+
+packed!(Guide {
+    squares: [f32; CELLS],
+    sum: f32,
+    sum_of_squares: f32,
+    weight: f32,
+    seen: f32,
+    to_eye: Option<Vec3>,
+});
 
 impl Default for Guide {
     fn default() -> Self {

@@ -29,6 +29,7 @@
 //! | `smooth` | irradiance averaged over neighbouring records |
 //! | `readers` | probes, fluence, irradiance, in-scattered light; many at a time |
 //! | `set_bytes` | all caches as bytes |
+//! | `output_bytes` | what jobs leave, as bytes |
 //! | `record` | [`Record`], [`Attachment`]: what is stored |
 //! | `radius` | Eq. 34, limits, distance to surfaces, clamping of gradients and neighbours |
 //! | `extrapolate` | Eq. 35, and a mixture of second order: [`Blend`] |
@@ -64,6 +65,7 @@ mod kind;
 mod lookup;
 mod memory;
 mod noise;
+mod output_bytes;
 mod photons;
 mod pilots;
 mod presets;

@@ -7,6 +7,7 @@
 use super::eye::CachedRadiance;
 use super::kind::{Kind, SECOND};
 use super::presets;
+use crate::sent::packed;
 
 /// Eye rays that are read. Fewer: single dark pixels decide; more: time.
 pub(super) const RAYS: u32 = 1024;
@@ -23,6 +24,8 @@ pub struct Glance {
     kinds: [f32; KINDS],
     all: f32,
 }
+
+packed!(Glance { kinds: [f32; KINDS], all: f32 });
 
 impl Glance {
     /// Of light that is no number nothing.

@@ -10,6 +10,7 @@ use super::lookup::{TURNING_DEGREE, TurningBasis};
 use crate::host::{Medium, Properties, Scene};
 use crate::light::Light;
 use crate::math::{Bounds, Ray, Vec3};
+use crate::sent::packed;
 use crate::phase::Phase;
 use crate::photon::{Event, trace};
 use crate::sampling::uniform::mix;
@@ -102,6 +103,8 @@ pub struct PhotonDeposit {
     /// Power times the length of the way (W·m).
     light: Spectrum,
 }
+
+packed!(PhotonDeposit { cell: u32, path: u32, at: Vec3, direction: Vec3, light: Spectrum });
 
 /// Who came by one cell.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]

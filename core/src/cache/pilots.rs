@@ -6,6 +6,7 @@
 //!
 //! Radii in free paths or of a tolerance cannot know this: how light bends within a free path depends on whether fog ends at a wall or in the open.
 
+use crate::sent::packed;
 use crate::spectrum::Spectrum;
 
 /// Part of the error asked for that extrapolation of a kind may take, of its own light. Larger: a picture is too dark or too bright as a whole; smaller: more
@@ -49,6 +50,8 @@ pub(super) struct Pilots {
     dt: f64,
     tt: f64,
 }
+
+packed!(Pilots { count: u32, d: f64, t: f64, dd: f64, dt: f64, tt: f64 });
 
 impl Pilots {
     /// What a cache tells at a place, and an estimate of its own.
