@@ -175,6 +175,45 @@ export class World extends Held {
     call("world_in_scattered", this._handle, samples, seed);
     return output(Float32Array);
   }
+
+  scatteredOnce(points, directions) {
+    input(pairs(points, directions));
+    call("world_scattered_once", this._handle);
+    return output(Float32Array);
+  }
+
+  record(point, toEye, { tolerance = 0.2, least = 0.01, most = 10 } = {}) {
+    const words = new Words().vector(point, "point").vector(toEye, "toEye").float(tolerance, "tolerance");
+    input(words.float(least, "least").float(most, "most").done());
+    call("world_record", this._handle);
+    return recordOf(output(Float32Array));
+  }
+
+  covariances({ edge = 16, photons = 10000 } = {}) {
+    input(new Words().integer(edge, "edge").integer(photons, "photons").done());
+    call("world_covariances", this._handle);
+    const all = output(Float32Array);
+    return { size: Array.from(new Uint32Array(all.buffer, 0, 3)), covariances: all.subarray(3) };
+  }
+
+  virtualLight({ position, incoming, flux = 1, bound, eye }, points) {
+    const words = new Words().vector(position, "position").vector(incoming, "incoming").colour(flux, "flux");
+    words.float(bound, "bound").vector(eye, "eye").array(typed(points, Float32Array, "points"));
+    input(words.done());
+    call("world_virtual_light", this._handle);
+    const both = output(Float32Array);
+    const [clamped, all] = [new Float32Array(both.length / 2), new Float32Array(both.length / 2)];
+    for (let i = 0; i < both.length; i += 6) {
+      clamped.set(both.subarray(i, i + 3), i / 2);
+      all.set(both.subarray(i + 3, i + 6), i / 2);
+    }
+    return { clamped, all };
+  }
+}
+
+function recordOf(numbers) {
+  const three = (at) => Array.from(numbers.subarray(at, at + 3));
+  return { position: three(0), radius: numbers[3], value: three(4), gradient: [three(7), three(10), three(13)] };
 }
 
 const RECORDS = { single: 0, surface: 1, multiple: 2, irradiance: 3 };

@@ -201,16 +201,22 @@ export class Scene {
   }
 
   /** Six walls, seen from within. */
-  room([min, max], material) {
-    const [a, b] = [min, max];
-    const size = [b[0] - a[0], b[1] - a[1], b[2] - a[2]];
-    const axis = (i) => [0, 1, 2].map((k) => (k === i ? size[i] : 0));
+  room(box, material) {
+    return this.#sides(box, material, true);
+  }
+
+  /** A solid block, seen from outside. */
+  block(box, material) {
+    return this.#sides(box, { twoSided: false, ...material }, false);
+  }
+
+  #sides([min, max], material, isRoom) {
+    const axis = (i) => [0, 1, 2].map((k) => (k === i ? max[i] - min[i] : 0));
     for (let i = 0; i < 3; i++) {
-      const [j, k] = [(i + 1) % 3, (i + 2) % 3];
-      this.quad(a, axis(j), axis(k), material);
-      const far = [...a];
-      far[i] = b[i];
-      this.quad(far, axis(k), axis(j), material);
+      const edges = [axis((i + 1) % 3), axis((i + 2) % 3)];
+      const back = [edges[1], edges[0]];
+      this.quad(min, ...(isRoom ? edges : back), material);
+      this.quad(Object.assign([...min], { [i]: max[i] }), ...(isRoom ? back : edges), material);
     }
     return this;
   }
@@ -309,13 +315,16 @@ export function askedWords({ view, box }, words = new Words()) {
 }
 
 const ORDERS = { all: 0, indirect: 1, multiple: 2 };
+const QUANTITIES = { "in-scattered": 0, irradiance: 1 };
 
 /** The words of probes. */
-export function probesWords({ box, counts, degree = 2, orders = "all", error = 0.02, directions = 0, passes = 0, seed = 0 }) {
+export function probesWords({ box, counts, degree = 2, orders = "all", quantity = "in-scattered", error = 0.02, directions = 0, passes = 0, seed = 0 }) {
   if (counts?.length !== 3) throw new TypeError("counts must be three integers");
+  if (!(quantity in QUANTITIES)) throw new TypeError(`there is no quantity "${quantity}"`);
   if (!(orders in ORDERS)) throw new TypeError(`there are no orders "${orders}"`);
   const words = new Words().vector(box ? box[0] : [NaN, NaN, NaN], "box[0]").vector(box ? box[1] : [0, 0, 0], "box[1]");
   for (const count of counts) words.integer(count, "counts");
-  words.integer(degree, "degree").integer(ORDERS[orders], "orders").float(error, "error");
+  words.integer(degree, "degree").integer(ORDERS[orders], "orders");
+  words.integer(QUANTITIES[quantity], "quantity").float(error, "error");
   return words.integer(directions, "directions").integer(passes, "passes").integer(seed, "seed").done();
 }

@@ -10,6 +10,7 @@ use fogbow::math::Bounds;
 use fogbow::spectrum::Spectrum;
 
 use super::caches::WebCaches;
+use super::mathematics;
 use super::probes::WebProbes;
 use super::view::{Part, Rays, View};
 use super::words::{Fault, Words};
@@ -198,6 +199,34 @@ exports! {
     /// Path-traced light scattered at points towards directions.
     world_in_scattered(handle, samples, seed) -> state {
         let light = state.worlds.get(handle)?.in_scattered(&state.input, samples, u64::from(seed))?;
+        state.colours(&light);
+        Ok(0)
+    }
+
+    /// Light of lights scattered once, at points towards directions.
+    world_scattered_once(handle) -> state {
+        let light = mathematics::scattered_once(state.worlds.get(handle)?, &state.input)?;
+        state.colours(&light);
+        Ok(0)
+    }
+
+    /// A record of light scattered once: 16 floats.
+    world_record(handle) -> state {
+        let record = mathematics::record(state.worlds.get(handle)?, &state.input)?;
+        state.words(bytemuck::cast_slice(&[record]));
+        Ok(0)
+    }
+
+    /// A covariance grid.
+    world_covariances(handle) -> state {
+        let grid = mathematics::covariances(state.worlds.get(handle)?, &state.input)?;
+        state.words(&grid);
+        Ok(0)
+    }
+
+    /// A virtual light's clamped light, and all of it, at points.
+    world_virtual_light(handle) -> state {
+        let light = mathematics::virtual_light(state.worlds.get(handle)?, &state.input)?;
         state.colours(&light);
         Ok(0)
     }

@@ -20,6 +20,7 @@ extern crate std;
 
 mod abi;
 mod caches;
+mod mathematics;
 mod matter;
 mod probes;
 mod surfaces;

@@ -41,25 +41,24 @@ impl Matter<'_> {
     }
 }
 
-// Not inlined: each of these is three media, and is called from dozens of places. It makes the module a fifth smaller.
 impl Medium for Matter<'_> {
-    #[inline(never)]
+    #[inline]
     fn properties(&self, point: Vec3) -> Properties {
         each!(self, medium => medium.properties(point))
     }
-    #[inline(never)]
+    #[inline]
     fn majorant_segment(&self, ray: &Ray, from: f32) -> MajorantSegment {
         each!(self, medium => medium.majorant_segment(ray, from))
     }
-    #[inline(never)]
+    #[inline]
     fn marching_segment(&self, ray: &Ray, from: f32) -> MajorantSegment {
         each!(self, medium => medium.marching_segment(ray, from))
     }
-    #[inline(never)]
+    #[inline]
     fn extinction(&self, point: Vec3) -> Spectrum {
         each!(self, medium => medium.extinction(point))
     }
-    #[inline(never)]
+    #[inline]
     fn extinction_with_gradient(&self, point: Vec3) -> (Spectrum, Gradient) {
         each!(self, medium => medium.extinction_with_gradient(point))
     }

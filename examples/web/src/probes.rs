@@ -2,7 +2,7 @@
 
 use alloc::vec::Vec;
 
-use fogbow::bake::{Bake, BakeMemory, BakeSettings, BakedProbes, Orders, ProbeBasis, ProbeGrid, ProbeState, bytes};
+use fogbow::bake::{Bake, BakeMemory, BakeSettings, BakedProbes, Orders, ProbeBasis, ProbeGrid, ProbeState, Quantity, bytes};
 use fogbow::math::Bounds;
 use fogbow::spectrum::Spectrum;
 use fogbow::work::{self, Rounds};
@@ -25,7 +25,7 @@ pub struct WebProbes {
 
 impl WebProbes {
     /// From words: box, counts, degree of spherical harmonics, orders (0: all, 1: all but light straight from lamps, 2: only what was scattered
-    /// more than once), relative error, directions of a pass (0: as usual), passes at most (0: as usual), seed.
+    /// more than once), quantity (0: in-scattered radiance, 1: irradiance), relative error, directions of a pass (0: as usual), passes at most (0: as usual), seed.
     ///
     /// # Errors
     /// What the core refuses.
@@ -33,7 +33,8 @@ impl WebProbes {
         let mut words = Words::new(words);
         let bounds = Bounds { min: words.vector()?, max: words.vector()? };
         let counts = [words.integer()?, words.integer()?, words.integer()?];
-        let (degree, orders, error) = (words.integer()?, words.integer()?, words.float()?);
+        let (degree, orders, quantity) = (words.integer()?, words.integer()?, words.integer()?);
+        let error = words.float()?;
         let (directions, passes, seed) = (words.integer()?, words.integer()?, words.integer()?);
         let orders = match orders {
             0 => Orders::All,
@@ -41,11 +42,17 @@ impl WebProbes {
             2 => Orders::Multiple,
             _ => return Err(Fault::new("no such orders of light")),
         };
+        let quantity = match quantity {
+            0 => Quantity::InScattered,
+            1 => Quantity::Irradiance,
+            _ => return Err(Fault::new("no such quantity of light")),
+        };
         let usual = BakeSettings::for_outline(&world.outline(), counts);
         let settings = BakeSettings {
             bounds: if bounds.min.x.is_nan() { usual.bounds } else { bounds },
             basis: ProbeBasis::SphericalHarmonics { degree },
             orders,
+            quantity,
             error,
             directions: if directions == 0 { usual.directions } else { directions },
             most_passes: if passes == 0 { usual.most_passes } else { passes },
