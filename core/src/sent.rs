@@ -262,7 +262,8 @@ impl<'b> Received<'b> {
             return Err(JobBytesError::Kind);
         }
         let lengths: [usize; LISTS] = core::array::from_fn(|i| word(16 + 4 * i) as usize);
-        let words = lengths.iter().zip(lists).try_fold(fixed, |sum, (length, each)| sum.checked_add(length.checked_mul(each)?));
+        let words =
+            lengths.iter().zip(lists).try_fold(fixed, |sum, (length, each)| sum.checked_add(length.checked_mul(each)?));
         if words.and_then(|words| words.checked_mul(4)) != Some(rest.len()) {
             return Err(JobBytesError::Length);
         }

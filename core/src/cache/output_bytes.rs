@@ -42,7 +42,8 @@ const KIND: u32 = 1;
 /// What there is one of: estimate, paths, flights, pilots, glances, whether it is cut.
 type Fixed = (Option<Estimate>, u32, u64, Pilots, [Glance; 16], bool);
 
-const FIXED: usize = <Option<Estimate>>::WORDS + u32::WORDS + u64::WORDS + Pilots::WORDS + 16 * Glance::WORDS + bool::WORDS;
+const FIXED: usize =
+    <Option<Estimate>>::WORDS + u32::WORDS + u64::WORDS + Pilots::WORDS + 16 * Glance::WORDS + bool::WORDS;
 
 const EACH: [usize; 4] = [Wanted::WORDS, u32::WORDS, Coefficient::WORDS, PhotonDeposit::WORDS];
 

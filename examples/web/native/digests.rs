@@ -7,6 +7,7 @@
 use std::time::Instant;
 use std::{env, error, fs};
 
+use fogbow::bytemuck;
 use fogbow::bytes::Crc;
 use fogbow_web::{Fault, Part, View, WebCaches, WebProbes, WebWorld, Words};
 
@@ -23,7 +24,9 @@ fn digest(bytes: &[u8]) -> u64 {
 fn main() -> Result<(), Box<dyn error::Error>> {
     let said = |Fault(message)| message;
     let arguments: Vec<String> = env::args().skip(1).collect();
-    let [world, caches, picture, probes] = &arguments[..] else { return Err("digests WORLD CACHES PICTURE PROBES".into()) };
+    let [world, caches, picture, probes] = &arguments[..] else {
+        return Err("digests WORLD CACHES PICTURE PROBES".into());
+    };
     let began = Instant::now();
     let world = WebWorld::new(&words(world)?).map_err(said)?;
     let mut filled = WebCaches::new(&world, &words(caches)?).map_err(said)?;
@@ -33,10 +36,10 @@ fn main() -> Result<(), Box<dyn error::Error>> {
     let mut asked = Words::new(&words_of_picture);
     let (view, part) = (View::read(&mut asked).map_err(said)?, Part::read(&mut asked).map_err(said)?);
     let cached = filled.picture(&world, &view, &part).map_err(said)?;
-    println!("cached {:016x}", digest(fogbow::bytemuck::cast_slice(&cached)));
+    println!("cached {:016x}", digest(bytemuck::cast_slice(&cached)));
     eprintln!("{:.3} s", began.elapsed().as_secs_f64());
     let traced = world.path_trace(&view, &part).map_err(said)?;
-    println!("traced {:016x}", digest(fogbow::bytemuck::cast_slice(&traced)));
+    println!("traced {:016x}", digest(bytemuck::cast_slice(&traced)));
     let mut baked = WebProbes::new(&world, &words(probes)?).map_err(said)?;
     while baked.bake(&world, Some(&filled), 64).map_err(said)? {}
     println!("probes {:016x}", digest(&baked.save().map_err(said)?));

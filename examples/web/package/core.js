@@ -356,8 +356,8 @@ export class Probes extends Held {
     return output(Float32Array);
   }
 
-  textures() {
-    call("probes_textures", this._handle);
+  textures({ dilated = true } = {}) {
+    call("probes_textures", this._handle, dilated ? 1 : 0);
     const all = output(Float32Array);
     const each = 4 * this.counts[0] * this.counts[1] * this.counts[2];
     const numbers = (this.degree + 1) ** 2;

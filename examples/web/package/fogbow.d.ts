@@ -273,7 +273,8 @@ export class Probes {
   readonly share: number;
   /** Light at points towards directions (unit). */
   values(points: Float32Array | readonly number[], directions: Float32Array | readonly number[]): Float32Array;
-  textures(): Textures;
+  /** Unless `dilated` is false, light has spread into probes in walls: for hardware that mixes all eight around a point. */
+  textures(options?: { dilated?: boolean }): Textures;
   save(): Uint8Array;
   load(bytes: Uint8Array): void;
 }

@@ -43,7 +43,7 @@ export interface RemoteProbes extends Remote {
   bakeAnew(box: Box): Promise<unknown>;
   values(points: Float32Array | readonly number[], directions: Float32Array | readonly number[]): Promise<Float32Array>;
   /** As far as it is baked; may be asked for while it is. */
-  textures(): Promise<Textures>;
+  textures(options?: { dilated?: boolean }): Promise<Textures>;
   save(): Promise<Uint8Array>;
   load(bytes: Uint8Array): Promise<unknown>;
 }

@@ -147,8 +147,8 @@ export class RemoteProbes extends Remote {
     return this._call("values", points, directions);
   }
 
-  textures() {
-    return this._call("textures");
+  textures(options) {
+    return this._call("textures", options);
   }
 
   save() {

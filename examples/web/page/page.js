@@ -133,60 +133,75 @@ let renderer = null;
 let isDirty = true;
 let isRequested = false;
 let last = 0;
-/** Pixels of the canvas for one of the page, less where frames take long. */
-let scale = Math.min(devicePixelRatio, 1.5);
-const frames = { script: [], whole: [] };
+/** Pixels of the canvas for one of the page: as many as the device draws in time. */
+const SCALES = [0.12, Math.min(devicePixelRatio, 1.5)];
+let scale = Math.max(SCALES[0], Math.min(SCALES[1], 160 / Math.max(canvas.clientWidth, 160)));
+/** Set while the device is drawing; no frame begins before it is done, or they would queue up. */
+let fence = null;
+const frames = { script: [], drawn: [] };
 globalThis.fogbowFrames = frames;
+
+const note = (list, value) => list.push(value) > 600 && list.shift();
 
 const mode = () => Number(document.querySelector("input[name=mode]:checked").value);
 
 function redraw() {
   isDirty = true;
-  if (!isRequested && renderer) {
-    isRequested = true;
-    requestAnimationFrame(frame);
-  }
+  if (renderer) keepGoing();
 }
 
+let movedAt = -Infinity;
+/** Still pictures have more pixels than those of a walk. */
+const REST = 2.2;
+const isMoving = (now) => held.size > 0 || now - movedAt < 400;
+
 function moved() {
+  movedAt = performance.now();
+  setTimeout(redraw, 450);
   truth.restart();
   redraw();
 }
 
 function frame(now) {
   isRequested = false;
+  if (fence && !renderer.isDrawn(fence.sync)) return void keepGoing();
+  if (fence) adapt(now - fence.began, fence.isMoving);
+  fence = null;
   const began = performance.now();
-  const seconds = Math.min(0.1, (now - last) / 1000);
-  const wasWalking = now - last < 200;
-  if (walk(wasWalking ? seconds : 1 / 60)) {
-    moved();
-    if (wasWalking) adapt(seconds);
-  }
+  const wasWalking = now - last < 400;
+  if (walk(wasWalking ? Math.min(0.25, (now - last) / 1000) : 1 / 60)) moved();
   last = now;
-  if (!isDirty || element("panel-room").hidden) return;
+  if (!(isDirty || held.size) || element("panel-room").hidden) return;
   isDirty = false;
   const { clientWidth, clientHeight } = canvas;
-  const size = mode() === 0 ? [Math.round(clientWidth * scale), Math.round(clientHeight * scale)] : truth.size();
+  const own = isMoving(now) ? scale : Math.min(SCALES[1], REST * scale);
+  const size = mode() === 0 ? [Math.round(clientWidth * own), Math.round(clientHeight * own)] : truth.size();
   const [width, height] = size.map((n) => Math.max(1, n));
   if (canvas.width !== width || canvas.height !== height) [canvas.width, canvas.height] = [width, height];
   if (mode() !== 1 || truth.samples === 0) {
-    renderer.marched(width, height, camera(width / height), settings(), { steps: 24, jitter: mode() === 0 ? 1 : 0 });
+    renderer.marched(width, height, camera(width / height), settings(), { steps: 16, jitter: mode() === 0 ? 1 : 0 });
   }
   if (mode() === 2 && truth.samples > 0) truth.compare(renderer.read());
   renderer.shown(truth.samples === 0 ? 0 : mode(), truth.level);
-  frames.script.push(performance.now() - began);
-  if (frames.script.length > 600) frames.script.shift();
-  if (held.size) redraw();
+  fence = { sync: renderer.fence(), began: now, isMoving: isMoving(now) };
+  note(frames.script, performance.now() - began);
+  keepGoing();
+}
+
+function keepGoing() {
+  if (isRequested) return;
+  isRequested = true;
+  requestAnimationFrame(frame);
 }
 
 /** Fewer pixels where frames take long, more where they do not. */
-function adapt(seconds) {
-  frames.whole.push(seconds);
-  if (frames.whole.length < 12) return;
-  const mean = frames.whole.reduce((sum, s) => sum + s, 0) / frames.whole.length;
-  frames.whole.length = 0;
-  if (mean > 0.03) scale = Math.max(0.2, scale * 0.8);
-  else if (mean < 0.018) scale = Math.min(Math.min(devicePixelRatio, 1.5), scale * 1.1);
+function adapt(milliseconds, isMoving) {
+  note(frames.drawn, milliseconds);
+  if (mode() !== 0) return;
+  const before = scale;
+  if (milliseconds > (isMoving ? 45 : 250)) scale = Math.max(SCALES[0], scale * Math.max(0.5, Math.sqrt((isMoving ? 33 : 180) / milliseconds)));
+  else if (milliseconds < 22) scale = Math.min(SCALES[1], scale * 1.25);
+  if (scale > 1.1 * before) isDirty = true;
 }
 
 new ResizeObserver(() => moved()).observe(canvas);
@@ -194,7 +209,8 @@ new ResizeObserver(() => moved()).observe(canvas);
 // ---------------------------------------------------------------------------------------------
 // Baking
 
-const COUNTS = [12, 6, 18];
+/** Probes along the room: few at first, for quick light; then more. */
+const COUNTS = [[6, 3, 9], [12, 6, 18]];
 let workers = null;
 let world = null;
 let baking = null;
@@ -215,48 +231,57 @@ async function bake() {
     world = described;
     made.length = 0;
     truth.restart();
-    const usual = { counts: COUNTS, orders: "indirect", directions: 8, error: 0.03, passes: 96 };
-    const hasFog = now.density > 0 || now.smoke > 0;
-    const fog = hasFog ? await workers.probes(described, { ...usual, degree: 2 }) : null;
-    const surfaces = await workers.probes(described, { ...usual, degree: 1, quantity: "irradiance" });
-    made.push(surfaces, ...(fog ? [fog] : []));
-    const state = new Map();
-    let shownAt = 0;
     const began = performance.now();
-    const show = async (isLast) => {
-      // Whole passes only: bricks without any would be dark.
-      const all = [...state.values()];
-      if (all.length < made.length || all.some(({ passes }) => passes === 0)) return;
-      if (!isLast && performance.now() - shownAt < 250) return;
-      shownAt = performance.now();
-      const [a, b] = await Promise.all([fog?.textures(), surfaces.textures()]);
-      if (signal.aborted) return;
-      renderer.light(a, b);
-      frames.firstLight ??= performance.now();
-      redraw();
-    };
-    const run = (probes) => probes.bake({
-      signal,
-      onProgress({ done, of, error, share }) {
-        const before = state.get(probes) ?? { passes: 0, done: 0 };
-        const isWhole = done < before.done || done === of;
-        state.set(probes, { passes: before.passes + (isWhole ? 1 : 0), done, error, share });
-        tell(state, began, false);
-        if (isWhole) show(false).catch(problem);
-      },
-    });
-    const done = await Promise.all(made.map(run));
-    if (done.every(Boolean) && !signal.aborted) {
-      await show(true);
-      tell(state, began, true);
-      bakes++;
-      globalThis.fogbowBakes = bakes;
+    for (const [stage, counts] of COUNTS.entries()) {
+      const isLast = stage === COUNTS.length - 1;
+      const usual = { counts, orders: "indirect", directions: 8, error: isLast ? 0.05 : 0.2, passes: isLast ? 128 : 8 };
+      const hasFog = now.density > 0 || now.smoke > 0;
+      const fog = hasFog ? await workers.probes(described, { ...usual, degree: 2 }) : null;
+      const surfaces = await workers.probes(described, { ...usual, degree: 1, quantity: "irradiance" });
+      const both = fog ? [fog, surfaces] : [surfaces];
+      made.push(...both);
+      if (!(await refine({ signal, fog, surfaces, both, began, isLast }))) return;
     }
+    bakes++;
+    globalThis.fogbowBakes = bakes;
   } catch (error) {
     if (!signal.aborted) problem(error);
   } finally {
     for (const object of made) await object.free();
   }
+}
+
+/** Bakes both grids, and shows how far they are after each pass; whether to the end. */
+async function refine({ signal, fog, surfaces, both, began, isLast }) {
+  const state = new Map();
+  let shownAt = 0;
+  const show = async (isDone) => {
+    // Whole passes only: bricks without any would be dark. And not fewer than the coarse ones have had.
+    const all = [...state.values()];
+    if (all.length < both.length || all.some(({ passes }) => passes < (isLast ? 4 : 1))) return;
+    if (!isDone && performance.now() - shownAt < 250) return;
+    shownAt = performance.now();
+    const [a, b] = await Promise.all([fog?.textures(), surfaces.textures()]);
+    if (signal.aborted) return;
+    renderer.light(a, b);
+    frames.firstLight ??= performance.now();
+    redraw();
+  };
+  const run = (probes) => probes.bake({
+    signal,
+    onProgress({ done, of, error, share }) {
+      const before = state.get(probes) ?? { passes: 0, done: 0 };
+      const isWhole = done < before.done || done === of;
+      state.set(probes, { passes: before.passes + (isWhole ? 1 : 0), done, error, share });
+      tell(state, began, false);
+      if (isWhole) show(false).catch((error) => signal.aborted || problem(error));
+    },
+  });
+  const done = await Promise.all(both.map(run));
+  if (!done.every(Boolean) || signal.aborted) return false;
+  await show(true);
+  if (isLast) tell(state, began, true);
+  return !signal.aborted;
 }
 
 let told = 0;

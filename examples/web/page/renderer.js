@@ -107,8 +107,8 @@ float thickness(vec3 from, vec3 direction, float length) {
     vec3 near = min(a, b), far = max(a, b);
     float enter = max(max(near.x, near.y), max(near.z, 0.0)), leave = min(min(far.x, far.y), min(far.z, length));
     if (smoke > 0.0 && enter < leave) {
-        float each = (leave - enter) / 6.0;
-        for (int i = 0; i < 6; i++) {
+        float each = (leave - enter) / 4.0;
+        for (int i = 0; i < 4; i++) {
             vec3 point = from + (enter + (float(i) + 0.5) * each) * direction;
             sum += smoke * texture(smoke_map, (point - SMOKE_LOW) / SMOKE_SIZE).r * each;
         }
@@ -294,6 +294,20 @@ export class Renderer {
     gl.drawArrays(gl.TRIANGLES, 0, 3);
   }
 
+  /** To be asked later whether all that was drawn so far is there. */
+  fence() {
+    const sync = this.gl.fenceSync(this.gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
+    this.gl.flush();
+    return sync;
+  }
+
+  isDrawn(sync) {
+    const { gl } = this;
+    if (gl.getSyncParameter(sync, gl.SYNC_STATUS) !== gl.SIGNALED) return false;
+    gl.deleteSync(sync);
+    return true;
+  }
+
   /** The light of the marched picture, from the lower left: four floats a pixel. */
   read() {
     const { gl } = this;
@@ -316,7 +330,7 @@ export class Renderer {
       gl.bindTexture(gl.TEXTURE_2D, texture);
       gl.uniform1i(places[name], unit);
     });
-    gl.uniform1f(places.exposure, 1.6);
+    gl.uniform1f(places.exposure, 2.2);
     gl.uniform1f(places.level, level);
     gl.uniform1i(places.mode, mode);
     gl.drawArrays(gl.TRIANGLES, 0, 3);

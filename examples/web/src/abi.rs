@@ -1,6 +1,9 @@
 //! What JavaScript calls. Numbers go in as arguments, all else through one buffer; what comes back lies in another. A function that fails
 //! answers [`FAILED`] and leaves a message. Objects are named by handles, which JavaScript gives back.
-#![expect(unsafe_code, reason = "names of exports, and state that is shared by calls of which there is never more than one at a time")]
+#![expect(
+    unsafe_code,
+    reason = "names of exports, and state that is shared by calls of which there is never more than one at a time"
+)]
 
 use alloc::string::String;
 use alloc::vec::Vec;
@@ -31,7 +34,7 @@ struct State {
     worlds: Objects<WebWorld>,
     caches: Objects<WebCaches>,
     probes: Objects<WebProbes>,
-    /// Words for the aligment; bytes are written into them, too.
+    /// Words for the alignment; bytes are written into them, too.
     input: Vec<u32>,
     output: Vec<u32>,
     output_bytes: usize,
@@ -385,9 +388,9 @@ exports! {
         Ok(0)
     }
 
-    /// 3D textures: four floats for each probe, number after number, then the medium.
-    probes_textures(handle) -> state {
-        let textures = state.probes.get(handle)?.textures()?;
+    /// 3D textures: four floats for each probe, number after number, then the medium. Light spreads into invalid probes unless the last is 0.
+    probes_textures(handle, is_dilated) -> state {
+        let textures = state.probes.get(handle)?.textures(is_dilated != 0)?;
         state.words(bytemuck::cast_slice(&textures));
         Ok(0)
     }

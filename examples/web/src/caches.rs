@@ -92,7 +92,11 @@ impl WebCaches {
             settings.rays = rays;
         }
         let filling = RadianceCaches::new(settings).fill(asked);
-        Ok(Self { state: State::Filling(Box::new(FillingBox(filling))), output: FilledRecords::default(), tag: world.tag() })
+        Ok(Self {
+            state: State::Filling(Box::new(FillingBox(filling))),
+            output: FilledRecords::default(),
+            tag: world.tag(),
+        })
     }
 
     /// Goes on for another view or box; what is there stays.

@@ -27,7 +27,8 @@ fn single(world: &CoreWorld<'_>, words: &mut Words<'_>) -> Result<(Vec3, Sums), 
     let phase = world.medium.properties(point).phase;
     let settings = single_scatter::Settings { samples: SAMPLES, steps: Steps::Length(STEP) };
     // The same random numbers everywhere: what differs from point to point is light and not chance.
-    let sums = single_scatter::sample(point, &Towards { to_eye, phase: &phase }, world, &settings, &mut Generator::new(1));
+    let sums =
+        single_scatter::sample(point, &Towards { to_eye, phase: &phase }, world, &settings, &mut Generator::new(1));
     Ok((point, sums))
 }
 
@@ -53,7 +54,8 @@ pub(crate) fn record(world: &WebWorld, words: &[u32]) -> Result<Record, Fault> {
 pub(crate) fn covariances(world: &WebWorld, words: &[u32]) -> Result<Vec<u32>, Fault> {
     let mut words = Words::new(words);
     let (edge, photons) = (words.integer()?, words.integer()?);
-    let settings = covariance::Settings { edge, photons: u64::from(photons), ..covariance::Settings::new(world.bounds()) };
+    let settings =
+        covariance::Settings { edge, photons: u64::from(photons), ..covariance::Settings::new(world.bounds()) };
     let mut fill = Fill::new(settings)?;
     world.with(|world| work::finish(&mut fill, world, &mut GridOutput::default()));
     let grid = fill.finish();

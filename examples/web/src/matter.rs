@@ -5,7 +5,9 @@ use alloc::vec::Vec;
 
 use fogbow::host::{Face, Gradients, MajorantSegment, Medium, Properties};
 use fogbow::math::{Affine3, Bounds, Ray, Vec3};
-use fogbow::medium::{Density, DensityGrid, FractalNoise, Homogeneous, MediumError, MinMax, Noise, Overlap, Placed, Region};
+use fogbow::medium::{
+    Density, DensityGrid, FractalNoise, Homogeneous, MediumError, MinMax, Noise, Overlap, Placed, Region,
+};
 use fogbow::phase::{Lobe, Phase};
 use fogbow::spectrum::{Gradient, Hessian, Spectrum};
 use self_cell::{MutBorrow, self_cell};

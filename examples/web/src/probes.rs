@@ -2,7 +2,9 @@
 
 use alloc::vec::Vec;
 
-use fogbow::bake::{Bake, BakeMemory, BakeSettings, BakedProbes, Orders, ProbeBasis, ProbeGrid, ProbeState, Quantity, bytes};
+use fogbow::bake::{
+    Bake, BakeMemory, BakeSettings, BakedProbes, Orders, ProbeBasis, ProbeGrid, ProbeState, Quantity, bytes,
+};
 use fogbow::math::Bounds;
 use fogbow::spectrum::Spectrum;
 use fogbow::work::{self, Rounds};
@@ -66,7 +68,11 @@ impl WebProbes {
     }
 
     /// Does something with the bake, which goes on from the grid.
-    fn with_bake<T>(&mut self, caches: Option<&WebCaches>, work: impl FnOnce(&mut Bake<'static, '_>, &mut BakedProbes<'static>) -> T) -> Result<T, Fault> {
+    fn with_bake<T>(
+        &mut self,
+        caches: Option<&WebCaches>,
+        work: impl FnOnce(&mut Bake<'static, '_>, &mut BakedProbes<'static>) -> T,
+    ) -> Result<T, Fault> {
         let grid = self.grid.take().ok_or_else(|| Fault::new("there are no probes"))?;
         let mut bake = Bake::resume(grid, self.settings)?;
         if let Some(caches) = caches.and_then(WebCaches::caches) {
@@ -155,21 +161,23 @@ impl WebProbes {
     }
 
     /// The numbers of all probes, number after number, each four floats: red, green, blue, and 1 where the probe is valid, else 0. Then the
-    /// medium: albedo, and extinction (m⁻¹; mean of the channels). As 3D textures have them. Invalid probes have light that spread there.
+    /// medium: albedo, and extinction (m⁻¹; mean of the channels). As 3D textures have them. If `is_dilated`, light has spread into invalid probes.
     ///
     /// # Errors
     /// No memory.
-    pub fn textures(&self) -> Result<Vec<f32>, Fault> {
+    pub fn textures(&self, is_dilated: bool) -> Result<Vec<f32>, Fault> {
         let grid = self.grid()?;
-        let copy = bytes::read(&self.save()?, self.tag, BakeMemory::default())?;
-        let mut dilated = copy;
-        dilated.dilate();
+        // The bake goes on with what it has found itself.
+        let mut copy = bytes::read(&self.save()?, self.tag, BakeMemory::default())?;
+        if is_dilated {
+            copy.dilate();
+        }
         let (cells, numbers) = (grid.lattice().cell_count(), grid.basis().count());
         let mut all = Vec::with_capacity(4 * cells * (numbers + 1));
         for number in 0..numbers {
             for (cell, probe) in grid.probes().iter().enumerate() {
                 let is_valid = probe.state() == ProbeState::Valid;
-                all.extend_from_slice(&dilated.held(cell)[number].0);
+                all.extend_from_slice(&copy.held(cell)[number].0);
                 all.push(f32::from(u8::from(is_valid)));
             }
         }

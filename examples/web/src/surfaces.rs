@@ -13,10 +13,21 @@ use super::words::{Fault, Words};
 /// Where light meets it.
 #[derive(Debug, Clone, Copy)]
 enum Shape {
-    Triangle { corner: Vec3, edges: [Vec3; 2], normal: Vec3 },
+    Triangle {
+        corner: Vec3,
+        edges: [Vec3; 2],
+        normal: Vec3,
+    },
     /// A parallelogram.
-    Quad { corner: Vec3, edges: [Vec3; 2], normal: Vec3 },
-    Sphere { centre: Vec3, radius: f32 },
+    Quad {
+        corner: Vec3,
+        edges: [Vec3; 2],
+        normal: Vec3,
+    },
+    Sphere {
+        centre: Vec3,
+        radius: f32,
+    },
 }
 
 /// What a surface does to light, and whether on both sides.
@@ -167,7 +178,8 @@ fn passes(bounds: &Bounds, ray: &Ray, inverse: Vec3, length: f32) -> bool {
 /// Builds the tree over a slice of primitives that starts at number `first`: in halves along the longest axis.
 fn divide(primitives: &mut [Primitive], first: u32, nodes: &mut Vec<Node>) {
     let bounds = primitives.iter().fold(Bounds::EMPTY, |all, one| all.union(one.shape.bounds()));
-    let margin = 1e-5 * bounds.size().max_element().max(bounds.min.abs().max_element()).max(bounds.max.abs().max_element());
+    let margin =
+        1e-5 * bounds.size().max_element().max(bounds.min.abs().max_element()).max(bounds.max.abs().max_element());
     let bounds = Bounds { min: bounds.min - margin, max: bounds.max + margin };
     let at = nodes.len();
     nodes.push(Node { bounds, first, count: primitives.len() as u32, other: 0 });
@@ -279,7 +291,11 @@ impl Scene for Surfaces {
                 && primitive.shape.meet(ray, length) == Some(hit.distance)
             {
                 // Seen from inside it is hollow.
-                let side = if hit.normal.dot(ray.at(hit.distance) - primitive.shape.bounds().centre()) < 0.0 { -1.0 } else { 1.0 };
+                let side = if hit.normal.dot(ray.at(hit.distance) - primitive.shape.bounds().centre()) < 0.0 {
+                    -1.0
+                } else {
+                    1.0
+                };
                 let (u, v) = hit.normal.any_orthonormal_pair();
                 curvature = Symmetric3::embedded(&Symmetric2::diagonal(side / radius, side / radius), u, v);
             }
@@ -299,12 +315,16 @@ fn material(words: &mut Words<'_>) -> Result<Material, Fault> {
     let (kind, sides) = (words.integer()?, words.integer()?);
     let (first, second, number) = (words.colour()?, words.colour()?, words.float()?);
     let is_share = |colour: Spectrum| colour.0.iter().all(|c| (0.0..=1.0).contains(c));
-    if !(is_share(first) && is_share(second) && is_share(first + second) || kind == DIELECTRIC && is_share(first) && is_share(second)) {
+    if !(is_share(first) && is_share(second) && is_share(first + second)
+        || kind == DIELECTRIC && is_share(first) && is_share(second))
+    {
         return Err(Fault::new("reflectances must lie in [0, 1], and their sum, too"));
     }
     let surface = match kind {
         LAMBERT => Surface::Lambert { reflectance: first },
-        PHONG if number >= 0.0 && number.is_finite() => Surface::Phong { diffuse: first, specular: second, exponent: number },
+        PHONG if number >= 0.0 && number.is_finite() => {
+            Surface::Phong { diffuse: first, specular: second, exponent: number }
+        }
         PHONG => return Err(Fault::new("a Phong exponent must be finite and not negative")),
         MIRROR => Surface::Mirror { reflectance: first },
         DIELECTRIC if number > 0.0 && number.is_finite() => {
@@ -318,9 +338,9 @@ fn material(words: &mut Words<'_>) -> Result<Material, Fault> {
 }
 
 fn painted(shape: Shape, materials: &[Material], material: u32) -> Result<Primitive, Fault> {
-    let material = materials.get(material as usize).ok_or_else(|| {
-        Fault(alloc::format!("material {material} is none of {}", materials.len()))
-    })?;
+    let material = materials
+        .get(material as usize)
+        .ok_or_else(|| Fault(alloc::format!("material {material} is none of {}", materials.len())))?;
     Ok(Primitive { shape, material: *material, light: None })
 }
 

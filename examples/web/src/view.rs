@@ -32,7 +32,9 @@ impl View {
         let (eye, target, upward) = (words.vector()?, words.vector()?, words.vector()?);
         let fov = words.float()?;
         let size = [words.integer()?, words.integer()?];
-        let none = || Fault::new("a view needs an eye, a target away from it, and a direction up that is not the one of sight");
+        let none = || {
+            Fault::new("a view needs an eye, a target away from it, and a direction up that is not the one of sight")
+        };
         let forward = (target - eye).try_normalize().filter(|_| eye.is_finite()).ok_or_else(none)?;
         let right = forward.cross(upward).try_normalize().ok_or_else(none)?;
         if !(fov > 0.0 && fov < core::f32::consts::PI) {
@@ -96,7 +98,11 @@ impl Part {
     }
 
     /// Means of samples, pixel after pixel. What a sample is depends on its pixel and number alone, so pictures may be taken in parts.
-    pub(crate) fn picture(&self, view: &View, sample: impl Fn(&Ray, &mut Generator) -> Spectrum) -> Result<Vec<Spectrum>, Fault> {
+    pub(crate) fn picture(
+        &self,
+        view: &View,
+        sample: impl Fn(&Ray, &mut Generator) -> Spectrum,
+    ) -> Result<Vec<Spectrum>, Fault> {
         let [width, height] = self.size;
         let of_pixel = |number: u32| {
             let (x, y) = (self.origin[0] + number % width, self.origin[1] + number / width);
@@ -138,7 +144,12 @@ impl<'a> Rays<'a> {
         }
     }
 
-    pub(crate) fn radiance(&self, samples: u32, seed: u64, sample: impl Fn(&Ray, &mut Generator) -> Spectrum) -> Vec<Spectrum> {
+    pub(crate) fn radiance(
+        &self,
+        samples: u32,
+        seed: u64,
+        sample: impl Fn(&Ray, &mut Generator) -> Spectrum,
+    ) -> Vec<Spectrum> {
         let of = |(number, ray): (usize, &[u32; 7])| {
             let mut sum = Spectrum::ZERO;
             for index in 0..samples.max(1) {

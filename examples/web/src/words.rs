@@ -51,7 +51,8 @@ impl<'a> Words<'a> {
     /// # Errors
     /// Fewer are left.
     pub fn take(&mut self, count: usize) -> Result<&'a [u32], Fault> {
-        let (taken, rest) = self.0.split_at_checked(count).ok_or_else(|| Fault::new("the description ends too soon"))?;
+        let (taken, rest) =
+            self.0.split_at_checked(count).ok_or_else(|| Fault::new("the description ends too soon"))?;
         self.0 = rest;
         Ok(taken)
     }

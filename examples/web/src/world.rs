@@ -1,6 +1,7 @@
 //! A world, from words.
 
 use alloc::vec::Vec;
+use core::cell::OnceCell;
 
 use fogbow::bytes::Crc;
 use fogbow::light::{Light, LightTree, Lights, PointLight, QuadLight, SphereLight, SpotLight, Sun};
@@ -33,6 +34,8 @@ pub struct WebWorld {
     tree: Option<LightTree<'static>>,
     bounds: Bounds,
     tag: u64,
+    /// Known once somebody has asked: looking takes some milliseconds.
+    outline: OnceCell<Outline>,
 }
 
 impl WebWorld {
@@ -68,7 +71,7 @@ impl WebWorld {
         } else {
             None
         };
-        Ok(Self { media, surfaces, lights, tree, bounds, tag: crc.value() })
+        Ok(Self { media, surfaces, lights, tree, bounds, tag: crc.value(), outline: OnceCell::new() })
     }
 
     /// The box around what matters.
@@ -96,7 +99,7 @@ impl WebWorld {
     /// What methods must know of it beforehand.
     #[must_use]
     pub fn outline(&self) -> Outline {
-        self.with(|world| Outline::of(world, self.bounds))
+        *self.outline.get_or_init(|| self.with(|world| Outline::of(world, self.bounds)))
     }
 
     /// Path-traced radiance (W·m⁻²·sr⁻¹) of the pixels of a part of a picture: means over samples, of which the first has number `first`.

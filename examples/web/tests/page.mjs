@@ -1,0 +1,158 @@
+// The page in a real browser: node page.mjs FOLDER-OF-PAGE [--full] [--pictures FOLDER]
+//
+// Loads, bakes, walks by keyboard, moves sliders, shows truth, difference and mathematics, without an error in the console or a request to elsewhere; axe
+// finds nothing. With --full also on a phone's width and in the dark, with 50 bakes, and pictures for looking at.
+
+import { readFile } from "node:fs/promises";
+import { createRequire } from "node:module";
+import { join } from "node:path";
+import { browse, serve, watched } from "./browser.mjs";
+
+const [folder, ...options] = process.argv.slice(2);
+const isFull = options.includes("--full");
+const pictures = options.includes("--pictures") ? options[options.indexOf("--pictures") + 1] : null;
+const axe = await readFile(createRequire(import.meta.url).resolve("axe-core/axe.min.js"), "utf8");
+
+const failures = [];
+const check = (name, holds, told = "") => {
+  console.log(`${holds ? "ok " : "OFF"} ${name}${told === "" ? "" : `: ${told}`}`);
+  if (!holds) failures.push(name);
+};
+
+const picture = (page, name) => pictures && page.screenshot({ path: join(pictures, `${name}.png`), timeout: 120_000 });
+
+async function accessible(page, name) {
+  await page.evaluate(axe);
+  const { violations } = await page.evaluate(() => globalThis.axe.run());
+  check(`axe: ${name}`, violations.length === 0, violations.map(({ id, nodes }) => `${id} ${nodes[0].html}`).join("; "));
+}
+
+/** Waits for something to be so, without counting on frames, which are slow here. */
+async function until(page, name, condition, argument) {
+  const began = Date.now();
+  for (;;) {
+    if (await page.evaluate(condition, argument)) return check(name, true, `${((Date.now() - began) / 1000).toFixed(1)} s`);
+    if (Date.now() - began > 120_000) return check(name, false, "after 120 s");
+    await page.waitForTimeout(100);
+  }
+}
+
+const text = (page, id) => page.evaluate((id) => document.getElementById(id).textContent, id);
+
+const site = await serve(folder);
+await browse(async (browser) => {
+  const { page, wrong } = await watched(browser, site.url);
+  await page.goto(site.url);
+  await until(page, "first light", () => fogbowFrames.firstLight > 0);
+  console.log(`    first light ${((await page.evaluate(() => fogbowFrames.firstLight)) / 1000).toFixed(2)} s after the page began`);
+  await until(page, "an error is told", () => /noise [\d.]+ %/.test(document.getElementById("baked").textContent));
+
+  // What is seen is no even colour.
+  const spread = () => page.evaluate(() => {
+    const canvas = document.getElementById("room");
+    const small = new OffscreenCanvas(32, 20);
+    const context = small.getContext("2d");
+    context.drawImage(canvas, 0, 0, 32, 20);
+    const { data } = context.getImageData(0, 0, 32, 20);
+    const light = Array.from({ length: 640 }, (_, i) => data[4 * i] + data[4 * i + 1] + data[4 * i + 2]);
+    const mean = light.reduce((a, b) => a + b, 0) / 640;
+    return { mean, deviation: Math.sqrt(light.reduce((a, b) => a + (b - mean) ** 2, 0) / 640), light };
+  });
+  const before = await spread();
+  check("the room is seen", before.mean > 20 && before.deviation > 15, `mean ${before.mean.toFixed(0)}, deviation ${before.deviation.toFixed(0)}`);
+
+  // By keyboard alone: from the top of the page to the room, and ahead.
+  for (let i = 0; i < 3; i++) {
+    await page.keyboard.press("Tab");
+    if (await page.evaluate(() => document.activeElement.id === "room")) break;
+  }
+  check("the room has the focus", await page.evaluate(() => document.activeElement.id === "room"));
+  await page.keyboard.down("ArrowUp");
+  await page.waitForTimeout(700);
+  await page.keyboard.up("ArrowUp");
+  await page.waitForTimeout(900);
+  const after = await spread();
+  const moved = after.light.reduce((sum, light, i) => sum + Math.abs(light - before.light[i]), 0) / 640;
+  check("walking changes the picture", moved > 4, moved.toFixed(1));
+  const script = await page.evaluate(() => [...fogbowFrames.script].sort((a, b) => a - b));
+  const median = script[Math.floor(script.length / 2)];
+  check("the script of a frame takes at most 4 ms", median <= 4, `median ${median.toFixed(2)} ms of ${script.length} frames`);
+
+  const slide = (id, value) => page.evaluate(([id, value]) => {
+    const slider = document.getElementById(id);
+    slider.value = value;
+    slider.dispatchEvent(new Event("input", { bubbles: true }));
+  }, [id, value]);
+  await slide("density", "0.3");
+  await slide("lamp-x", "4.9");
+  await until(page, "a slider begins another bake", () => {
+    const [, seconds] = /, ([\d.]+) s/.exec(document.getElementById("baked").textContent) ?? [];
+    return Number(seconds) < 2;
+  });
+  await picture(page, "desktop");
+  await accessible(page, "the room");
+
+  await page.getByLabel("Path-traced truth").check();
+  await until(page, "the truth is traced", (least) => fogbowTruth.samples >= least, isFull ? 64 : 2);
+  await picture(page, "truth");
+  await page.getByLabel("Difference").check();
+  await until(page, "the difference is told", () => /(brighter|darker) on the whole/.test(document.getElementById("compared").textContent));
+  console.log(`    ${await text(page, "compared")}`);
+  if (isFull) {
+    await until(page, "the difference of many samples", () => fogbowTruth.samples >= 64);
+    await page.waitForTimeout(1000);
+    console.log(`    ${await text(page, "compared")}; ${await text(page, "baked")}`);
+    const off = await page.evaluate(() => fogbowTruth.off);
+    check("baked light is near the truth", Math.abs(off) < 0.15, `${(100 * off).toFixed(1)} %`);
+  }
+  await picture(page, "difference");
+  await page.getByLabel("Baked light").check();
+
+  await page.getByRole("tab", { name: "The mathematics" }).click();
+  await until(page, "a record, covariances and a virtual light", () =>
+    ["record-values", "covariance-values", "virtual-values"].every((id) => /\d/.test(document.getElementById(id).textContent)));
+  const record = await text(page, "record-values");
+  await page.focus("#record");
+  for (let i = 0; i < 5; i++) await page.keyboard.press("ArrowLeft");
+  check("the record moves", (await text(page, "record-values")) !== record, await text(page, "record-values"));
+  await picture(page, "mathematics");
+  await accessible(page, "the mathematics");
+
+  if (isFull) {
+    await page.getByRole("tab", { name: "The room" }).click();
+    const session = await browser.newCDPSession(page);
+    const heap = async () => {
+      await session.send("HeapProfiler.collectGarbage");
+      const { usedSize } = await session.send("Runtime.getHeapUsage");
+      return usedSize / 1e6;
+    };
+    const heaps = [];
+    for (let i = 0; i < 50; i++) {
+      await slide("lamp-z", String(1 + (i % 8)));
+      await page.waitForTimeout(600);
+      if (i === 9 || i === 49) heaps.push(await heap());
+    }
+    check("the heap is flat over 40 bakes after the first ten", heaps[1] < 1.1 * heaps[0] + 1, heaps.map((mb) => `${mb.toFixed(1)} MB`).join(" → "));
+  }
+  check("no errors, no requests to elsewhere", wrong.length === 0, wrong.join("; "));
+});
+
+for (const [name, options] of isFull ? [["phone", { viewport: { width: 375, height: 760 }, hasTouch: true, isMobile: true }], ["dark", { colorScheme: "dark" }]] : []) {
+  await browse(async (browser) => {
+    const { page, wrong } = await watched(browser, site.url);
+    await page.goto(site.url);
+    await until(page, `${name}: first light`, () => fogbowFrames.firstLight > 0);
+    await page.waitForTimeout(3000);
+    const wide = await page.evaluate(() => document.documentElement.scrollWidth - innerWidth);
+    check(`${name}: nothing sticks out`, wide <= 0, `${wide} px`);
+    await picture(page, name);
+    await accessible(page, name);
+    await page.getByRole("tab", { name: "The mathematics" }).click();
+    await until(page, `${name}: mathematics`, () => /\d/.test(document.getElementById("virtual-values").textContent));
+    await picture(page, `${name}-mathematics`);
+    await accessible(page, `${name}, mathematics`);
+    check(`${name}: no errors, no requests to elsewhere`, wrong.length === 0, wrong.join("; "));
+  }, options);
+}
+site.close();
+process.exit(failures.length ? 1 : 0);

@@ -1,0 +1,177 @@
+// fog.glsl in a browser against the core: node shader.mjs FOLDER-OF-PAGE
+//
+// 100 000 random points and directions, and as many rays: in-scattered light, the medium, and fog marched, from probes of a room with a block in it (so that some
+// probes are not valid), of degree 2. The core's answers come from the package in the same page.
+
+import { browse, serve, watched } from "./browser.mjs";
+
+const [folder] = process.argv.slice(2);
+const site = await serve(folder);
+let failed = false;
+
+await browse(async (browser) => {
+  const { page, wrong } = await watched(browser, site.url);
+  // Anything of the same origin that runs no script.
+  await page.goto(`${site.url}page.css`);
+  const found = await page.evaluate(async () => {
+    const { Light, Medium, Probes, Scene, World, init } = await import("/fogbow/fogbow.js");
+    await init();
+    const box = [[0, 0, 0], [4, 3, 5]];
+    const world = new World({
+      media: [Medium.noise({ scattering: [0.5, 0.4, 0.3], absorption: 0.1, g: 0.4, frequency: 0.6, box })],
+      scene: new Scene().room(box, { reflectance: 0.6 }).block([[1.2, 0, 1.5], [2.9, 1.6, 3.2]], { reflectance: [0.6, 0.3, 0.2] }),
+      lights: [Light.sphere({ centre: [3, 2.5, 1], radius: 0.15, radiance: 100 })],
+    });
+    const probes = new Probes(world, { box, counts: [7, 6, 9], degree: 2, error: 0.5, passes: 8 });
+    while (probes.bake());
+    const { harmonics, medium, counts } = probes.textures({ dilated: false });
+    const invalid = harmonics[0].filter((v, i) => i % 4 === 3 && v === 0).length;
+
+    const [W, H] = [400, 250];
+    let state = 1;
+    const random = () => {
+      state = (Math.imul(state, 1664525) + 1013904223) >>> 0;
+      return state / 2 ** 32;
+    };
+    const points = new Float32Array(4 * W * H);
+    const directions = new Float32Array(4 * W * H);
+    for (let i = 0; i < points.length; i += 4) {
+      points.set([4.4 * random() - 0.2, 3.4 * random() - 0.2, 5.4 * random() - 0.2, 6 * random()], i);
+      const [z, a] = [2 * random() - 1, 2 * Math.PI * random()];
+      const r = Math.sqrt(1 - z * z);
+      directions.set([r * Math.cos(a), r * Math.sin(a), z, 0], i);
+    }
+
+    const gl = new OffscreenCanvas(W, H).getContext("webgl2");
+    gl.getExtension("EXT_color_buffer_float");
+    const fog = await (await fetch("/fog.glsl")).text();
+    const draw = (body) => {
+      const program = gl.createProgram();
+      const sources = [
+        [gl.VERTEX_SHADER, "#version 300 es\nvoid main() { gl_Position = vec4(vec2(gl_VertexID & 1, gl_VertexID >> 1) * 4.0 - 1.0, 0.0, 1.0); }"],
+        [gl.FRAGMENT_SHADER, `#version 300 es\nprecision highp float;\nprecision highp int;\nprecision highp sampler3D;\n${fog}
+uniform highp sampler2D points, directions;
+out vec4 colour;
+void main() {
+    vec4 point = texelFetch(points, ivec2(gl_FragCoord.xy), 0);
+    vec3 direction = texelFetch(directions, ivec2(gl_FragCoord.xy), 0).xyz;
+    colour = ${body};
+}`],
+      ];
+      for (const [kind, source] of sources) {
+        const shader = gl.createShader(kind);
+        gl.shaderSource(shader, source);
+        gl.compileShader(shader);
+        if (!gl.getShaderParameter(shader, gl.COMPILE_STATUS)) throw new Error(gl.getShaderInfoLog(shader));
+        gl.attachShader(program, shader);
+      }
+      gl.linkProgram(program);
+      gl.useProgram(program);
+      let unit = 0;
+      const bind = (kind, name, upload) => {
+        const place = gl.getUniformLocation(program, name);
+        if (!place) return;
+        gl.activeTexture(gl.TEXTURE0 + unit);
+        gl.bindTexture(kind, gl.createTexture());
+        upload();
+        for (const filter of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER]) gl.texParameteri(kind, filter, gl.NEAREST);
+        gl.uniform1i(place, unit++);
+      };
+      const flat = (data) => () => gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA32F, W, H, 0, gl.RGBA, gl.FLOAT, data);
+      const deep = (data) => () => gl.texImage3D(gl.TEXTURE_3D, 0, gl.RGBA32F, ...counts, 0, gl.RGBA, gl.FLOAT, data);
+      bind(gl.TEXTURE_2D, "points", flat(points));
+      bind(gl.TEXTURE_2D, "directions", flat(directions));
+      harmonics.forEach((data, i) => bind(gl.TEXTURE_3D, `sh${i}`, deep(data)));
+      bind(gl.TEXTURE_3D, "medium", deep(medium));
+      gl.uniform3f(gl.getUniformLocation(program, "probes_corner"), ...box[0]);
+      gl.uniform3f(gl.getUniformLocation(program, "probes_size"), ...box[1]);
+      gl.uniform1f(gl.getUniformLocation(program, "probes_scale"), 1);
+      gl.uniform1i(gl.getUniformLocation(program, "probes_numbers"), 9);
+      gl.activeTexture(gl.TEXTURE15);
+      const target = gl.createTexture();
+      gl.bindTexture(gl.TEXTURE_2D, target);
+      flat(null)();
+      gl.bindFramebuffer(gl.FRAMEBUFFER, gl.createFramebuffer());
+      gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, target, 0);
+      gl.viewport(0, 0, W, H);
+      gl.drawArrays(gl.TRIANGLES, 0, 3);
+      const light = new Float32Array(4 * W * H);
+      gl.readPixels(0, 0, W, H, gl.RGBA, gl.FLOAT, light);
+      return light;
+    };
+
+    const three = (all) => all.filter((_, i) => i % 4 < 3);
+    const level = (all) => all.reduce((a, b) => a + b, 0) / all.length;
+    // Once by the core.
+    const due = probes.values(three(points), three(directions));
+    const got = three(draw("vec4(in_scattered(point.xyz, direction), 1.0)"));
+    const mean = level(due);
+    let worst = 0;
+    due.forEach((d, i) => { worst = Math.max(worst, Math.abs(d - got[i]) / Math.max(mean, d)); });
+
+    // The medium, mixed here.
+    const at = (point, c) => {
+      const places = counts.map((n, i) => Math.min(Math.max((point[i] / box[1][i]) * n - 0.5, 0), n - 1));
+      let sum = 0;
+      for (let corner = 0; corner < 8; corner++) {
+        let [weight, index, stride] = [1, 0, 1];
+        for (let i = 0; i < 3; i++) {
+          const low = Math.min(Math.floor(places[i]), Math.max(counts[i] - 2, 0));
+          const share = places[i] - low;
+          const isHigh = (corner >> i) & 1;
+          weight *= isHigh ? share : 1 - share;
+          index += Math.min(low + isHigh, counts[i] - 1) * stride;
+          stride *= counts[i];
+        }
+        sum += weight * medium[4 * index + c];
+      }
+      return sum;
+    };
+    const matter = draw("matter(point.xyz)");
+    let worstMatter = 0;
+    for (let i = 0; i < points.length; i += 4) {
+      for (let c = 0; c < 4; c++) worstMatter = Math.max(worstMatter, Math.abs(matter[i + c] - at(points.subarray(i, i + 3), c)));
+    }
+
+    // Fog along rays of eight steps, for some of them: light at each step from the core.
+    const STEPS = 8;
+    const marched = draw(`fog(point.xyz, direction, point.w, ${STEPS})`);
+    let [worstFog, rays] = [0, 0];
+    for (let i = 0; i < points.length; i += 4 * 50) {
+      const [eye, direction, depth] = [points.subarray(i, i + 3), directions.subarray(i, i + 3), points[i + 3]];
+      let [begin, end] = [0, depth];
+      for (let k = 0; k < 3; k++) {
+        const sides = [(box[0][k] - eye[k]) / direction[k], (box[1][k] - eye[k]) / direction[k]];
+        begin = Math.max(begin, Math.min(...sides));
+        end = Math.min(end, Math.max(...sides));
+      }
+      const [light, each] = [[0, 0, 0], (end - begin) / STEPS];
+      let through = 1;
+      for (let s = 0; s < STEPS && end > begin; s++) {
+        const point = Array.from(eye, (e, k) => e + (begin + (s + 0.5) * each) * direction[k]);
+        const seen = probes.values(point, Array.from(direction, (d) => -d));
+        const passed = Math.exp(-at(point, 3) * each);
+        for (let c = 0; c < 3; c++) light[c] += through * (1 - passed) * at(point, c) * seen[c];
+        through *= passed;
+      }
+      [...light, through].forEach((d, c) => { worstFog = Math.max(worstFog, Math.abs(d - marched[i + c]) / Math.max(c < 3 ? mean : 1, d)); });
+      rays++;
+    }
+    return { invalid, mean, worst, worstMatter, worstFog, rays, error: gl.getError() };
+  });
+  console.log(JSON.stringify(found), wrong.join("; "));
+  const checks = [
+    ["some probes are not valid", found.invalid > 5],
+    // Single precision, sums of some ten numbers: a few parts in a million.
+    ["in-scattered light is the core's", found.mean > 0 && found.worst < 2e-5],
+    ["the medium is what it is", found.worstMatter < 1e-5],
+    ["fog is marched as by the core", found.rays > 1000 && found.worstFog < 5e-5],
+    ["no errors", found.error === 0 && wrong.length === 0],
+  ];
+  for (const [name, holds] of checks) {
+    console.log(`${holds ? "ok " : "OFF"} ${name}`);
+    failed ||= !holds;
+  }
+});
+site.close();
+process.exit(failed ? 1 : 0);
