@@ -271,7 +271,7 @@ impl Scene for Surfaces {
         if material.is_two_sided && normal.dot(ray.direction) > 0.0 {
             normal = -normal;
         }
-        Some(Hit { distance, normal, surface: material.surface, light })
+        Some(Hit { distance, normal, shading: normal, surface: material.surface, light })
     }
 
     fn is_blocked(&self, ray: &Ray) -> bool {
