@@ -35,16 +35,21 @@ impl Transform {
     /// without length.
     #[must_use]
     pub fn rotation(axis: [f64; 3], degrees: f64) -> Option<Self> {
-        let [x, y, z] = normalized(axis)?;
+        Some(Self::rotation_about(normalized(axis)?, degrees))
+    }
+
+    /// The same by Rodrigues' formula alone, with the axis as it stands: one that is not of length 1 scales and shears too.
+    #[must_use]
+    pub fn rotation_about([x, y, z]: [f64; 3], degrees: f64) -> Self {
         let (s, c) = degrees.to_radians().sin_cos();
         let k = 1.0 - c;
-        Some(Self {
+        Self {
             rows: [
                 [x * x * k + c, x * y * k - z * s, x * z * k + y * s, 0.0],
                 [x * y * k + z * s, y * y * k + c, y * z * k - x * s, 0.0],
                 [x * z * k - y * s, y * z * k + x * s, z * z * k + c, 0.0],
             ],
-        })
+        }
     }
 
     /// Local +z looks from `origin` to `target`, local +y is up, local +x is left. `None` where
@@ -201,6 +206,16 @@ mod tests {
     fn rotation_is_counter_clockwise() {
         let r = Transform::rotation([0.0, 1.0, 0.0], 90.0).unwrap();
         assert!(close(r.point([0.0, 0.0, 1.0]), [1.0, 0.0, 0.0]));
+    }
+
+    /// `mi.ScalarTransform4f().rotate` of Mitsuba 3.9.1.
+    #[test]
+    fn axes_of_other_lengths_shear_as_in_mitsuba() {
+        let t = Transform::rotation_about([1.0, 1.0, 0.0], 90.0);
+        assert!(close(t.column(0), [1.0, 1.0, -1.0]) && close(t.column(1), [1.0, 1.0, 1.0]));
+        assert!(close(t.column(2), [1.0, -1.0, 0.0]));
+        let t = Transform::rotation_about([0.0, 2.0, 0.0], 90.0);
+        assert!(close(t.column(0), [0.0, 0.0, -2.0]) && close(t.column(1), [0.0, 4.0, 0.0]));
     }
 
     #[test]

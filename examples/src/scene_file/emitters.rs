@@ -57,7 +57,7 @@ pub(super) fn read(element: &Element<'_>) -> Result<Emitter, SceneError> {
 }
 
 fn strength(plugin: &Plugin<'_>, name: &str) -> Result<Spectrum, SceneError> {
-    Ok(plugin.colour(name)?.map_or(Spectrum::ONE, |(value, _)| value))
+    Ok(plugin.emission(name)?.map_or(Spectrum::ONE, |(value, _)| value))
 }
 
 fn environment(plugin: &Plugin<'_>) -> Result<Emitter, SceneError> {

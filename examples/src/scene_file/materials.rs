@@ -98,7 +98,7 @@ fn read_surface(plugin: &Plugin<'_>, textures: &mut Textures) -> Result<Surface,
 /// An index of refraction as a number or the name of a substance.
 pub(super) fn index_of_refraction(plugin: &Plugin<'_>, name: &str, default: f64) -> Result<f64, SceneError> {
     // Names and values of Mitsuba 3's table.
-    const SUBSTANCES: [(&str, f64); 18] = [
+    const SUBSTANCES: [(&str, f64); 23] = [
         ("vacuum", 1.0),
         ("helium", 1.000_036),
         ("hydrogen", 1.000_132),
@@ -116,6 +116,11 @@ pub(super) fn index_of_refraction(plugin: &Plugin<'_>, name: &str, default: f64)
         ("fused quartz", 1.458),
         ("acrylic glass", 1.49),
         ("bk7", 1.5046),
+        ("pyrex", 1.470),
+        ("polypropylene", 1.49),
+        ("sodium chloride", 1.544),
+        ("amber", 1.55),
+        ("pet", 1.5750),
         ("diamond", 2.419),
     ];
     let is_named = plugin.get(name).is_some_and(|e| e.tag() == "string");

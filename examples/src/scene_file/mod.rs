@@ -13,6 +13,7 @@
 //! | `shape` | `rectangle`, `cube`, `sphere`, `disk`, `cylinder`, `ply`, `obj`, `serialized`, `linearcurve`, `bsplinecurve` (tubes of triangles), `shapegroup`, `instance`, `merge` |
 //! | `bsdf` | `diffuse`, `twosided`, `null`, `conductor`, `roughconductor`, `dielectric`, `roughdielectric`, `thindielectric`, `plastic`, `roughplastic`; and `phong`, which Mitsuba 3 does not know |
 //! | `texture` | `bitmap`, `checkerboard`, `mesh_attribute`, `volume`, `uniform`, `rawconstant`: on reflectances |
+//! | `spectrum` | a number, pairs of wavelength and value, `filename`; `uniform`, `d65`, `srgb`, `blackbody`, `regular`, `irregular` |
 //! | `emitter` | `point`, `spot`, `area`, `directional`, `constant`, `envmap` |
 //!
 //! `<include>`, `<path>`, `<default>` with `$name`, `<alias>`, `<ref>` to anything, and all transforms are understood; files of
@@ -25,6 +26,7 @@
 //! beside the scene, `SCENE.fog.toml`: boxes, balls, height fog, grids, and a sky.
 
 mod bsdfs;
+mod cie;
 mod description;
 mod element;
 mod emitters;
@@ -41,6 +43,7 @@ mod plugin;
 mod preprocess;
 mod sensor;
 mod shapes;
+mod spectra;
 mod textures;
 mod transforms;
 mod tree;

@@ -8,6 +8,7 @@ use std::path::PathBuf;
 use fogbow::spectrum::Spectrum;
 
 use super::element::Element;
+use super::spectra::{self, Role};
 use super::transforms;
 use crate::error::SceneError;
 use crate::transform::Transform;
@@ -222,12 +223,22 @@ impl<'a> Plugin<'a> {
 
     /// A colour or number that is not negative, and the element that holds it.
     pub(super) fn colour(&self, name: &str) -> Result<Option<(Spectrum, Element<'a>)>, SceneError> {
-        let tags = ["rgb", "float", "integer", "spectrum"];
-        let Some(element) = self.value(name, &tags, &["name", "value"])? else { return Ok(None) };
-        let colour = element.colour()?;
-        if element.tag() != "rgb" && element.numbers("value")?.len() != 1 {
-            return Err(element.attribute_error("value", "must be one number"));
-        }
+        self.colour_as(name, Role::Coefficient)
+    }
+
+    /// The same for light that something sends out.
+    pub(super) fn emission(&self, name: &str) -> Result<Option<(Spectrum, Element<'a>)>, SceneError> {
+        self.colour_as(name, Role::Light)
+    }
+
+    fn colour_as(&self, name: &str, role: Role) -> Result<Option<(Spectrum, Element<'a>)>, SceneError> {
+        let Some(element) = self.get(name) else { return Ok(None) };
+        let colour = if element.tag() == "spectrum" {
+            spectra::read(&element, role)?
+        } else {
+            self.value(name, &["rgb", "float", "integer", "spectrum"], &["name", "value"])?;
+            if element.tag() == "rgb" { element.colour()? } else { Spectrum::splat(element.number("value")? as f32) }
+        };
         if let Some(negative) = colour.0.iter().find(|c| **c < 0.0) {
             return Err(element.attribute_error("value", format!("{negative} is negative")));
         }
@@ -299,8 +310,11 @@ pub(super) fn suggestion<'n>(written: &str, known: impl Iterator<Item = &'n str>
 }
 
 /// # Errors
-/// A colour above 1.
+/// A colour above 1. One that comes from a spectrum may be more saturated than sRGB has: it is cut off.
 pub(super) fn is_share(colour: Spectrum, element: &Element<'_>) -> Result<Spectrum, SceneError> {
+    if element.node.attribute("value").is_none_or(|value| value.contains(':')) && element.tag() == "spectrum" {
+        return Ok(Spectrum(colour.0.map(|c| c.clamp(0.0, 1.0))));
+    }
     match colour.0.iter().find(|c| !(0.0..=1.0).contains(*c)) {
         Some(outside) => Err(element.attribute_error("value", format!("{outside} is outside [0, 1]"))),
         None => Ok(colour),

@@ -128,7 +128,7 @@ fn area_emitter(element: &Element<'_>) -> Result<Spectrum, SceneError> {
     if plugin.kind != "area" {
         return Err(plugin.unknown_type("area (inside a shape)"));
     }
-    let radiance = plugin.colour("radiance")?.map_or(Spectrum::ONE, |(value, _)| value);
+    let radiance = plugin.emission("radiance")?.map_or(Spectrum::ONE, |(value, _)| value);
     plugin.finish()?;
     Ok(radiance)
 }

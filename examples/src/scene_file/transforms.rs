@@ -2,7 +2,7 @@
 
 use super::element::Element;
 use crate::error::SceneError;
-use crate::transform::Transform;
+use crate::transform::{Transform, cross, dot};
 
 /// The transform of an element; always one that can be undone.
 pub(super) fn read(element: &Element<'_>) -> Result<Transform, SceneError> {
@@ -36,12 +36,22 @@ fn read_step(step: &Element<'_>) -> Result<Transform, SceneError> {
         "rotate" => {
             step.allow(&["x", "y", "z", "value", "angle"])?;
             let degrees = step.number("angle")?;
-            Transform::rotation(step.xyz(0.0, false)?, degrees).ok_or_else(|| step.error("the axis has no length"))
+            let axis = step.xyz(0.0, true)?;
+            let length = dot(axis, axis).sqrt();
+            if length == 0.0 {
+                return Err(step.error("the axis has no length"));
+            }
+            // A third of a percent is what axes written with two figures are off.
+            if (length - 1.0).abs() > 3e-3 {
+                step.suspicious(format!("an axis of length {length:.4} also scales and shears, here as in Mitsuba 3"));
+            }
+            Ok(Transform::rotation_about(axis, degrees))
         }
         "lookat" => {
             step.allow(&["origin", "target", "up"])?;
             let (origin, target) = (step.triple("origin")?, step.triple("target")?);
-            let up = step.triple("up")?;
+            let up = if step.node.has_attribute("up") { step.triple("up")? } else { [0.0; 3] };
+            let up = if up == [0.0; 3] { any_up([0, 1, 2].map(|i| target[i] - origin[i])) } else { up };
             Transform::look_at(origin, target, up)
                 .ok_or_else(|| step.error("origin and target coincide, or up is parallel to the view"))
         }
@@ -61,4 +71,10 @@ fn read_step(step: &Element<'_>) -> Result<Transform, SceneError> {
         }
         _ => Err(step.error("unknown element inside <transform>")),
     }
+}
+
+/// Some direction across another, where a camera does not say which way is up.
+fn any_up(forward: [f64; 3]) -> [f64; 3] {
+    let axis = if forward[0].abs() > forward[2].abs() { [0.0, 0.0, 1.0] } else { [1.0, 0.0, 0.0] };
+    cross(forward, axis)
 }
