@@ -11,9 +11,10 @@ use crate::filter::Filter;
 use crate::mesh::Mesh;
 use crate::picture::Picture;
 use crate::texture::{self, Texture};
-use crate::transform::Transform;
+use crate::transform::{Transform, to_array, to_vec3};
 use crate::vdb::BrickStorage;
 use crate::volume::Volume;
+use crate::world::Body;
 
 /// A scene as its file describes it: checked, with all files it names loaded.
 #[derive(Debug, Clone)]
@@ -190,8 +191,12 @@ pub struct Place {
 }
 
 /// A closed shape that holds a medium.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone)]
 pub enum Container {
+    /// All of space.
+    Everywhere,
+    /// What a mesh encloses.
+    Body(Arc<Body>),
     /// The image of the cube `[−1, 1]³`.
     Cube(Transform),
     /// A ball.
@@ -203,11 +208,26 @@ pub enum Container {
     },
 }
 
+impl PartialEq for Container {
+    /// Bodies are the same if they are one.
+    fn eq(&self, other: &Self) -> bool {
+        match (self, other) {
+            (Self::Everywhere, Self::Everywhere) => true,
+            (Self::Body(a), Self::Body(b)) => Arc::ptr_eq(a, b),
+            (Self::Cube(a), Self::Cube(b)) => a == b,
+            (Self::Sphere { centre, radius }, Self::Sphere { centre: c, radius: r }) => centre == c && radius == r,
+            _ => false,
+        }
+    }
+}
+
 impl Container {
     /// Whether a point lies inside.
     #[must_use]
     pub fn contains(&self, point: [f64; 3]) -> bool {
         match self {
+            Self::Everywhere => true,
+            Self::Body(body) => body.contains(to_vec3(point)),
             Self::Cube(to_world) => {
                 to_world.inverse().is_some_and(|to_local| to_local.point(point).iter().all(|c| c.abs() <= 1.0))
             }
@@ -218,10 +238,12 @@ impl Container {
         }
     }
 
-    /// Its middle (m).
+    /// Its middle (m); a point just inside, of a body of any form.
     #[must_use]
     pub fn centre(&self) -> [f64; 3] {
         match self {
+            Self::Everywhere => [0.0; 3],
+            Self::Body(body) => body.probes().first().copied().unwrap_or_else(|| to_array(body.bounds().centre())),
             Self::Cube(to_world) => to_world.column(3),
             Self::Sphere { centre, .. } => *centre,
         }
@@ -231,11 +253,47 @@ impl Container {
     #[must_use]
     pub fn bounds(&self) -> [[f64; 3]; 2] {
         let reach = match self {
+            Self::Everywhere => return [[f64::NEG_INFINITY; 3], [f64::INFINITY; 3]],
+            Self::Body(body) => return [body.bounds().min, body.bounds().max].map(to_array),
             Self::Cube(to_world) => to_world.rows.map(|r| r[0].abs() + r[1].abs() + r[2].abs()),
             Self::Sphere { radius, .. } => [*radius; 3],
         };
         let centre = self.centre();
         [[0, 1, 2].map(|i| centre[i] - reach[i]), [0, 1, 2].map(|i| centre[i] + reach[i])]
+    }
+
+    /// Points just inside its surface.
+    #[must_use]
+    pub fn probes(&self) -> Vec<[f64; 3]> {
+        const INSIDE: f64 = 1.0 - 1e-4;
+        match self {
+            Self::Everywhere => Vec::new(),
+            Self::Body(body) => body.probes(),
+            Self::Cube(to_world) => {
+                let along = [-1.0, -0.75, -0.5, -0.25, 0.0, 0.25, 0.5, 0.75, 1.0];
+                let pairs = || along.into_iter().flat_map(move |u| along.into_iter().map(move |v| (u, v)));
+                let face = |axis: usize, side: f64, (u, v): (f64, f64)| {
+                    let mut at = [0.0; 3];
+                    (at[axis], at[(axis + 1) % 3], at[(axis + 2) % 3]) = (side, u, v);
+                    to_world.point(at.map(|c| c * INSIDE))
+                };
+                (0..6)
+                    .flat_map(|i| pairs().map(move |at| (i / 2, if i % 2 == 0 { -1.0 } else { 1.0 }, at)))
+                    .map(|(axis, side, at)| face(axis, side, at))
+                    .collect()
+            }
+            Self::Sphere { centre, radius } => {
+                // A spiral by the golden angle.
+                let point = |i: u32| {
+                    let z = 1.0 - (f64::from(i) + 0.5) / 128.0;
+                    let (sin, cos) = (f64::from(i) * 2.399_963_229_728_653).sin_cos();
+                    let r = (1.0 - z * z).sqrt();
+                    let at = [r * cos, r * sin, z];
+                    [0, 1, 2].map(|axis| centre[axis] + radius * INSIDE * at[axis])
+                };
+                (0..256).map(point).collect()
+            }
+        }
     }
 }
 

@@ -113,7 +113,8 @@ fn moved<'a>(
             centre: to_world.point(centre),
             radius: radius * to_world.determinant().abs().cbrt(),
         }),
-        _ => None,
+        None => None,
+        Some(_) => return Err(member.element.error("a mesh in a group that is instanced cannot hold a medium")),
     };
     Ok(ShapeElement { shape, container, ..member })
 }

@@ -39,48 +39,94 @@ pub(super) fn read<'a>(
     }
     let mut boundaries = Vec::new();
     for source in shapes {
-        let mut side = |element: &Option<Element<'a>>| element.map(|e| found.index_of(&e)).transpose();
-        let (interior, exterior) = (side(&source.interior)?, side(&source.exterior)?);
         let is_clear = source.shape.as_ref().is_none_or(|s| s.material.surface.transmits());
         if !is_clear {
-            if interior.is_some() {
-                return Err(source.element.error("light never reaches the medium inside an opaque shape"));
+            if source.interior.is_some() {
+                source.element.suspicious("light never reaches the medium inside an opaque shape");
             }
             continue;
         }
+        let mut side = |element: &Option<Element<'a>>| element.map(|e| found.index_of(&e)).transpose();
+        let (interior, exterior) = (side(&source.interior)?, side(&source.exterior)?);
         if interior.is_none() && exterior.is_none() {
             continue;
         }
-        let container =
-            source.container.ok_or_else(|| source.element.error("only a cube or a sphere can hold a medium"))?;
+        let Some(container) = source.container.clone() else {
+            return Err(source.element.error("only a closed shape can hold a medium"));
+        };
+        let (interior, exterior) = if source.is_inside_out { (exterior, interior) } else { (interior, exterior) };
         boundaries.push(Boundary { source, container, interior, exterior });
     }
-    let mut holders: Vec<(usize, usize)> = Vec::new();
-    for (number, boundary) in boundaries.iter().enumerate() {
+    check_overlaps(&boundaries)?;
+    // The smallest other container around this one's middle is what it lies in.
+    let numbered = boundaries.iter().enumerate();
+    let around: Vec<Option<usize>> =
+        numbered.map(|(number, b)| surrounding(&boundaries, b.container.centre(), Some(number))).collect();
+    // What fills the rest of space.
+    let said = sensor_medium.map(|m| found.index_of(&m)).transpose()?;
+    let camera_in = surrounding(&boundaries, sensor.to_world.column(3), None);
+    let outermost = boundaries.iter().zip(&around).filter(|(_, around)| around.is_none()).map(|(b, _)| b);
+    let rest = match camera_in {
+        None => said,
+        Some(_) => outermost.clone().find_map(|b| b.exterior),
+    };
+    if let Some(medium) = rest {
+        let holes = outermost.map(|b| b.container.clone()).collect();
+        found.media[medium].places.push(Place { container: Container::Everywhere, holes });
+    }
+    for boundary in &boundaries {
         if let Some(medium) = boundary.interior {
-            holders.push((number, medium));
-            found.media[medium].places.push(Place { container: boundary.container, holes: Vec::new() });
+            found.media[medium].places.push(Place { container: boundary.container.clone(), holes: Vec::new() });
         }
     }
-    for (number, boundary) in boundaries.iter().enumerate() {
-        // The smallest other container around this one's middle is what it lies in.
-        let around = surrounding(&boundaries, boundary.container.centre(), Some(number));
-        check_exterior(&found, &boundaries, boundary, around)?;
-        if let (Some(outer), Some(medium)) = (around, boundary.exterior) {
-            let container = boundaries[outer].container;
+    for (boundary, around) in boundaries.iter().zip(&around) {
+        check_exterior(&found, boundary, around.map_or(rest, |i| boundaries[i].interior))?;
+        if let (Some(outer), Some(medium)) = (*around, boundary.exterior) {
+            let container = &boundaries[outer].container;
             let places = &mut found.media[medium].places;
-            for place in places.iter_mut().filter(|p| p.container == container) {
-                place.holes.push(boundary.container);
+            for place in places.iter_mut().filter(|p| p.container == *container) {
+                place.holes.push(boundary.container.clone());
             }
         }
     }
+    let is = camera_in.map_or(rest, |i| boundaries[i].interior);
+    if said != is {
+        let (said, is) = (found.name(said), found.name(is));
+        return Err(sensor_element.error(format!("its \"medium\" is {said}, but the camera stands in {is}")));
+    }
     for (medium, element) in found.media.iter().zip(&found.elements()) {
         if medium.places.is_empty() {
-            return Err(element.error("no cube or sphere has this medium as its interior"));
+            element.suspicious("no shape that light can enter has this medium as its interior: it is nowhere");
         }
     }
-    check_camera(&mut found, &boundaries, sensor, sensor_element, sensor_medium)?;
-    Ok(found.media.into_iter().map(|m| m.description).collect())
+    Ok(found.media.into_iter().map(|m| m.description).filter(|m| !m.places.is_empty()).collect())
+}
+
+/// # Errors
+/// Containers that overlap in part: which medium is there would depend on the way that light takes.
+fn check_overlaps(boundaries: &[Boundary<'_, '_>]) -> Result<(), SceneError> {
+    for (number, one) in boundaries.iter().enumerate() {
+        for other in boundaries.iter().take(number) {
+            let [a, b] = [one.container.bounds(), other.container.bounds()];
+            if (0..3).any(|i| a[1][i] < b[0][i] || b[1][i] < a[0][i]) {
+                continue;
+            }
+            // How many of the points just inside of one the other has, and of how many.
+            let shared = |one: &Container, other: &Container| {
+                let probes = one.probes();
+                (probes.iter().filter(|p| other.contains(**p)).count(), probes.len())
+            };
+            let (a, b) = (shared(&one.container, &other.container), shared(&other.container, &one.container));
+            if a.0 < a.1 && b.0 < b.1 && a.0 + b.0 > 0 {
+                let line = other.source.element.line();
+                return Err(one.source.element.error(format!(
+                    "overlaps in part with the container of a medium at line {line}: which medium is there would depend on \
+                     where light comes from; let one hold the other, or set them apart"
+                )));
+            }
+        }
+    }
+    Ok(())
 }
 
 struct Medium<'a> {
@@ -149,32 +195,14 @@ fn surrounding(boundaries: &[Boundary<'_, '_>], point: [f64; 3], except: Option<
 
 fn check_exterior(
     found: &Found<'_>,
-    boundaries: &[Boundary<'_, '_>],
     boundary: &Boundary<'_, '_>,
-    around: Option<usize>,
+    surrounded_by: Option<usize>,
 ) -> Result<(), SceneError> {
-    let surrounded_by = around.and_then(|i| boundaries[i].interior);
     if boundary.exterior == surrounded_by {
         return Ok(());
     }
     let (said, is) = (found.name(boundary.exterior), found.name(surrounded_by));
     Err(boundary.source.element.error(format!("its \"exterior\" is {said}, but around it is {is}")))
-}
-
-fn check_camera<'a>(
-    found: &mut Found<'a>,
-    boundaries: &[Boundary<'_, '_>],
-    sensor: &Sensor,
-    element: &Element<'a>,
-    medium: Option<Element<'a>>,
-) -> Result<(), SceneError> {
-    let said = medium.map(|m| found.index_of(&m)).transpose()?;
-    let is = surrounding(boundaries, sensor.to_world.column(3), None).and_then(|i| boundaries[i].interior);
-    if said == is {
-        return Ok(());
-    }
-    let (said, is) = (found.name(said), found.name(is));
-    Err(element.error(format!("its \"medium\" is {said}, but the camera stands in {is}")))
 }
 
 /// # Errors
@@ -193,7 +221,8 @@ fn far_plane(scene: &SceneFile) -> Result<(), String> {
         corners.extend([to_array(bounds.min), to_array(bounds.max)]);
     }
     for medium in &scene.media {
-        corners.extend(medium.places.iter().flat_map(|p| p.container.bounds()));
+        let containers = medium.places.iter().map(|p| &p.container).filter(|c| !matches!(c, Container::Everywhere));
+        corners.extend(containers.flat_map(Container::bounds));
     }
     let reach = |axis: usize| corners.iter().map(|c| (c[axis] - eye[axis]).abs()).fold(0.0, f64::max);
     let farthest = (reach(0).powi(2) + reach(1).powi(2) + reach(2).powi(2)).sqrt();

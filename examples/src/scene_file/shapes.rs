@@ -1,9 +1,11 @@
 //! `<shape>`.
 
+use std::sync::Arc;
+
 use fogbow::spectrum::Spectrum;
 use fogbow::surface::Surface;
 
-use super::description::{Container, Geometry, Material, Shape};
+use super::description::{Container, Geometry, Shape};
 use super::element::Element;
 use super::groups::Groups;
 use super::plugin::Plugin;
@@ -11,6 +13,7 @@ use super::{groups, materials, textures};
 use crate::error::SceneError;
 use crate::mesh::Mesh;
 use crate::transform::{Transform, normalized};
+use crate::world::{Body, as_box};
 
 const KNOWN: &str = "rectangle, cube, sphere, disk, cylinder, ply, obj, serialized, linearcurve, bsplinecurve, shapegroup, instance, merge";
 
@@ -22,6 +25,8 @@ pub(super) struct ShapeElement<'a> {
     pub(super) shape: Option<Shape>,
     /// The body it encloses, if media can be told apart by it.
     pub(super) container: Option<Container>,
+    /// Whether its normals point into that body: then interior and exterior are exchanged.
+    pub(super) is_inside_out: bool,
     /// The `<medium>` elements at both sides.
     pub(super) interior: Option<Element<'a>>,
     pub(super) exterior: Option<Element<'a>>,
@@ -60,11 +65,10 @@ fn read_one<'a>(plugin: &Plugin<'a>) -> Result<ShapeElement<'a>, SceneError> {
     let material = material.unwrap_or_else(|| materials::default_material(radiance.is_some()));
     let geometry = read_geometry(plugin)?;
     plugin.finish()?;
-    let container = match &geometry {
-        Geometry::Cube(to_world) => Some(Container::Cube(*to_world)),
-        Geometry::Sphere { centre, radius, .. } => Some(Container::Sphere { centre: *centre, radius: *radius }),
-        _ => None,
-    };
+    let has_media = interior.is_some() || exterior.is_some();
+    let is_boundary = has_media && material.surface.transmits();
+    let (container, mut is_inside_out) = if is_boundary { container_of(&geometry, element)? } else { (None, false) };
+    is_inside_out ^= is_flipped;
     let geometry = if radiance.is_some() { shining(geometry, is_flipped) } else { geometry };
     let mesh = match &geometry {
         Geometry::Mesh(mesh) => Some(mesh),
@@ -73,31 +77,31 @@ fn read_one<'a>(plugin: &Plugin<'a>) -> Result<ShapeElement<'a>, SceneError> {
     for (_, texture) in &material.textures {
         textures::check_attributes(texture, mesh).map_err(|reason| element.error(reason))?;
     }
-    check(element, &geometry, &material, radiance.is_some(), is_flipped, interior.is_some() || exterior.is_some())?;
-    let is_visible = material.surface != Surface::Null;
-    let shape = is_visible.then(|| Shape { geometry, is_flipped, material, radiance, line: element.line() });
-    Ok(ShapeElement { element: *element, shape, container, interior, exterior })
-}
-
-fn check(
-    element: &Element<'_>,
-    geometry: &Geometry,
-    material: &Material,
-    is_emitter: bool,
-    is_flipped: bool,
-    has_media: bool,
-) -> Result<(), SceneError> {
-    let is_clear = material.surface.transmits();
-    if is_emitter && is_clear {
+    if radiance.is_some() && material.surface.transmits() {
         return Err(element.error("an area light needs a bsdf that light cannot pass through"));
     }
-    if has_media && !matches!(geometry, Geometry::Cube(_) | Geometry::Sphere { .. }) && is_clear {
-        return Err(element.error("only a cube or a sphere can hold a medium"));
-    }
-    if has_media && is_clear && is_flipped {
-        return Err(element.error("a container of a medium cannot have flipped normals"));
-    }
-    Ok(())
+    let is_visible = material.surface != Surface::Null;
+    let shape = is_visible.then(|| Shape { geometry, is_flipped, material, radiance, line: element.line() });
+    Ok(ShapeElement { element: *element, shape, container, is_inside_out, interior, exterior })
+}
+
+/// The body that a form encloses, and whether normals point into it.
+fn container_of(geometry: &Geometry, element: &Element<'_>) -> Result<(Option<Container>, bool), SceneError> {
+    let container = match geometry {
+        Geometry::Cube(to_world) => Container::Cube(*to_world),
+        Geometry::Sphere { centre, radius, .. } => Container::Sphere { centre: *centre, radius: *radius },
+        Geometry::Mesh(mesh) => {
+            let body = Body::new(mesh).map_err(|reason| element.error(format!("cannot hold a medium: {reason}")))?;
+            let is_inside_out = body.is_inside_out();
+            // A mesh that is a box is quicker as one.
+            let container = as_box(mesh).map_or_else(|| Container::Body(Arc::new(body)), Container::Cube);
+            return Ok((Some(container), is_inside_out));
+        }
+        Geometry::Rectangle(_) | Geometry::Disk(_) | Geometry::Cylinder(_) => {
+            return Err(element.error("only a closed shape can hold a medium: a cube, a sphere or a mesh"));
+        }
+    };
+    Ok((Some(container), false))
 }
 
 /// A form that can shine: those that the lights of the core do not know become triangles.

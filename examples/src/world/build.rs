@@ -5,7 +5,7 @@ use fogbow::math::{Bounds, Vec3};
 use super::Part;
 use super::analytic::{Primitive, bounds};
 use crate::mesh::has_area;
-use crate::scene_file::{Geometry, Material, SceneFile, Shape};
+use crate::scene_file::{Container, Geometry, Material, SceneFile, Shape};
 use crate::transform::{Transform, cross, dot, normalized, to_vec3};
 
 /// What rays are tested against.
@@ -120,9 +120,17 @@ pub(super) fn scene_bounds(scene: &SceneFile) -> Bounds {
 
 /// The smallest box around all containers of media.
 pub(super) fn medium_bounds(scene: &SceneFile) -> Option<Bounds> {
-    let containers = scene.media.iter().flat_map(|m| &m.places).map(|p| {
-        let [min, max] = p.container.bounds();
-        Bounds { min: to_vec3(min), max: to_vec3(max) }
+    let containers = scene.media.iter().flat_map(|m| &m.places).map(|p| match &p.container {
+        // As far as there is anything to see.
+        Container::Everywhere => {
+            let eye = to_vec3(scene.sensor.to_world.column(3));
+            let near = Bounds { min: eye - Vec3::ONE, max: eye + Vec3::ONE };
+            scene.shapes.iter().map(|s| bounds_of(&s.geometry)).fold(near, Bounds::union)
+        }
+        container => {
+            let [min, max] = container.bounds();
+            Bounds { min: to_vec3(min), max: to_vec3(max) }
+        }
     });
     containers.reduce(Bounds::union)
 }

@@ -1,5 +1,7 @@
 //! Media and where they are.
 
+use std::sync::Arc;
+
 use fogbow::host::{Medium, Properties};
 use fogbow::math::Affine3;
 use fogbow::medium::{
@@ -8,6 +10,7 @@ use fogbow::medium::{
 
 use fogbow::phase::Phase;
 
+use super::contained::{Contained, Solid};
 use super::rotated::{Padded, shows_border};
 use crate::error::SceneError;
 use crate::scene_file::{Container, Matter, MediumDescription, Place, SceneFile};
@@ -58,6 +61,8 @@ pub enum Media<'a> {
     Grid(Placed<'a, DensityGrid<'a>>),
     /// Several, or none.
     Several(Vec<Placed<'a, AnyMedium<'a>>>),
+    /// In containers of any form.
+    Contained(Vec<Contained<'a>>),
 }
 
 /// Work to be done with the medium of a scene, whatever its type: see [`Media::with`].
@@ -82,6 +87,15 @@ impl WithMedium for Glow {
 
 impl<'a> Media<'a> {
     pub(super) fn new(scene: &'a SceneFile, tables: &'a mut [MediumTable]) -> Result<Self, SceneError> {
+        // A rotated grid may fill a part of its container only.
+        let is_cut = |(medium, table): (&MediumDescription, &MediumTable)| {
+            let is_refused = |padded: &Padded| medium.places.iter().any(|p| padded.region(&p.container).is_err());
+            table.padded.as_ref().is_some_and(is_refused)
+        };
+        let has_cuts = scene.media.iter().zip(&*tables).any(is_cut);
+        if has_cuts || scene.media.iter().flat_map(|m| &m.places).any(needs_solids) {
+            return Self::contained(scene, tables);
+        }
         let (mut placed, mut all_holes) = (Vec::new(), Vec::new());
         for (medium, table) in scene.media.iter().zip(tables) {
             let fail = |reason: String| SceneError {
@@ -114,6 +128,41 @@ impl<'a> Media<'a> {
         })
     }
 
+    /// Media of which one at least has a container that is no box and no ball.
+    fn contained(scene: &'a SceneFile, tables: &'a mut [MediumTable]) -> Result<Self, SceneError> {
+        let fail = |element: String, reason: String| SceneError {
+            file: scene.file.clone(),
+            line: None,
+            element,
+            attribute: None,
+            reason,
+        };
+        let mut media = Vec::new();
+        for (description, table) in scene.media.iter().zip(tables) {
+            let refused = |e: Refusal| fail(format!("<medium id=\"{}\">", description.id), e.to_string());
+            let MediumTable { blocks, padded, .. } = table;
+            let padded = padded.as_ref();
+            let medium = matter(description, padded, blocks).map_err(refused)?;
+            for place in &description.places {
+                let solids = |containers: &[Container]| containers.iter().map(solid).collect::<Result<Vec<_>, _>>();
+                let own = match &place.container {
+                    Container::Cube(_) | Container::Sphere { .. } if padded.is_none() => {
+                        region_of(description, place).map(Solid::Region)
+                    }
+                    other => solid(other),
+                };
+                let mut within = vec![own.map_err(|e| refused(e.into()))?];
+                if let Some(padded) = padded {
+                    within.push(Solid::Region(padded.around().map_err(|e| refused(e.into()))?));
+                }
+                let holes = solids(&place.holes).map_err(|e| refused(e.into()))?;
+                media.push(Contained { medium, within, holes });
+            }
+        }
+        Overlap::new(&media, |p| p.medium().phase()).map_err(|e| fail("<medium>".to_owned(), e.to_string()))?;
+        Ok(Self::Contained(media))
+    }
+
     /// Whether there is at most one medium, the same everywhere in its container.
     #[must_use]
     pub fn is_homogeneous(&self) -> bool {
@@ -121,6 +170,7 @@ impl<'a> Media<'a> {
             Self::Homogeneous(_) => true,
             Self::Grid(_) => false,
             Self::Several(media) => media.is_empty(),
+            Self::Contained(_) => false,
         }
     }
 
@@ -137,6 +187,7 @@ impl<'a> Media<'a> {
             Self::Homogeneous(fog) => vec![fog.medium().phase()],
             Self::Grid(grid) => vec![grid.medium().phase()],
             Self::Several(media) => media.iter().map(|p| p.medium().phase()).collect(),
+            Self::Contained(media) => media.iter().map(|p| p.medium().phase()).collect(),
         }
     }
 
@@ -147,6 +198,10 @@ impl<'a> Media<'a> {
             Self::Grid(grid) => work.with(grid),
             // The number of lobes was checked when the list was made.
             Self::Several(media) => work.with(&Overlap::new(media, |p| p.medium().phase()).unwrap_or_default()),
+            Self::Contained(media) => match &media[..] {
+                [one] => work.with(one),
+                several => work.with(&Overlap::new(several, |p| p.medium().phase()).unwrap_or_default()),
+            },
         }
     }
 }
@@ -162,7 +217,41 @@ type PlacedHoles<'a> = (Placed<'a, AnyMedium<'a>>, &'a [Region]);
 fn place<'a>(medium: &'a MediumDescription, table: &'a mut MediumTable) -> Result<Vec<PlacedHoles<'a>>, Refusal> {
     let MediumTable { blocks, padded, holes } = table;
     let padded = padded.as_ref();
-    let any = match &medium.matter {
+    let any = matter(medium, padded, blocks)?;
+    for place in &medium.places {
+        holes.push(place.holes.iter().map(region).collect::<Result<_, _>>()?);
+    }
+    let mut placed = Vec::new();
+    for (place, holes) in medium.places.iter().zip(&*holes) {
+        let region = match padded {
+            Some(padded) => padded.region(&place.container)?,
+            None => region_of(medium, place)?,
+        };
+        placed.push((Placed::new(any, region).with_holes(holes), holes.as_slice()));
+    }
+    Ok(placed)
+}
+
+/// Whether a place is more than a box or ball with such holes.
+fn needs_solids(place: &Place) -> bool {
+    let is_special = |c: &Container| matches!(c, Container::Body(_) | Container::Everywhere);
+    is_special(&place.container) || place.holes.iter().any(is_special)
+}
+
+fn solid(container: &Container) -> Result<Solid, MediumError> {
+    match container {
+        Container::Body(body) => Ok(Solid::Body(Arc::clone(body))),
+        other => region(other).map(Solid::Region),
+    }
+}
+
+/// The medium without its place.
+fn matter<'a>(
+    medium: &'a MediumDescription,
+    padded: Option<&'a Padded>,
+    blocks: &'a mut [MinMax],
+) -> Result<AnyMedium<'a>, Refusal> {
+    Ok(match &medium.matter {
         Matter::Homogeneous { absorption, scattering, phase } => {
             AnyMedium::from(Homogeneous::new(*absorption, *scattering, *phase)?)
         }
@@ -185,19 +274,7 @@ fn place<'a>(medium: &'a MediumDescription, table: &'a mut MediumTable) -> Resul
             let properties = Properties { absorption, scattering, phase, ..Properties::VACUUM };
             AnyMedium::from(SparseGrid::new(bricks.bricks(), &properties, to_world.to_affine(), blocks)?)
         }
-    };
-    for place in &medium.places {
-        holes.push(place.holes.iter().map(region).collect::<Result<_, _>>()?);
-    }
-    let mut placed = Vec::new();
-    for (place, holes) in medium.places.iter().zip(&*holes) {
-        let region = match padded {
-            Some(padded) => padded.region(&place.container)?,
-            None => region_of(medium, place)?,
-        };
-        placed.push((Placed::new(any, region).with_holes(holes), holes.as_slice()));
-    }
-    Ok(placed)
+    })
 }
 
 /// Why a medium cannot be built.
@@ -226,6 +303,8 @@ impl core::fmt::Display for Refusal {
 
 pub(super) fn region(container: &Container) -> Result<Region, MediumError> {
     match container {
+        // Bodies are no regions of the core: see `solid`.
+        Container::Everywhere | Container::Body(_) => Ok(Region::Everywhere),
         Container::Cube(to_world) => {
             let centred = Transform::translation([-0.5; 3]).then(&Transform::scaling([2.0; 3]));
             let placement: Affine3 = centred.then(to_world).to_affine();

@@ -9,11 +9,14 @@
 //! | `triangles` | meshes in a tree |
 //! | `lights` | emitters and lent tables |
 //! | `media` | media and where they are |
+//! | `body`, `contained` | closed meshes, and media in them |
 //! | `places` | texture coordinates and interpolated normals |
 //! | `rotated` | rotated grids, whose border reaches as far as Mitsuba's |
 
 mod analytic;
+mod body;
 mod build;
+mod contained;
 mod lights;
 mod many;
 mod media;
@@ -30,7 +33,9 @@ use fogbow::phase::Phase;
 use fogbow::surface::Surface;
 use fogbow::world::{Outline, World as LitWorld};
 
+pub use body::{Body, as_box};
 pub use build::bounds_of;
+pub use contained::Contained;
 pub use lights::{Storage, light_tree, view};
 pub use media::{Media, WithMedium};
 

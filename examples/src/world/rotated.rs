@@ -78,6 +78,13 @@ impl Padded {
         Some(Self { volume: Volume { size, values }, to_world: grown.then(&moved).then(to_world), around })
     }
 
+    /// The box around the grid before.
+    pub(super) fn around(&self) -> Result<Region, fogbow::medium::MediumError> {
+        let [low, high] = self.around;
+        let size = [0, 1, 2].map(|i| high[i] - low[i]);
+        Region::unit_cube(Transform::scaling(size).then(&Transform::translation(low)).to_affine())
+    }
+
     /// Where the medium is that a container holds: in the part of it that lies in the box around the grid.
     pub(super) fn region(&self, container: &Container) -> Result<Region, Refusal> {
         let [low, high] = self.around;
@@ -88,9 +95,7 @@ impl Padded {
         }
         let is_within = |i: u32| container.contains([0, 1, 2].map(|axis| self.around[(i >> axis & 1) as usize][axis]));
         if (0..8).all(is_within) {
-            let size = [0, 1, 2].map(|i| high[i] - low[i]);
-            let place = Transform::scaling(size).then(&Transform::translation(low));
-            return Ok(Region::unit_cube(place.to_affine())?);
+            return Ok(self.around()?);
         }
         Err(Refusal::Border)
     }
@@ -104,6 +109,15 @@ fn centred() -> Transform {
 /// The smallest box around a container, in the coordinates of a grid.
 fn extent(container: &Container, to_local: &Transform) -> Corners {
     match container {
+        Container::Everywhere => container.bounds(),
+        Container::Body(_) => {
+            let box_around = container.bounds();
+            let corner = |i: u32| to_local.point([0, 1, 2].map(|axis| box_around[(i >> axis & 1) as usize][axis]));
+            let corners: Vec<[f64; 3]> = (0..8).map(corner).collect();
+            let least = |axis: usize| corners.iter().map(|c| c[axis]).fold(f64::INFINITY, f64::min);
+            let most = |axis: usize| corners.iter().map(|c| c[axis]).fold(f64::NEG_INFINITY, f64::max);
+            [[0, 1, 2].map(least), [0, 1, 2].map(most)]
+        }
         Container::Cube(to_world) => Container::Cube(to_world.then(to_local)).bounds(),
         Container::Sphere { centre, radius } => {
             let middle = to_local.point(*centre);
@@ -224,7 +238,7 @@ mod tests {
         let text = "<scene version=\"3.0.0\"><integrator type=\"volpath\"/><sensor type=\"perspective\"><float name=\"fov\" value=\"36\"/>\
             <film type=\"hdrfilm\"><rfilter type=\"box\"/></film></sensor></scene>";
         let mut scene = SceneFile::parse("test.xml".as_ref(), text).unwrap();
-        let places = vec![Place { container, holes: Vec::new() }];
+        let places = vec![Place { container: container.clone(), holes: Vec::new() }];
         scene.media.push(MediumDescription { id: "smoke".to_owned(), matter, places });
         let mut tables = tables(&scene);
         Ok(Media::new(&scene, &mut tables).map_err(|e| e.to_string())?.with(Differences(&container)))
@@ -247,9 +261,9 @@ mod tests {
     }
 
     #[test]
-    fn a_container_across_the_box_is_refused() {
+    fn a_container_across_the_box_shows_what_both_have() {
         let around = Container::Cube(centred().then(&turned())).bounds();
-        let refused = with_container(Container::Sphere { centre: around[1], radius: 0.5 });
-        assert!(refused.unwrap_err().contains("rotated grid"));
+        let corner = [0, 1, 2].map(|i| around[1][i] - 0.1);
+        assert!(with_container(Container::Sphere { centre: corner, radius: 0.5 }).unwrap() > 100);
     }
 }
