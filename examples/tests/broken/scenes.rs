@@ -131,10 +131,9 @@ const CASES: &[(&str, &str, &[&str])] = &[
     ),
     (
         "<string name=\"material\" value=\"none\"/>",
-        "<string name=\"material\" value=\"Au\"/>",
-        &["<string name=\"material\">", "Au"],
+        "<string name=\"material\" value=\"Aurum\"/>",
+        &["<string name=\"material\">", "Aurum"],
     ),
-    ("<string name=\"material\" value=\"none\"/>", "", &["<bsdf type=\"conductor\">", "material"]),
     ("value=\"water\"", "value=\"wine\"", &["<string name=\"int_ior\">", "wine", "water"]),
     (
         "<float name=\"ext_ior\" value=\"1\"/>",
@@ -142,7 +141,7 @@ const CASES: &[(&str, &str, &[&str])] = &[
         &["<float name=\"ext_ior\">", "outside"],
     ),
     ("value=\"0.5 0.5 0.5\"", "value=\"0.5 1.5 0.5\"", &["<rgb name=\"reflectance\">", "1.5 is outside [0, 1]"]),
-    ("<bsdf type=\"diffuse\">", "<bsdf type=\"roughplastic\">", &["<bsdf type=\"roughplastic\">", "diffuse"]),
+    ("<bsdf type=\"diffuse\">", "<bsdf type=\"velvet\">", &["<bsdf type=\"velvet\">", "diffuse"]),
     (
         "<bsdf type=\"diffuse\"><rgb name=\"reflectance\" value=\"0.5 0.5 0.5\"/></bsdf>",
         "<bsdf type=\"null\"/>",
