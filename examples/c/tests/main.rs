@@ -1,0 +1,3 @@
+//! All tests of the interface: one program.
+
+mod header;
