@@ -55,7 +55,9 @@ impl Default for FractalNoise {
 
 impl FractalNoise {
     fn check(self) -> Result<Self, MediumError> {
-        let highest = self.octave_scales().fold(0.0, |_, (frequency, _)| frequency);
+        // Not of four thousand million octaves, before it is known that there are few.
+        let few = Self { octaves: self.octaves.min(MAX_OCTAVES), ..self };
+        let highest = few.octave_scales().fold(0.0, |_, (frequency, _)| frequency);
         let is_positive = |v: f32| v > 0.0 && v < f32::INFINITY;
         let is_valid = (1..=MAX_OCTAVES).contains(&self.octaves)
             && is_positive(self.frequency)

@@ -1,5 +1,4 @@
-/* Fog around a lamp in a room, by radiance caching, with the host's own ray caster: writes fog.ppm.
- *   cc -std=c99 -O2 fog.c $(pkg-config --cflags --libs fogbow) -lm && ./a.out */
+/* Fog around a lamp in a room, with the host's own ray caster: cc -std=c99 -O2 fog.c $(pkg-config --cflags --libs fogbow) -lm */
 #include <fogbow.h>
 #include <math.h>
 #include <stdio.h>
@@ -11,7 +10,7 @@ static void check(fogbow_status status) {
     if (status) exit((fprintf(stderr, "%s\n", fogbow_message()), 1));
 }
 
-/* A room from -1 to 1 with walls of two colours, seen from within. */
+/* A room from -1 to 1, red on the left and green on the right, seen from within. */
 static int32_t closest_hit(void *context, const fogbow_ray *ray, fogbow_hit *hit) {
     (void)context;
     hit->distance = INFINITY;
@@ -21,14 +20,14 @@ static int32_t closest_hit(void *context, const fogbow_ray *ray, fogbow_hit *hit
         if (!(t >= 0 && t < hit->distance)) continue;
         hit->distance = t;
         for (int k = 0; k < 3; k++) hit->normal[k] = k == axis ? -side : 0;
-        for (int k = 0; k < 3; k++) hit->reflectance[k] = axis == 0 && side * (k - 1) > 0 ? 0.2f : 0.7f;
+        for (int k = 0; k < 3; k++) hit->reflectance[k] = axis ? 0.7f : k == (side > 0) ? 0.6f : 0.1f;
     }
     return hit->distance < ray->length;
 }
 
 int main(void) {
     fogbow_properties fog = {.absorption = {0.1f, 0.1f, 0.1f}, .scattering = {0.9f, 0.9f, 0.9f}, .phase = {FOGBOW_PHASE_HENYEY_GREENSTEIN, 0.5f, 0}};
-    fogbow_light lamp = {.kind = FOGBOW_LIGHT_POINT, .position = {-0.3f, 0.4f, 0}, .emission = {3, 2.7f, 2}};
+    fogbow_light lamp = {.kind = FOGBOW_LIGHT_POINT, .position = {-0.3f, 0.4f, 0}, .emission = {0.3f, 0.27f, 0.2f}};
     fogbow_host_scene room = {.size = sizeof room, .closest_hit = closest_hit};
     fogbow_world_parts parts = {.size = sizeof parts, .scene = &room, .lights = &lamp, .light_count = 1, .bounds = {{-1, -1, -1}, {1, 1, 1}}};
     fogbow_camera camera = {.eye = {0, 0, 0.95f}, .target = {0, 0, 0}, .up = {0, 1, 0}, .field_of_view = 1.2f, .aspect = 1};

@@ -773,13 +773,19 @@ fogbow_status fogbow_path_trace(const fogbow_world *world,
 
 // Numbers of the jobs that are due: from `first` to below `end`; equal ones if all is done.
 //
-// They stay due until their results are accepted: hand each number out once, or work is done twice. Safe on any thread.
-fogbow_status fogbow_work_jobs(const fogbow_work *work, uint32_t *first, uint32_t *end);
+// They stay due until it is their turn: hand each number out once, or work is done twice. Those of results that never came back are due again. Safe on any
+// thread.
+fogbow_status fogbow_work_jobs(const fogbow_work *work,
+                               uint32_t *first,
+                               uint32_t *end);
 
-// Runs a job that is due. Safe on any thread, many at a time. The result is to be accepted, or freed.
-fogbow_status fogbow_work_run(const fogbow_work *work, uint32_t job, fogbow_result **result);
+// Runs a job. Safe on any thread, many at a time. The result is to be accepted, or freed; it is null for a job whose result is there already or whose
+// round is over, which is not run again.
+fogbow_status fogbow_work_run(const fogbow_work *work,
+                              uint32_t job,
+                              fogbow_result **result);
 
-// Takes a result back and frees its handle, whatever comes of it. Safe on any thread, in any order.
+// Takes a result back and frees its handle, whatever comes of it. Safe on any thread, in any order. Null is nothing.
 fogbow_status fogbow_work_accept(fogbow_work *work, fogbow_result *result);
 
 // Frees a result that is not accepted. Null is nothing.
@@ -831,6 +837,21 @@ fogbow_status fogbow_fill_box(fogbow_caches *caches,
 // Tells what caches hold.
 fogbow_status fogbow_caches_look(const fogbow_caches *caches, fogbow_caches_state *state);
 
+// Saves caches as bytes: the same on every machine, with a version and checksums. `tag` says what they were made for: whatever changes the
+// light in the world. With a null `buffer`, `needed` alone is written; else it may be null. Not while they are filled.
+fogbow_status fogbow_caches_save(const fogbow_caches *caches,
+                                 uint64_t tag,
+                                 uint8_t *buffer,
+                                 size_t capacity,
+                                 size_t *needed);
+
+// Reads caches that were saved with the same tag, in place of what is there. The settings must be those they were made with, or ask for less. Where it fails,
+// some of what was there may be lost.
+fogbow_status fogbow_caches_load(fogbow_caches *caches,
+                                 uint64_t tag,
+                                 const uint8_t *bytes,
+                                 size_t count);
+
 // Radiance (W/(m² sr), three channels a ray) that arrives at the origins of rays: one sample each of what caches say, with light straight from the lights
 // and what is not cached sampled. `parts` may be null; else it has room for `count` elements. On any thread, also while the caches are filled.
 fogbow_status fogbow_radiance(const fogbow_caches *caches,
@@ -878,21 +899,6 @@ fogbow_status fogbow_irradiance(const fogbow_caches *caches,
                                 size_t count,
                                 float *irradiances,
                                 size_t *missing);
-
-// Saves caches as bytes: the same on every machine, with a version and checksums. `tag` says what they were made for: whatever changes the
-// light in the world. With a null `buffer`, `needed` alone is written; else it may be null. Not while they are filled.
-fogbow_status fogbow_caches_save(const fogbow_caches *caches,
-                                 uint64_t tag,
-                                 uint8_t *buffer,
-                                 size_t capacity,
-                                 size_t *needed);
-
-// Reads caches that were saved with the same tag, in place of what is there. The settings must be those they were made with, or ask for less. Where it fails,
-// some of what was there may be lost.
-fogbow_status fogbow_caches_load(fogbow_caches *caches,
-                                 uint64_t tag,
-                                 const uint8_t *bytes,
-                                 size_t count);
 
 // Work that compares the caches with path tracing along about `rays` eye rays of a view (0 for 16384; four times as many halve the error of what is found).
 // Meanwhile the caches can be read, but not filled.

@@ -7,8 +7,9 @@ use fogbow::cache::{Audit, Compared, Deviation, Kind as Part, RadianceCaches};
 use fogbow::work::Rounds;
 
 use crate::arguments::{self, Versioned};
-use crate::caches::{self, Eye, EyeRays, OwnedCaches, fogbow_caches, fogbow_view};
+use crate::caches::{self, OwnedCaches, fogbow_caches};
 use crate::status::{FOGBOW_ERROR_ARGUMENT, FOGBOW_ERROR_BUSY, Failure, Outcome, fogbow_status, guard};
+use crate::view::{Eye, EyeRays, fogbow_view};
 use crate::work::{self, Kind, Made, Place, Steps, Work, fogbow_work};
 use crate::world::{self, OwnedWorld, fogbow_world};
 
@@ -45,15 +46,16 @@ impl Steps for AuditWork {
         Ok("audit")
     }
 
-    fn run(&self, job: u32, world: &OwnedWorld, made: Option<Made>) -> Outcome<Made> {
+    fn run(&self, job: u32, world: &OwnedWorld, made: Option<Made>) -> Outcome<Option<Made>> {
         let mut compared =
             if let Some(Made::Compared(compared)) = made { compared } else { Box::<Compared>::default() };
         self.with(|audit| {
-            work::check(job, &Rounds::<Place<'_>>::jobs(audit))?;
-            audit.run(job, &world.get(), &mut compared);
-            Ok(())
-        })??;
-        Ok(Made::Compared(compared))
+            let is_due = Rounds::<Place<'_>>::jobs(audit).contains(&job);
+            is_due.then(|| {
+                audit.run(job, &world.get(), &mut compared);
+                Made::Compared(compared)
+            })
+        })
     }
 
     fn accept(&self, made: &Made, may_wait: bool) -> Outcome<bool> {
@@ -92,7 +94,7 @@ pub unsafe extern "C" fn fogbow_audit(
         let rays = if rays == 0 { USUAL_RAYS } else { rays.min(MOST_RAYS) };
         let of = Borrowing { audit: Audit::new(borrowed, eye.rays(), rays), _caches: shared };
         let audit = AuditWork { of: RwLock::new(Some(of)), caches, eye };
-        work.set(Work::put(Kind::Audit(audit), world)?);
+        work.set(Work::put(Kind::Audit(Box::new(audit)), world)?);
         Ok(())
     })
 }

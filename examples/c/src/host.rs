@@ -230,8 +230,9 @@ impl Medium for HostMedium {
             return MajorantSegment { until: f32::INFINITY, minorant: Spectrum::ZERO, majorant: self.majorant };
         };
         let mut segment = fogbow_segment { until: f32::INFINITY, ..fogbow_segment::default() };
+        let ray = fogbow_ray::of(ray);
         // SAFETY: as above.
-        unsafe { bounds(self.of.context, &raw const *&fogbow_ray::of(ray), from, &raw mut segment) };
+        unsafe { bounds(self.of.context, &raw const ray, from, &raw mut segment) };
         let fogbow_segment { until, minorant, majorant } = segment;
         let (minorant, majorant) = (Spectrum(minorant), Spectrum(majorant));
         let is_ordered = minorant.zip(majorant, |least, most| most - least).min_element() >= 0.0;
@@ -393,9 +394,9 @@ impl HostScene {
 impl Scene for HostScene {
     fn closest_hit(&self, ray: &Ray) -> Option<Hit> {
         let closest_hit = self.closest_hit?;
-        let mut hit = fogbow_hit::NOTHING;
+        let (asked, mut hit) = (fogbow_ray::of(ray), fogbow_hit::NOTHING);
         // SAFETY: the host's function, with pointers that are good during the call.
-        if unsafe { closest_hit(self.context, &raw const *&fogbow_ray::of(ray), &raw mut hit) } == 0 {
+        if unsafe { closest_hit(self.context, &raw const asked, &raw mut hit) } == 0 {
             return None;
         }
         let normal = Vec3::from_array(hit.normal);
@@ -419,9 +420,10 @@ impl Scene for HostScene {
     }
 
     fn is_blocked(&self, ray: &Ray) -> bool {
+        let asked = fogbow_ray::of(ray);
         match (self.is_blocked, self.closest_hit) {
             // SAFETY: as above.
-            (Some(is_blocked), _) => unsafe { is_blocked(self.context, &raw const *&fogbow_ray::of(ray)) != 0 },
+            (Some(is_blocked), _) => unsafe { is_blocked(self.context, &raw const asked) != 0 },
             (None, Some(_)) => fogbow::world::nearest_surface(ray, self).is_some(),
             (None, None) => false,
         }

@@ -8,7 +8,8 @@
 //! | `host` | callbacks of the host, and checks of their answers |
 //! | `medium`, `light`, `world` | the world |
 //! | `work` | jobs of fills, bakes and audits |
-//! | `caches`, `audit` | radiance caches |
+//! | `view` | eye rays |
+//! | `caches`, `readers`, `audit` | radiance caches |
 //! | `probes` | baked light |
 //! | `phase`, `transmittance`, `covariance`, `records`, `compensation` | formulas |
 #![expect(non_camel_case_types, reason = "types have the names that C knows")]
@@ -24,9 +25,11 @@ mod light;
 mod medium;
 mod phase;
 mod probes;
+mod readers;
 mod records;
 mod status;
 mod transmittance;
+mod view;
 mod work;
 mod world;
 
@@ -39,8 +42,10 @@ pub use light::*;
 pub use medium::*;
 pub use phase::*;
 pub use probes::*;
+pub use readers::*;
 pub use records::*;
 pub use status::*;
 pub use transmittance::*;
+pub use view::*;
 pub use work::*;
 pub use world::*;

@@ -197,13 +197,15 @@ impl Steps for BakeWork {
         Ok("bake")
     }
 
-    fn run(&self, job: u32, world: &OwnedWorld, made: Option<Made>) -> Outcome<Made> {
+    fn run(&self, job: u32, world: &OwnedWorld, made: Option<Made>) -> Outcome<Option<Made>> {
         let mut baked = if let Some(Made::Probes(baked)) = made { baked } else { BakedProbes::default() };
         let of = self.look();
         let Borrowing { bake, .. } = of.as_ref().ok_or_else(taken)?;
-        work::check(job, &Rounds::<Place<'_>>::jobs(bake))?;
+        if !Rounds::<Place<'_>>::jobs(bake).contains(&job) {
+            return Ok(None);
+        }
         bake.run(job, &world.get(), &mut baked);
-        Ok(Made::Probes(baked))
+        Ok(Some(Made::Probes(baked)))
     }
 
     fn accept(&self, made: &Made, may_wait: bool) -> Outcome<bool> {
@@ -258,7 +260,7 @@ pub unsafe extern "C" fn fogbow_bake(
             bake = bake.with_caches(unsafe { &*Arc::as_ptr(caches) });
         }
         let of = Borrowing { bake, _caches: caches };
-        work.set(Work::put(Kind::Bake(BakeWork(RwLock::new(Some(of)))), world)?);
+        work.set(Work::put(Kind::Bake(Box::new(BakeWork(RwLock::new(Some(of))))), world)?);
         Ok(())
     })
 }

@@ -3,6 +3,7 @@
 use core::ffi::c_char;
 use core::fmt;
 use core::ops::Range;
+use core::ptr;
 use core::sync::atomic::{AtomicU64, Ordering};
 use std::collections::BTreeMap;
 use std::ffi::CString;
@@ -41,7 +42,7 @@ pub struct fogbow_result {
 /// What a job leaves.
 #[derive(Debug)]
 pub(crate) enum Made {
-    Records(FilledRecords<'static>),
+    Records(Box<FilledRecords<'static>>),
     Probes(BakedProbes<'static>),
     Compared(Box<Compared>),
 }
@@ -50,8 +51,8 @@ pub(crate) enum Made {
 pub(crate) trait Steps: Send + Sync {
     fn jobs(&self) -> Outcome<Range<u32>>;
     fn stage(&self) -> Outcome<&'static str>;
-    /// Runs a job that is due into `made`, or into new memory if that is of other work.
-    fn run(&self, job: u32, world: &OwnedWorld, made: Option<Made>) -> Outcome<Made>;
+    /// Runs a job into `made`, or into new memory if that is of other work. `None` if it is not due.
+    fn run(&self, job: u32, world: &OwnedWorld, made: Option<Made>) -> Outcome<Option<Made>>;
     /// Takes the result of the first job that is due. While others run, waits for them to end if it `may_wait`; if not, returns `false`.
     fn accept(&self, made: &Made, may_wait: bool) -> Outcome<bool>;
     /// About what share of the work is done, if that can be told.
@@ -63,16 +64,16 @@ pub(crate) trait Steps: Send + Sync {
 /// What kind of work it is.
 pub(crate) enum Kind {
     Fill(FillWork),
-    Bake(BakeWork),
-    Audit(AuditWork),
+    Bake(Box<BakeWork>),
+    Audit(Box<AuditWork>),
 }
 
 impl Kind {
     fn steps(&self) -> &dyn Steps {
         match self {
             Self::Fill(work) => work,
-            Self::Bake(work) => work,
-            Self::Audit(work) => work,
+            Self::Bake(work) => &**work,
+            Self::Audit(work) => &**work,
         }
     }
 }
@@ -87,8 +88,10 @@ pub(crate) struct Work {
 
 #[derive(Default)]
 struct State {
-    /// How many rounds have begun.
+    /// How many rounds have ended.
     round: u64,
+    /// No job ever had this number, or a greater one.
+    most: u32,
     early: BTreeMap<u32, Made>,
     /// Memory to be used again.
     spare: Vec<Made>,
@@ -134,14 +137,6 @@ pub(crate) fn failure<T>(message: String) -> Outcome<T> {
 /// Where jobs are done.
 pub(crate) type Place<'w> = World<'w, AnyMedium, AnyScene>;
 
-/// Whether a job is due.
-pub(crate) fn check(job: u32, due: &Range<u32>) -> Outcome {
-    if due.contains(&job) {
-        return Ok(());
-    }
-    failure(format!("job {job} is not due; those from {} to below {} are", due.start, due.end))
-}
-
 /// The right to change what jobs look at: `None` if some do, unless it may wait for them.
 pub(crate) fn change<T>(lock: &RwLock<T>, may_wait: bool) -> Option<RwLockWriteGuard<'_, T>> {
     if may_wait {
@@ -172,25 +167,35 @@ impl Work {
         Ok(())
     }
 
-    /// Runs a job; the round it belongs to, and what it made.
-    fn run(&self, job: u32) -> Outcome<(u64, Made)> {
+    /// Runs a job; the round it belongs to, and what it made. `None` if its result is there already.
+    fn run(&self, job: u32) -> Outcome<Option<(u64, Made)>> {
         let (round, spare) = {
             let mut state = self.state();
             Self::whole(&state)?;
-            check(job, &self.kind.steps().jobs()?)?;
+            let due = self.kind.steps().jobs()?;
+            state.most = state.most.max(due.end);
+            if job >= state.most {
+                return failure(format!(
+                    "there was never a job {job}; those from {} to below {} are due",
+                    due.start, due.end
+                ));
+            }
+            if !due.contains(&job) || state.early.contains_key(&job) {
+                return Ok(None);
+            }
             (state.round, state.spare.pop())
         };
-        // Should the round end meanwhile, because somebody else ran the same job, the result is of no round and is refused.
-        let made = self.kind.steps().run(job, &self.world, spare)?;
-        Ok((round, made))
+        // The round may end meanwhile, if somebody else has run the same job.
+        Ok(self.kind.steps().run(job, &self.world, spare)?.map(|made| (round, made)))
     }
 
     fn accept(&self, round: u64, job: u32, made: Made) -> Outcome {
         let mut state = self.state();
         Self::whole(&state)?;
         let due = self.kind.steps().jobs()?;
+        // Jobs are pure: what is there already says the same.
         if round != state.round || !due.contains(&job) || state.early.contains_key(&job) {
-            return failure(format!("the result of job {job} is there already, or of a round that is over"));
+            return Ok(());
         }
         state.early.insert(job, made);
         self.advance(&mut state)
@@ -225,8 +230,9 @@ impl Work {
     fn step(&self) -> Outcome<bool> {
         self.advance(&mut self.state())?;
         let Some(job) = self.kind.steps().jobs()?.next() else { return Ok(false) };
-        let (round, made) = self.run(job)?;
-        self.accept(round, job, made)?;
+        if let Some((round, made)) = self.run(job)? {
+            self.accept(round, job, made)?;
+        }
         Ok(true)
     }
 }
@@ -237,7 +243,8 @@ pub(crate) fn get(work: *const fogbow_work) -> Outcome<Arc<Work>> {
 
 /// Numbers of the jobs that are due: from `first` to below `end`; equal ones if all is done.
 ///
-/// They stay due until their results are accepted: hand each number out once, or work is done twice. Safe on any thread.
+/// They stay due until it is their turn: hand each number out once, or work is done twice. Those of results that never came back are due again. Safe on any
+/// thread.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn fogbow_work_jobs(work: *const fogbow_work, first: *mut u32, end: *mut u32) -> fogbow_status {
     guard(|| {
@@ -252,7 +259,8 @@ pub unsafe extern "C" fn fogbow_work_jobs(work: *const fogbow_work, first: *mut 
     })
 }
 
-/// Runs a job that is due. Safe on any thread, many at a time. The result is to be accepted, or freed.
+/// Runs a job. Safe on any thread, many at a time. The result is to be accepted, or freed; it is null for a job whose result is there already or whose
+/// round is over, which is not run again.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn fogbow_work_run(
     work: *const fogbow_work,
@@ -263,19 +271,23 @@ pub unsafe extern "C" fn fogbow_work_run(
         let work = get(work)?;
         // SAFETY: what the head of the header asks of pointers.
         let result = unsafe { arguments::place(result, "result")? };
-        let (round, made) = work.run(job)?;
-        let answer = Answer { work: work.number, round, job, made: Mutex::new(Some(made)) };
-        result.set(handles::put(answer)?);
+        result.set(match work.run(job)? {
+            None => ptr::null_mut(),
+            Some((round, made)) => {
+                handles::put(Answer { work: work.number, round, job, made: Mutex::new(Some(made)) })?
+            }
+        });
         Ok(())
     })
 }
 
-/// Takes a result back and frees its handle, whatever comes of it. Safe on any thread, in any order.
+/// Takes a result back and frees its handle, whatever comes of it. Safe on any thread, in any order. Null is nothing.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn fogbow_work_accept(work: *mut fogbow_work, result: *mut fogbow_result) -> fogbow_status {
     guard(|| {
-        let Some(answer) = handles::take::<Answer>(result, "result")? else { return Err(arguments::null("result")) };
+        let answer = handles::take::<Answer>(result, "result")?;
         let work = get(work)?;
+        let Some(answer) = answer else { return Ok(()) };
         if answer.work != work.number {
             return failure(format!("the result of job {} is of other work", answer.job));
         }
