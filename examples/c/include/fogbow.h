@@ -73,6 +73,18 @@
 // An interface that light passes unchanged.
 #define FOGBOW_SURFACE_NULL 4
 
+// A thin pane of glass, both faces as one, of the parameters of a dielectric; what passes goes straight on.
+#define FOGBOW_SURFACE_PANE 5
+
+// A rough metal (GGX) of `reflectance` and `roughness`, on the side of the normal.
+#define FOGBOW_SURFACE_ROUGH_METAL 6
+
+// Rough glass (GGX), of the parameters of a dielectric, `eta` not 1, and `roughness`.
+#define FOGBOW_SURFACE_ROUGH_DIELECTRIC 7
+
+// A diffuse base of `reflectance` under a smooth coat of index `eta`, whose reflections have the factor `specular`; on the side of the normal.
+#define FOGBOW_SURFACE_PLASTIC 8
+
 // The hit is on no lamp.
 #define FOGBOW_NO_LIGHT 4294967295
 
@@ -346,6 +358,8 @@ typedef struct {
     float distance;
     // Geometric normal (unit); surfaces shine and reflect on the side it points to. For two-sided ones, turn it against the ray.
     float normal[3];
+    // The normal (unit) that scattering goes by, on the side of the other: interpolated between vertices, or bent by a texture. Zeros: the geometric one.
+    float shading[3];
     // `FOGBOW_SURFACE_…`.
     uint32_t surface;
     // Share of light reflected, in [0, 1].
@@ -358,6 +372,8 @@ typedef struct {
     float exponent;
     // Relative index of refraction, above 0.
     float eta;
+    // Width of the distribution of facets, in [0.001, 1].
+    float roughness;
     // Number of the light whose surface this is, or `FOGBOW_NO_LIGHT`. Each light with an area must be found so.
     uint32_t light;
 } fogbow_hit;

@@ -6,7 +6,7 @@ use fogbow::host::{Hit, MajorantSegment, Medium, Properties, Scene};
 use fogbow::math::{Ray, Vec3};
 use fogbow::phase::{Lobe, Phase};
 use fogbow::spectrum::Spectrum;
-use fogbow::surface::Surface;
+use fogbow::surface::{Conductor, Distribution, Plastic, RoughConductor, RoughDielectric, Roughness, Surface};
 
 use crate::arguments::{self, Versioned, is_unit};
 use crate::status::{Outcome, complain, refused, wrong};
@@ -279,6 +279,15 @@ pub const FOGBOW_SURFACE_DIELECTRIC: u32 = 3;
 /// An interface that light passes unchanged.
 pub const FOGBOW_SURFACE_NULL: u32 = 4;
 
+/// A thin pane of glass, both faces as one, of the parameters of a dielectric; what passes goes straight on.
+pub const FOGBOW_SURFACE_PANE: u32 = 5;
+/// A rough metal (GGX) of `reflectance` and `roughness`, on the side of the normal.
+pub const FOGBOW_SURFACE_ROUGH_METAL: u32 = 6;
+/// Rough glass (GGX), of the parameters of a dielectric, `eta` not 1, and `roughness`.
+pub const FOGBOW_SURFACE_ROUGH_DIELECTRIC: u32 = 7;
+/// A diffuse base of `reflectance` under a smooth coat of index `eta`, whose reflections have the factor `specular`; on the side of the normal.
+pub const FOGBOW_SURFACE_PLASTIC: u32 = 8;
+
 /// The hit is on no lamp.
 pub const FOGBOW_NO_LIGHT: u32 = 0xffff_ffff;
 
@@ -290,6 +299,8 @@ pub struct fogbow_hit {
     pub distance: f32,
     /// Geometric normal (unit); surfaces shine and reflect on the side it points to. For two-sided ones, turn it against the ray.
     pub normal: [f32; 3],
+    /// The normal (unit) that scattering goes by, on the side of the other: interpolated between vertices, or bent by a texture. Zeros: the geometric one.
+    pub shading: [f32; 3],
     /// `FOGBOW_SURFACE_…`.
     pub surface: u32,
     /// Share of light reflected, in [0, 1].
@@ -302,6 +313,8 @@ pub struct fogbow_hit {
     pub exponent: f32,
     /// Relative index of refraction, above 0.
     pub eta: f32,
+    /// Width of the distribution of facets, in [0.001, 1].
+    pub roughness: f32,
     /// Number of the light whose surface this is, or `FOGBOW_NO_LIGHT`. Each light with an area must be found so.
     pub light: u32,
 }
@@ -310,12 +323,14 @@ impl fogbow_hit {
     const NOTHING: Self = Self {
         distance: 0.0,
         normal: [0.0; 3],
+        shading: [0.0; 3],
         surface: FOGBOW_SURFACE_LAMBERT,
         reflectance: [0.0; 3],
         specular: [0.0; 3],
         transmittance: [1.0; 3],
         exponent: 0.0,
         eta: 1.0,
+        roughness: 0.0,
         light: FOGBOW_NO_LIGHT,
     };
 
@@ -323,6 +338,11 @@ impl fogbow_hit {
     fn surface(&self) -> Option<Surface> {
         let share = |of: Rgb| of.iter().all(|c| *c >= 0.0 && *c <= 1.0).then_some(Spectrum(of));
         let reflectance = share(self.reflectance)?;
+        let index = || Some(self.eta).filter(|eta| *eta > 0.0 && *eta < f32::INFINITY);
+        let facets = || {
+            let is_sound = (1e-3..=1.0).contains(&self.roughness);
+            is_sound.then(|| Roughness::even(Distribution::Ggx, self.roughness))
+        };
         Some(match self.surface {
             FOGBOW_SURFACE_LAMBERT => Surface::Lambert { reflectance },
             FOGBOW_SURFACE_MIRROR => Surface::Mirror { reflectance },
@@ -335,9 +355,24 @@ impl fogbow_hit {
                 is_sound.then_some(Surface::Phong { diffuse: reflectance, specular, exponent: self.exponent })?
             }
             FOGBOW_SURFACE_DIELECTRIC => {
-                let transmittance = share(self.transmittance)?;
-                let is_sound = self.eta > 0.0 && self.eta.is_finite();
-                is_sound.then_some(Surface::Dielectric { eta: self.eta, reflectance, transmittance })?
+                let (eta, transmittance) = (index()?, share(self.transmittance)?);
+                Surface::Dielectric { eta, reflectance, transmittance }
+            }
+            FOGBOW_SURFACE_PANE => {
+                let (eta, transmittance) = (index()?, share(self.transmittance)?);
+                Surface::ThinDielectric { eta, reflectance, transmittance }
+            }
+            FOGBOW_SURFACE_ROUGH_METAL => {
+                let roughness = facets()?;
+                Surface::RoughConductor(RoughConductor { conductor: Conductor::mirror(reflectance), roughness })
+            }
+            FOGBOW_SURFACE_ROUGH_DIELECTRIC => {
+                let (eta, transmittance) = (index().filter(|eta| *eta != 1.0)?, share(self.transmittance)?);
+                Surface::RoughDielectric(RoughDielectric { eta, reflectance, transmittance, roughness: facets()? })
+            }
+            FOGBOW_SURFACE_PLASTIC => {
+                let (eta, specular) = (index()?, share(self.specular)?);
+                Surface::Plastic(Plastic { eta, diffuse: reflectance, specular, nonlinear: false })
             }
             _ => return None,
         })
@@ -404,6 +439,12 @@ impl Scene for HostScene {
             complain("the callback `closest_hit` gave a distance outside the ray, or a normal that is not of length 1");
             return None;
         }
+        let shading = Vec3::from_array(hit.shading);
+        let shading = if shading == Vec3::ZERO { normal } else { shading };
+        if !(is_unit(shading) && shading.dot(normal) > 0.0) {
+            complain("the callback `closest_hit` gave a shading normal that is not of length 1, or on the other side");
+            return None;
+        }
         let surface = hit.surface().unwrap_or_else(|| {
             complain("the callback `closest_hit` gave a surface that there is not, or values outside their ranges");
             Surface::BLACK
@@ -416,7 +457,7 @@ impl Scene for HostScene {
             }
             is_one
         });
-        Some(Hit { distance: hit.distance, normal, surface, light })
+        Some(Hit { distance: hit.distance, normal, shading, surface, light })
     }
 
     fn is_blocked(&self, ray: &Ray) -> bool {

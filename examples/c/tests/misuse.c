@@ -698,7 +698,7 @@ int main(void) {
     fogbow_world_parts odd_parts = parts;
     odd_parts.scene = &scene;
     OK(fogbow_world_new(&odd_parts, &odd));
-    for (int i = 0; i < 10; i++) {
+    for (int i = 0; i < 15; i++) {
         answer = (fogbow_hit){.distance = 1, .normal = {0, 0, -1}, .eta = 1, .light = FOGBOW_NO_LIGHT};
         if (i == 0) answer.distance = NAN;
         if (i == 1) answer.distance = -1;
@@ -710,6 +710,11 @@ int main(void) {
         if (i == 7) answer.light = 1;
         if (i == 8) answer.surface = FOGBOW_SURFACE_DIELECTRIC, answer.eta = 0;
         if (i == 9) answer.surface = FOGBOW_SURFACE_PHONG, answer.exponent = NAN;
+        if (i == 10) answer.shading[2] = 1;
+        if (i == 11) answer.shading[0] = NAN;
+        if (i == 12) answer.surface = FOGBOW_SURFACE_PANE, answer.eta = -1;
+        if (i == 13) answer.surface = FOGBOW_SURFACE_ROUGH_METAL, answer.roughness = NAN;
+        if (i == 14) answer.surface = FOGBOW_SURFACE_ROUGH_DIELECTRIC, answer.roughness = 0.5f;
         FAILS(HOST, fogbow_path_trace(odd, &ray, 1, chance, rgb));
         for (int k = 0; k < 3; k++) wrong += !isfinite(rgb[k]);
         FAILS(HOST, fogbow_world_outline(odd, &outline));

@@ -55,7 +55,7 @@ impl Scene for Box {
                 nearest = t;
                 let normal = Vec3::from_array([0, 1, 2].map(|k| if k == axis { side } else { 0.0 }));
                 let surface = Surface::Lambert { reflectance: Spectrum(colour) };
-                found = Some(Hit { distance: t, normal, surface, light: is_lamp.then_some(0) });
+                found = Some(Hit { distance: t, normal, shading: normal, surface, light: is_lamp.then_some(0) });
             }
         }
         for (centre, radius, colour) in BALLS {
@@ -68,7 +68,7 @@ impl Scene for Box {
                 nearest = t;
                 let normal = Vec3::from_array([0, 1, 2].map(|k| (from[k] + t * d[k]) / radius));
                 let surface = Surface::Mirror { reflectance: Spectrum(colour) };
-                found = Some(Hit { distance: t, normal, surface, light: None });
+                found = Some(Hit { distance: t, normal, shading: normal, surface, light: None });
             }
         }
         found
