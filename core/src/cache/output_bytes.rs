@@ -156,3 +156,55 @@ impl FilledRecords<'_> {
         received.list(&mut self.deposits)
     }
 }
+
+#[cfg(all(test, feature = "alloc"))]
+mod tests {
+    use super::*;
+    use alloc::vec::Vec;
+    use glam::Vec3;
+
+    fn left() -> FilledRecords<'static> {
+        let mut output = FilledRecords { paths: 7, flights: 1 << 40, is_cut: true, ..FilledRecords::default() };
+        let place = Place { point: Vec3::new(1.0, 2.0, 3.0), normal: Some(Vec3::Y), to_eye: None, ..Place::default() };
+        output.estimate = Some(Estimate { number: 3, place, effort: 0.5, ..Estimate::default() });
+        output.wanted.push(Wanted { place, distance: f32::INFINITY, ray: 9 }).unwrap();
+        output.open.extend_from_slice(&[1, 2, 3]).unwrap();
+        output.higher.push(Coefficient::ZERO).unwrap();
+        output.deposits.push(PhotonDeposit::default()).unwrap();
+        output
+    }
+
+    #[test]
+    fn all_comes_back() {
+        let (output, mut read) = (left(), FilledRecords::default());
+        assert_eq!(read.read(&output.to_bytes()), Ok(()));
+        assert_eq!(read.to_bytes(), output.to_bytes());
+        assert_eq!(alloc::format!("{read:?}"), alloc::format!("{output:?}"));
+    }
+
+    #[test]
+    fn damage_is_an_error() {
+        let bytes = left().to_bytes();
+        let mut read = FilledRecords::default();
+        for length in 0..bytes.len() {
+            assert!(read.read(&bytes[..length]).is_err(), "{length} bytes");
+        }
+        for at in 0..bytes.len() {
+            let mut damaged: Vec<u8> = bytes.clone();
+            damaged[at] ^= 0x10;
+            assert!(read.read(&damaged).is_err(), "byte {at}");
+        }
+        let mut longer = bytes;
+        longer.push(0);
+        assert_eq!(read.read(&longer), Err(JobBytesError::Length));
+    }
+
+    #[test]
+    fn lent_memory_may_be_too_small() {
+        let bytes = left().to_bytes();
+        let (mut wanted, mut open, mut higher, mut deposits) =
+            ([Wanted::default(); 1], [0; 2], [Coefficient::ZERO; 1], [PhotonDeposit::default(); 1]);
+        let mut read = FilledRecords::lent(&mut wanted, &mut open, &mut higher, &mut deposits);
+        assert_eq!(read.read(&bytes), Err(JobBytesError::Full));
+    }
+}

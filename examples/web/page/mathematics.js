@@ -95,7 +95,7 @@ export async function mathematics(element, eye) {
     paint(context, (i) => shade(slice[i], most * 4), [0, 0, WIDTH, HEIGHT]);
     context.strokeStyle = "#7fffd4";
     context.lineWidth = 1.25;
-    let [least, count] = [Infinity, 0];
+    const cells = [];
     for (let k = 0; k < size[2]; k++) {
       for (let i = 0; i < size[0]; i++) {
         const cell = 6 * (i + size[0] * (layer + size[1] * k));
@@ -105,16 +105,23 @@ export async function mathematics(element, eye) {
         const [middle, spread] = [(xx + zz) / 2, Math.hypot((xx - zz) / 2, xz)];
         const reach = [middle + spread, middle - spread].map((c) => 1 / (2 * Math.PI * Math.sqrt(Math.max(c, 1e-6))));
         const angle = 0.5 * Math.atan2(2 * xz, zz - xx);
-        const cellSize = METRE * (HIGH[2] / size[2]);
-        const radii = reach.map((r) => Math.min(r * METRE, 0.48 * cellSize));
-        context.beginPath();
-        context.ellipse(left(((k + 0.5) / size[2]) * HIGH[2]), top(((i + 0.5) / size[0]) * HIGH[0]), ...radii, angle, 0, 2 * Math.PI);
-        context.stroke();
-        least = Math.min(least, reach[0]);
-        count++;
+        cells.push({ centre: [left(((k + 0.5) / size[2]) * HIGH[2]), top(((i + 0.5) / size[0]) * HIGH[0])], reach, angle });
       }
     }
-    element("covariance-values").textContent = count ? `${count} cells; shortest reach ${(100 * least).toFixed(0)} cm` : "no light here";
+    // The longer axis of most of them fits into a cell; all are drawn to that scale.
+    const longest = cells.map(({ reach }) => reach[1]).sort((a, b) => a - b)[Math.floor(0.8 * cells.length)];
+    const cellSize = METRE * (HIGH[2] / size[2]);
+    for (const { centre, reach, angle } of cells) {
+      // The first axis is that along which light varies most.
+      const radii = reach.map((r) => Math.max(1, 0.48 * cellSize * Math.min(1, r / longest)));
+      context.beginPath();
+      context.ellipse(...centre, ...radii, angle, 0, 2 * Math.PI);
+      context.stroke();
+    }
+    const shortest = Math.min(...cells.map(({ reach }) => reach[0]));
+    element("covariance-values").textContent = cells.length
+      ? `${cells.length} cells; light stays alike over ${(100 * shortest).toFixed(0)} cm at least, and ${(100 * longest).toFixed(0)} cm where a cell is full`
+      : "no light here";
   }
 
   function drawVirtual() {
@@ -146,12 +153,13 @@ export async function mathematics(element, eye) {
     const on = world.virtualLight(light, line);
     context.fillStyle = "#101216";
     context.fillRect(0, HEIGHT / 2 + 2, WIDTH, HEIGHT / 2 - 2);
+    const highest = Math.max(1e-12, ...Array.from({ length: count }, (_, i) => mean(on.all, 3 * i)));
     const curve = (values, colour) => {
       context.strokeStyle = colour;
       context.lineWidth = 2;
       context.beginPath();
       for (let i = 0; i < count; i++) {
-        const t = Math.max(0, Math.min(1.2, 1 + Math.log10(Math.max(mean(values, 3 * i), 1e-12) / brightest) / 3));
+        const t = Math.max(0, 1 + Math.log10(Math.max(mean(values, 3 * i), 1e-20) / highest) / 5);
         context.lineTo(((i + 0.5) / count) * WIDTH, HEIGHT - 8 - t * (HEIGHT / 2 - 40));
       }
       context.stroke();

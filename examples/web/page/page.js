@@ -380,7 +380,7 @@ const truth = {
     for (let i = 0; i < baked.length; i += 4) sum += baked[i] + baked[i + 1] + baked[i + 2];
     const off = sum / ((baked.length / 4) * 3) / this.level - 1;
     const more = off >= 0 ? "brighter" : "darker";
-    this.say(`Baked light is ${Math.abs(100 * off).toFixed(1)} % ${more} on the whole (${this.samples} samples). Orange: too bright; blue: too dark; full colour at half of the mean light.`);
+    this.say(`Baked light is ${Math.abs(100 * off).toFixed(1)} % ${more} on the whole (${this.samples} samples). Orange: too bright; blue: too dark, means over some pixels; full colour at half of the mean light.`);
     this.off = off;
   },
 

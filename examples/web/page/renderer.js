@@ -187,8 +187,16 @@ void main() {
     vec3 traced = texture(truth, vec2(film.x, 1.0 - film.y)).rgb;
     if (mode == 0) { colour = vec4(film_of(baked), 1.0); return; }
     if (mode == 1) { colour = vec4(film_of(traced), 1.0); return; }
-    // Too bright orange, too dark blue; full at half of the mean light.
-    float off = dot(baked - traced, vec3(1.0 / 3.0)) / max(level, 1e-9) * 2.0;
+    // Means over nine by nine pixels: of single ones little is known but their noise. Too bright orange, too dark blue; full at half of the mean light.
+    vec3 more = vec3(0.0);
+    vec2 pixel = 1.0 / vec2(textureSize(truth, 0));
+    for (int y = -4; y <= 4; y++) {
+        for (int x = -4; x <= 4; x++) {
+            vec2 at = clamp(film + vec2(x, y) * pixel, 0.0, 1.0);
+            more += texture(picture, at).rgb - texture(truth, vec2(at.x, 1.0 - at.y)).rgb;
+        }
+    }
+    float off = dot(more, vec3(1.0 / 243.0)) / max(level, 1e-9) * 2.0;
     vec3 hue = off > 0.0 ? vec3(0.95, 0.45, 0.05) : vec3(0.1, 0.4, 0.95);
     colour = vec4(mix(vec3(0.1), hue, clamp(abs(off), 0.0, 1.0)), 1.0);
 }`;

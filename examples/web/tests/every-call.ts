@@ -141,7 +141,7 @@ await workers.caches(there, options).then(() => holds(false, "a freed world"), (
 workers.close();
 
 // What is refused, and in which words
-refuses(() => new World({ media: [Medium.homogeneous({ scattering: -1, box })] }), /medium 0: coefficients/);
+refuses(() => new World({ media: [Medium.homogeneous({ scattering: -1, box })] }), /medium 0: absorption and scattering must be finite/);
 refuses(() => new World({ lights: [Light.quad({ corner: [0, 0, 0], edgeU: [0, 0, 0], edgeV: [0, 1, 0], radiance: 1 })] }), /light 0: /);
 refuses(() => new World({ scene: new Scene().sphere([0, 0, 0], -1) }), /sphere 0: a radius must be finite and positive/);
 refuses(() => new Scene().triangles([0, 0, 0], [0, 1, 2]), /triangle 0: vertex 1 is none of 1/);
