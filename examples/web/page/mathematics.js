@@ -36,7 +36,7 @@ export async function mathematics(element, eye) {
   const TO_EYE = [0, 1, 0];
   let world = null;
   let now = null;
-  let at = [3.6, 4.8];
+  let at = [2.3, 3.9];
   let slice = null;
   let most = 1;
   let waiting = 0;
@@ -134,7 +134,8 @@ export async function mathematics(element, eye) {
       const length = Math.hypot(...way);
       return way.map((c) => c / length);
     };
-    const position = [3.7, height, 5];
+    // In a corner of the cells: in a centre, one point would have nearly all of the light.
+    const position = [3.75, height, 4.95];
     // Towards where its light came from: the lamp.
     const light = { position, incoming: to(position, now.lamp), flux: 1, bound: 1 / within ** 2, eye: [3, height + 20, 5] };
     const { clamped, all } = world.virtualLight(light, points(height));
