@@ -48,6 +48,7 @@
 //! | follow light from the lights | [`photon`] |
 //! | one formula | [`math`], [`sampling`], [`sh`], [`spectrum`], and the index of equations: `EQUATIONS.md` beside this crate's manifest |
 //! | lend memory, save bytes | [`storage`], [`bytes`] |
+//! | send what jobs leave to workers that share no memory | [`sent`] |
 //!
 //! The head of each module holds its formula, its source and its files. How the modules build on each other, and why:
 //! `ARCHITECTURE.md` and `decisions/`, beside the manifest, too.

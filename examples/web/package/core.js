@@ -64,8 +64,7 @@ function call(name, ...args) {
     answer = module[name](...args) >>> 0;
   } catch (error) {
     // A bug of the library, or no memory is left: what is in the module cannot be trusted any more.
-    const [at, length] = [module.fogbow_panic() >>> 0, module.fogbow_panic_length() >>> 0];
-    ended = length ? new TextDecoder().decode(new Uint8Array(module.memory.buffer, at, length)) : String(error.message ?? error);
+    ended = `${error.message ?? error}; no memory is left, or this is a bug`;
     throw new FogbowError(`the module has ended: ${ended}`);
   }
   if (answer === FAILED) {

@@ -415,36 +415,9 @@ fn address(memory: &[u32]) -> u32 {
     memory.as_ptr().addr() as u32
 }
 
+/// Panics are bugs of the library, and end the module: the package says so. They are compiled without words, which would be 4 % of it.
 #[cfg(target_family = "wasm")]
-mod panics {
-    use alloc::string::ToString;
-    use core::sync::atomic::{AtomicU32, Ordering};
-
-    /// Address and length of the last words of the module.
-    static ADDRESS: AtomicU32 = AtomicU32::new(0);
-    static LENGTH: AtomicU32 = AtomicU32::new(0);
-
-    /// Leaves the message where JavaScript finds it: not in the state, which may be in the middle of a call.
-    #[panic_handler]
-    fn panic(info: &core::panic::PanicInfo<'_>) -> ! {
-        let message = info.to_string();
-        ADDRESS.store(message.as_ptr().addr() as u32, Ordering::Relaxed);
-        LENGTH.store(message.len() as u32, Ordering::Relaxed);
-        core::mem::forget(message);
-        core::arch::wasm32::unreachable()
-    }
-
-    /// Where the message of the panic lies that has ended the module.
-    // SAFETY: no other symbol of this module is called so.
-    #[unsafe(no_mangle)]
-    extern "C" fn fogbow_panic() -> u32 {
-        ADDRESS.load(Ordering::Relaxed)
-    }
-
-    /// How many bytes it has.
-    // SAFETY: no other symbol of this module is called so.
-    #[unsafe(no_mangle)]
-    extern "C" fn fogbow_panic_length() -> u32 {
-        LENGTH.load(Ordering::Relaxed)
-    }
+#[panic_handler]
+fn panic(_: &core::panic::PanicInfo<'_>) -> ! {
+    core::arch::wasm32::unreachable()
 }
