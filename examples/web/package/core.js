@@ -24,12 +24,21 @@ export function hasSimd() {
 let exports = null;
 let ended = null;
 
-/** Compiles nothing twice: whoever calls again gets the module that is there. */
+let starting = null;
+
+/** Compiles nothing twice: whoever calls again, or meanwhile, gets the module that is there. After a failure one may try again. */
 export async function instantiate(source) {
   if (exports) return;
-  const resolved = await source();
-  const module = resolved instanceof WebAssembly.Module ? resolved : await WebAssembly.compile(resolved);
-  start(await WebAssembly.instantiate(module, {}));
+  starting ??= (async () => {
+    const resolved = await source();
+    const module = resolved instanceof WebAssembly.Module ? resolved : await WebAssembly.compile(resolved);
+    start(await WebAssembly.instantiate(module, {}));
+  })();
+  try {
+    await starting;
+  } finally {
+    starting = null;
+  }
 }
 
 /** As `instantiate`, without waiting: for workers and for Node. */

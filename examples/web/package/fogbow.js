@@ -2,17 +2,12 @@
 
 import { hasSimd, instantiate } from "./core.js";
 
-export { Caches, FogbowError, Probes, World, hasSimd, memoryBytes, trim } from "./core.js";
-export { Light, Medium, Scene } from "./describe.js";
-
-/** The version of this package. */
-export const version = "0.1.0";
+export * from "./api.js";
 
 const isNode = typeof process === "object" && process !== null && Boolean(process.versions?.node);
 
-// Both urls stand as they are, so that bundlers see them.
-const plain = new URL("./fogbow.wasm", import.meta.url);
-const simd = new URL("./fogbow-simd.wasm", import.meta.url);
+/** The module beside this file. Both urls stand as they are, so that bundlers see them. */
+const own = () => (hasSimd() ? new URL("./fogbow-simd.wasm", import.meta.url) : new URL("./fogbow.wasm", import.meta.url));
 
 async function fetched(url) {
   if (isNode && (typeof url === "string" ? url : url.href).startsWith("file:")) {
@@ -28,7 +23,7 @@ async function fetched(url) {
 export async function init(source) {
   await instantiate(async () => {
     const given = await source;
-    if (given === undefined) return fetched(hasSimd() ? simd : plain);
+    if (given === undefined) return fetched(own());
     if (typeof given === "string" || given instanceof URL) return fetched(given);
     if (typeof Response === "function" && given instanceof Response) return new Uint8Array(await given.arrayBuffer());
     return given;

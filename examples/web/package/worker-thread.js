@@ -1,47 +1,50 @@
 // What runs in each worker: its own instance of the module, and objects by number.
 
-import { Caches, Probes, World, instantiateSync } from "./core.js";
+import { Caches, FogbowError, Probes, World, instantiateSync } from "./core.js";
 
 const objects = new Map();
+
+function object(key) {
+  const found = objects.get(key);
+  if (!found) throw new FogbowError("the object has been freed");
+  return found;
+}
 
 const operations = {
   start: ({ module }) => instantiateSync(module),
   world: ({ key, words }) => void objects.set(key, new World(words)),
-  caches: ({ key, world, words }) => void objects.set(key, new Caches(objects.get(world), words)),
+  caches: ({ key, world, words }) => void objects.set(key, new Caches(object(world), words)),
   probes({ key, world, words, caches }) {
-    const probes = new Probes(objects.get(world), words);
-    probes.caches = caches === null ? null : objects.get(caches);
+    const probes = new Probes(object(world), words);
+    probes.caches = caches === null ? null : object(caches);
     objects.set(key, probes);
   },
   // Takes what all workers have left of the last jobs, in order, then runs its share of the next.
   step({ key, accept, worker, workers, jobs }) {
-    const object = objects.get(key);
-    for (const left of accept) object.accept(new Uint8Array(left));
-    const { next, end } = object.jobs;
+    const filled = object(key);
+    for (const left of accept) filled.accept(new Uint8Array(left));
+    const { next, end } = filled.jobs;
     const left = [];
-    for (let job = next + worker; job < Math.min(end, next + workers * jobs); job += workers) left.push(object.run(job).buffer);
-    return { left, next, end, ...status(object) };
+    for (let job = next + worker; job < Math.min(end, next + workers * jobs); job += workers) left.push(filled.run(job).buffer);
+    return { left, next, end, ...status(filled) };
   },
   // Alone: nothing has to be sent.
   alone({ key, jobs }) {
-    const object = objects.get(key);
-    if (object instanceof Caches) object.fill(jobs);
-    else object.bake(jobs);
-    return { left: [], ...object.jobs, ...status(object) };
+    const filled = object(key);
+    if (filled instanceof Caches) filled.fill(jobs);
+    else filled.bake(jobs);
+    return { left: [], ...filled.jobs, ...status(filled) };
   },
-  cancel: ({ key }) => objects.get(key).cancel?.(),
-  call({ key, name, args }) {
-    const answer = objects.get(key)[name](...args);
-    return answer;
-  },
+  cancel: ({ key }) => object(key).cancel?.(),
+  call: ({ key, name, args }) => object(key)[name](...args),
   free({ key }) {
     objects.get(key)?.free();
     objects.delete(key);
   },
 };
 
-function status(object) {
-  return object instanceof Caches ? { stage: object.stage } : { stage: "bake", error: object.error, share: object.share };
+function status(filled) {
+  return filled instanceof Caches ? { stage: filled.stage } : { stage: "bake", error: filled.error, share: filled.share };
 }
 
 /** Buffers that are handed over and not copied. */

@@ -23,7 +23,7 @@ await writeFile(
 
 import { instantiate } from "./core.js";
 
-export * from "./fogbow.js";
+export * from "./api.js";
 
 const BYTES = "${base64}";
 

@@ -27,8 +27,9 @@ const sum = (numbers: Float32Array): number => numbers.reduce((a, b) => a + b, 0
 const same = (a: ArrayLike<number>, b: ArrayLike<number>): boolean => a.length === b.length && Array.from(a).every((x, i) => Object.is(x, b[i]));
 
 refuses(() => memoryBytes(), /call init\(\)/);
-await init();
-await init(inlineBytes()); // Again is no error.
+await init(new Uint8Array(3)).then(() => holds(false, "damaged bytes"), () => {});
+await Promise.all([init(), init(inlineBytes())]);
+await init(); // Again is no error.
 console.log(`version ${version}, SIMD ${hasSimd()}`);
 
 // Descriptions
@@ -137,7 +138,7 @@ holds((await baked.textures()).harmonics.length === 1 && (await baked.values([0,
 await baked.load(await baked.save());
 await baked.bakeAnew(box);
 await Promise.all([baked.free(), filled.free(), there.free()]);
-await workers.caches(there, options).then(() => holds(false, "a freed world"), (error: unknown) => holds(error instanceof Error, "a freed world"));
+await workers.caches(there, options).then(() => holds(false, "a freed world"), (error: unknown) => holds(error instanceof FogbowError && /has been freed/.test(error.message), "a freed world"));
 workers.close();
 
 // What is refused, and in which words

@@ -41,6 +41,8 @@ try {
   const readme = await readFile(join(empty, "node_modules/fogbow/README.md"), "utf8");
   const example = (name) => new RegExp(`<!-- test: ${name} -->\n\`\`\`\\w+\n([^]*?)\n\`\`\``).exec(readme)[1];
 
+  const lines = example("page").split("\n").length;
+  check("a page that bakes a room has fewer than 60 lines", lines < 60, lines);
   await writeFile(join(empty, "fog.mjs"), example("node"));
   await run("node", ["fog.mjs"], { cwd: empty });
   const pixels = (await readFile(join(empty, "fog.ppm"))).subarray("P6 64 64 255\n".length);
