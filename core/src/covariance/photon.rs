@@ -15,9 +15,9 @@ use super::light_field::{LightField, Patch};
 use super::metrics::{Voxel, divergence};
 use super::occluders::Occluders;
 use crate::host::{Hit, Medium, Scene};
-use crate::math::{Ray, Symmetric3, float};
+use crate::math::{Frame, Ray, Symmetric3, float};
 use crate::photon::Event;
-use crate::surface::{RoughDielectric, Surface};
+use crate::surface::{Principled, RoughDielectric, Surface};
 use crate::world::World;
 
 /// What frequency photons fly through and where they leave what they carry.
@@ -159,9 +159,17 @@ impl<'a, M: Medium + ?Sized, S: Scene + ?Sized> FrequencyPhotons<'a, M, S> {
         match hit.surface {
             Surface::Null => *light,
             Surface::ThinDielectric { .. } if passes => *light,
-            Surface::Dielectric { eta, .. } | Surface::RoughDielectric(RoughDielectric { eta, .. }) if passes => {
+            Surface::Dielectric { eta, .. } | Surface::RoughDielectric(RoughDielectric { eta, .. })
+            | Surface::Principled(Principled { eta, .. }) if passes => {
                 let indices = if incoming.dot(hit.shading) < 0.0 { (1.0, eta) } else { (eta, 1.0) };
                 light.refracted(outgoing, &patch, indices)
+            }
+            // What passes a sheet is spread as if it had been reflected, and then turned to the other side.
+            ref surface if passes => {
+                let turned = |v: Vec3| v - hit.shading * (2.0 * hit.shading.dot(v));
+                let near = light.reflected(turned(outgoing), &patch, surface);
+                let (u, v) = (turned(near.frame.u), -turned(near.frame.v));
+                LightField { covariance: near.covariance.flipped(), frame: Frame { u, v, w: outgoing } }
             }
             ref surface => light.reflected(outgoing, &patch, surface),
         }

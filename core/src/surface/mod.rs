@@ -10,6 +10,7 @@
 //! | `conductor` | [`Conductor`], [`RoughConductor`]: metals by complex indices |
 //! | `dielectric` | [`RoughDielectric`]; thin panes |
 //! | `plastic` | [`Plastic`], [`RoughPlastic`]: a diffuse base under a coat |
+//! | `principled` | [`Principled`], [`PrincipledThin`]: Burley's models |
 //!
 //! `normal` is the geometric normal; one-sided surfaces (all that light does not pass) are black from behind. All directions
 //! leave the surface.
@@ -20,6 +21,7 @@ pub mod lambert;
 mod microfacet;
 pub mod phong;
 mod plastic;
+mod principled;
 pub mod specular;
 
 use glam::{Vec2, Vec3};
@@ -28,6 +30,7 @@ pub use conductor::{Conductor, RoughConductor};
 pub use dielectric::RoughDielectric;
 pub use microfacet::{Distribution, Roughness};
 pub use plastic::{Plastic, RoughPlastic, diffuse_reflectance};
+pub use principled::{Principled, PrincipledThin};
 
 use crate::math::Frame;
 use crate::spectrum::Spectrum;
@@ -83,6 +86,10 @@ pub enum Surface {
     Plastic(Plastic),
     /// A diffuse base under a rough coat, on the side of the normal.
     RoughPlastic(RoughPlastic),
+    /// A body of many looks, by a few numbers; light passes it where it is glass.
+    Principled(Principled),
+    /// A thin sheet of many looks, the same on both sides.
+    PrincipledThin(PrincipledThin),
     /// An interface that light passes unchanged.
     Null,
 }
@@ -150,6 +157,8 @@ impl Surface {
             Self::Dielectric { .. } | Self::ThinDielectric { .. } | Self::RoughDielectric(_) | Self::Null => true,
             Self::Lambert { .. } | Self::Phong { .. } | Self::Mirror { .. } => false,
             Self::Conductor(_) | Self::RoughConductor(_) | Self::Plastic(_) | Self::RoughPlastic(_) => false,
+            Self::Principled(body) => body.spec_trans > 0.0 && body.metallic < 1.0,
+            Self::PrincipledThin(sheet) => sheet.spec_trans > 0.0 || sheet.diff_trans > 0.0,
         }
     }
 
@@ -186,7 +195,7 @@ impl Surface {
         }
         match self {
             Self::Dielectric { transmittance, .. } => *transmittance,
-            Self::RoughDielectric(RoughDielectric { eta, .. }) => {
+            Self::RoughDielectric(RoughDielectric { eta, .. }) | Self::Principled(Principled { eta, .. }) => {
                 sample.weight * if cosine > 0.0 { eta * eta } else { 1.0 / (eta * eta) }
             }
             _ => sample.weight,
@@ -235,6 +244,19 @@ impl Surface {
                 let (all, base) = (plastic.value(eye, light).mean(), plastic.diffuse_value(eye, light).mean());
                 Some(Gloss { exponent: plastic.roughness().exponent(), share: share(all - base, base) })
             }
+            Self::Principled(body) => {
+                let frame = Frame::along(normal, body.tangent);
+                let (eye, light) = (frame.to_local(to_eye), frame.to_local(to_light));
+                let (all, base) = (body.value(eye, light).mean(), body.base_value(eye, light).mean());
+                Some(Gloss { exponent: body.facets().exponent(), share: share(all - base, base) })
+            }
+            Self::PrincipledThin(sheet) => {
+                let frame = Frame::along(normal, sheet.tangent);
+                let (eye, light) = (frame.to_local(to_eye), frame.to_local(to_light));
+                let base = PrincipledThin { spec_trans: 0.0, ..sheet }.value(eye, light).mean() * (1.0 - sheet.spec_trans);
+                let all = sheet.value(eye, light).mean();
+                Some(Gloss { exponent: sheet.facets().exponent(), share: share(all - base, base) })
+            }
         }
     }
 
@@ -249,9 +271,21 @@ impl Surface {
     #[inline]
     #[must_use]
     pub fn value(&self, normal: Vec3, to_eye: Vec3, to_light: Vec3) -> Spectrum {
-        if let Self::RoughDielectric(glass) = self {
-            let frame = glass.roughness.frame(normal);
-            return glass.value(frame.to_local(to_eye), frame.to_local(to_light));
+        // What has two sides of its own.
+        match self {
+            Self::RoughDielectric(glass) => {
+                let frame = glass.roughness.frame(normal);
+                return glass.value(frame.to_local(to_eye), frame.to_local(to_light));
+            }
+            Self::Principled(body) => {
+                let frame = Frame::along(normal, body.tangent);
+                return body.value(frame.to_local(to_eye), frame.to_local(to_light));
+            }
+            Self::PrincipledThin(sheet) => {
+                let frame = Frame::along(normal, sheet.tangent);
+                return sheet.value(frame.to_local(to_eye), frame.to_local(to_light));
+            }
+            _ => {}
         }
         if normal.dot(to_eye) <= 0.0 || normal.dot(to_light) <= 0.0 {
             return Spectrum::ZERO;
@@ -291,9 +325,20 @@ impl Surface {
     #[inline]
     #[must_use]
     pub fn pdf(&self, normal: Vec3, to_eye: Vec3, to_light: Vec3) -> f32 {
-        if let Self::RoughDielectric(glass) = self {
-            let frame = glass.roughness.frame(normal);
-            return glass.pdf(frame.to_local(to_eye), frame.to_local(to_light));
+        match self {
+            Self::RoughDielectric(glass) => {
+                let frame = glass.roughness.frame(normal);
+                return glass.pdf(frame.to_local(to_eye), frame.to_local(to_light));
+            }
+            Self::Principled(body) => {
+                let frame = Frame::along(normal, body.tangent);
+                return body.pdf(frame.to_local(to_eye), frame.to_local(to_light));
+            }
+            Self::PrincipledThin(sheet) => {
+                let frame = Frame::along(normal, sheet.tangent);
+                return sheet.pdf(frame.to_local(to_eye), frame.to_local(to_light));
+            }
+            _ => {}
         }
         let cosine = normal.dot(to_light);
         if normal.dot(to_eye) <= 0.0 || cosine <= 0.0 {
@@ -347,6 +392,14 @@ impl Surface {
             Self::RoughDielectric(glass) => {
                 let frame = glass.roughness.frame(normal);
                 within(&frame, glass.sample(frame.to_local(to_eye), choice, u))
+            }
+            Self::Principled(body) => {
+                let frame = Frame::along(normal, body.tangent);
+                within(&frame, body.sample(frame.to_local(to_eye), choice, u))
+            }
+            Self::PrincipledThin(sheet) => {
+                let frame = Frame::along(normal, sheet.tangent);
+                within(&frame, sheet.sample(frame.to_local(to_eye), choice, u))
             }
             _ if normal.dot(to_eye) <= 0.0 => None,
             Self::Conductor(metal) => {
@@ -410,7 +463,8 @@ impl Surface {
             Self::RoughDielectric(glass) => glass.reflectance.max(glass.transmittance),
             Self::Plastic(plastic) => plastic.diffuse.max(plastic.specular),
             Self::RoughPlastic(plastic) => plastic.plastic().diffuse.max(plastic.plastic().specular),
-            Self::Null => Spectrum::ONE,
+            // Sheen, coats and tints add to their bases.
+            Self::Principled(_) | Self::PrincipledThin(_) | Self::Null => Spectrum::ONE,
         }
     }
 }
