@@ -159,8 +159,11 @@ impl<'a, M: Medium + ?Sized, S: Scene + ?Sized> FrequencyPhotons<'a, M, S> {
         match hit.surface {
             Surface::Null => *light,
             Surface::ThinDielectric { .. } if passes => *light,
-            Surface::Dielectric { eta, .. } | Surface::RoughDielectric(RoughDielectric { eta, .. })
-            | Surface::Principled(Principled { eta, .. }) if passes => {
+            Surface::Dielectric { eta, .. }
+            | Surface::RoughDielectric(RoughDielectric { eta, .. })
+            | Surface::Principled(Principled { eta, .. })
+                if passes =>
+            {
                 let indices = if incoming.dot(hit.shading) < 0.0 { (1.0, eta) } else { (eta, 1.0) };
                 light.refracted(outgoing, &patch, indices)
             }

@@ -253,7 +253,8 @@ impl Surface {
             Self::PrincipledThin(sheet) => {
                 let frame = Frame::along(normal, sheet.tangent);
                 let (eye, light) = (frame.to_local(to_eye), frame.to_local(to_light));
-                let base = PrincipledThin { spec_trans: 0.0, ..sheet }.value(eye, light).mean() * (1.0 - sheet.spec_trans);
+                let base =
+                    PrincipledThin { spec_trans: 0.0, ..sheet }.value(eye, light).mean() * (1.0 - sheet.spec_trans);
                 let all = sheet.value(eye, light).mean();
                 Some(Gloss { exponent: sheet.facets().exponent(), share: share(all - base, base) })
             }

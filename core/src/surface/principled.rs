@@ -387,7 +387,8 @@ impl PrincipledThin {
         if self.spec_trans > 0.0 {
             let rough = if reflects { self.facets() } else { self.far_facets() };
             // A facet has the sides that the sheet has.
-            if let Some((m, specular)) = reflection(&rough, eye, near).filter(|(m, _)| reflects || light.dot(*m) < 0.0) {
+            if let Some((m, specular)) = reflection(&rough, eye, near).filter(|(m, _)| reflects || light.dot(*m) < 0.0)
+            {
                 let cosine = eye.dot(m);
                 let fresnel = refract(eye, m, self.eta).reflectance;
                 value += if reflects {

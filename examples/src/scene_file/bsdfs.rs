@@ -2,10 +2,11 @@
 
 use fogbow::spectrum::Spectrum;
 use fogbow::surface::{
-    Conductor, Distribution, Plastic, RoughConductor, RoughDielectric, RoughPlastic, Roughness, Surface,
+    Conductor, Distribution, Plastic, Principled, PrincipledThin, RoughConductor, RoughDielectric, RoughPlastic,
+    Roughness, Surface,
 };
 
-use super::description::Slot;
+use super::material::Slot;
 use super::materials::index_of_refraction;
 use super::metals::METALS;
 use super::plugin::Plugin;
@@ -33,11 +34,11 @@ pub(super) fn read(plugin: &Plugin<'_>, share: &mut Share<'_>) -> Result<Option<
             }
         }
         "roughconductor" => {
-            let (conductor, roughness) = (metal(plugin, share)?, roughness(plugin)?);
+            let (conductor, roughness) = (metal(plugin, share)?, roughness(plugin, share)?);
             Surface::RoughConductor(RoughConductor { conductor, roughness })
         }
         "roughdielectric" => {
-            let roughness = roughness(plugin)?;
+            let roughness = roughness(plugin, share)?;
             let eta = relative_index(plugin, GLASS)?;
             let reflectance = share("specular_reflectance", one, Slot::Specular)?;
             let transmittance = share("specular_transmittance", one, Slot::Transmitted)?;
@@ -61,7 +62,12 @@ pub(super) fn read(plugin: &Plugin<'_>, share: &mut Share<'_>) -> Result<Option<
             if kind == "plastic" {
                 return Ok(Some(Surface::Plastic(plastic)));
             }
-            let Roughness { distribution, alpha: [u, v], .. } = roughness(plugin)?;
+            if plugin.get("alpha").is_some_and(|alpha| alpha.tag() == "texture") {
+                return Err(plugin
+                    .element
+                    .error("the coat of rough plastic is as rough everywhere: alpha cannot be a texture"));
+            }
+            let Roughness { distribution, alpha: [u, v], .. } = roughness(plugin, share)?;
             if u != v {
                 return Err(plugin
                     .element
@@ -69,8 +75,87 @@ pub(super) fn read(plugin: &Plugin<'_>, share: &mut Share<'_>) -> Result<Option<
             }
             Surface::RoughPlastic(RoughPlastic::new(plastic, distribution, u))
         }
+        "principled" => Surface::Principled(principled(plugin, share)?),
+        "principledthin" => Surface::PrincipledThin(principled_thin(plugin, share)?),
         _ => return Ok(None),
     }))
+}
+
+/// A number within [0, 1] by name; a texture may stand there.
+fn part(share: &mut Share<'_>, name: &str, default: f32, slot: Slot) -> Result<f32, SceneError> {
+    // Of a colour, the middle channel is nearest to what the eye sees; numbers have all channels the same.
+    Ok(share(name, Spectrum::splat(default), slot)?[1])
+}
+
+/// Rates that shift samples between lobes: they change noise alone.
+fn skip_rates(plugin: &Plugin<'_>, names: &[&str]) -> Result<(), SceneError> {
+    names.iter().try_for_each(|name| plugin.number(name).map(drop))
+}
+
+fn principled(plugin: &Plugin<'_>, share: &mut Share<'_>) -> Result<Principled, SceneError> {
+    skip_rates(
+        plugin,
+        &["main_specular_sampling_rate", "clearcoat_sampling_rate", "diffuse_reflectance_sampling_rate"],
+    )?;
+    let default = Principled::default();
+    let spec_trans = part(share, "spec_trans", 0.0, Slot::SpecTrans)?;
+    let has_glass = plugin.get("spec_trans").is_some();
+    let eta = match (plugin.number("eta")?, plugin.get("specular").is_some()) {
+        (Some((_, element)), true) => return Err(element.error("either eta can be given, or specular")),
+        (Some(_), false) => plugin.number_in("eta", 1.5, 0.1..=10.0)? as f32,
+        // Glass must bend light a little.
+        (None, _) => {
+            let specular = plugin.number_in("specular", 0.5, 0.0..=1.0)? as f32;
+            Principled::eta_of(if has_glass { specular.max(1e-3) } else { specular })
+        }
+    };
+    Ok(Principled {
+        base_color: share("base_color", default.base_color, Slot::Diffuse)?,
+        roughness: part(share, "roughness", 0.5, Slot::Roughness)?,
+        anisotropic: part(share, "anisotropic", 0.0, Slot::Anisotropic)?,
+        metallic: part(share, "metallic", 0.0, Slot::Metallic)?,
+        spec_trans,
+        eta: if has_glass && eta == 1.0 { 1.001 } else { eta },
+        spec_tint: part(share, "spec_tint", 0.0, Slot::SpecTint)?,
+        sheen: part(share, "sheen", 0.0, Slot::Sheen)?,
+        sheen_tint: part(share, "sheen_tint", 0.0, Slot::SheenTint)?,
+        flatness: part(share, "flatness", 0.0, Slot::Flatness)?,
+        clearcoat: part(share, "clearcoat", 0.0, Slot::Clearcoat)?,
+        clearcoat_gloss: part(share, "clearcoat_gloss", 0.0, Slot::ClearcoatGloss)?,
+        ..default
+    })
+}
+
+fn principled_thin(plugin: &Plugin<'_>, share: &mut Share<'_>) -> Result<PrincipledThin, SceneError> {
+    skip_rates(
+        plugin,
+        &[
+            "specular_reflectance_sampling_rate",
+            "specular_transmittance_sampling_rate",
+            "diffuse_transmittance_sampling_rate",
+            "diffuse_reflectance_sampling_rate",
+        ],
+    )?;
+    let default = PrincipledThin::default();
+    let is_number = plugin.get("diff_trans").is_some_and(|element| element.tag() == "float");
+    let diff_trans = if is_number {
+        plugin.number_in("diff_trans", 0.0, 0.0..=2.0)? as f32
+    } else {
+        2.0 * part(share, "diff_trans", 0.0, Slot::DiffTrans)?
+    };
+    Ok(PrincipledThin {
+        base_color: share("base_color", default.base_color, Slot::Diffuse)?,
+        roughness: part(share, "roughness", 0.5, Slot::Roughness)?,
+        anisotropic: part(share, "anisotropic", 0.0, Slot::Anisotropic)?,
+        spec_trans: part(share, "spec_trans", 0.0, Slot::SpecTrans)?,
+        eta: plugin.number_in("eta", 1.5, 0.1..=10.0)? as f32,
+        spec_tint: part(share, "spec_tint", 0.0, Slot::SpecTint)?,
+        sheen: part(share, "sheen", 0.0, Slot::Sheen)?,
+        sheen_tint: part(share, "sheen_tint", 0.0, Slot::SheenTint)?,
+        flatness: part(share, "flatness", 0.0, Slot::Flatness)?,
+        diff_trans,
+        ..default
+    })
 }
 
 /// The index inside over that outside.
@@ -109,14 +194,17 @@ fn metal(plugin: &Plugin<'_>, share: &mut Share<'_>) -> Result<Conductor, SceneE
 }
 
 /// `distribution`, and `alpha` or `alpha_u` and `alpha_v`.
-fn roughness(plugin: &Plugin<'_>) -> Result<Roughness, SceneError> {
+fn roughness(plugin: &Plugin<'_>, share: &mut Share<'_>) -> Result<Roughness, SceneError> {
     let distribution = match plugin.word("distribution", &["beckmann", "ggx"])? {
         "ggx" => Distribution::Ggx,
         _ => Distribution::Beckmann,
     };
     // Normals are drawn as they are seen, whatever this says: it changes noise alone.
     plugin.boolean("sample_visible", true)?;
-    let alpha = |name| plugin.number_in(name, 0.1, 0.0..=10.0);
+    let mut alpha = |name, slot| match plugin.get(name) {
+        Some(element) if element.tag() == "texture" => part(share, name, 0.1, slot),
+        _ => plugin.number_in(name, 0.1, 0.0..=10.0).map(|alpha| alpha as f32),
+    };
     let (u, v) = (plugin.get("alpha_u").is_some(), plugin.get("alpha_v").is_some());
     if u != v {
         return Err(plugin.element.error("alpha_u and alpha_v must both be given, or neither"));
@@ -124,8 +212,12 @@ fn roughness(plugin: &Plugin<'_>) -> Result<Roughness, SceneError> {
     if u && plugin.get("alpha").is_some() {
         return Err(plugin.element.error("either alpha can be given, or alpha_u and alpha_v"));
     }
-    let alpha = if u { [alpha("alpha_u")?, alpha("alpha_v")?] } else { [alpha("alpha")?; 2] };
-    Ok(Roughness { alpha: alpha.map(|a| a as f32), ..Roughness::even(distribution, 0.0) })
+    let alpha = if u {
+        [alpha("alpha_u", Slot::AlphaU)?, alpha("alpha_v", Slot::AlphaV)?]
+    } else {
+        [alpha("alpha", Slot::Alpha)?; 2]
+    };
+    Ok(Roughness { alpha, ..Roughness::even(distribution, 0.0) })
 }
 
 /// Why a kind of `<bsdf>` that other programs know is not read.

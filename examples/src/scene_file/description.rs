@@ -5,12 +5,11 @@ use std::sync::Arc;
 
 use fogbow::phase::Phase;
 use fogbow::spectrum::Spectrum;
-use fogbow::surface::{Conductor, RoughConductor, RoughDielectric, Surface};
 
+use super::material::Material;
 use crate::filter::Filter;
 use crate::mesh::Mesh;
 use crate::picture::Picture;
-use crate::texture::{self, Texture};
 use crate::transform::{Transform, to_array, to_vec3};
 use crate::vdb::BrickStorage;
 use crate::volume::Volume;
@@ -334,97 +333,6 @@ pub enum Geometry {
     Cylinder(Transform),
     /// Triangles, already in world space.
     Mesh(Mesh),
-}
-
-/// What a surface does to light, and on which sides.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Material {
-    /// On the side of the normal; where textures vary it, with their means.
-    pub surface: Surface,
-    /// Whether both sides do the same.
-    pub is_two_sided: bool,
-    /// What varies over the surface.
-    pub textures: Vec<(Slot, Arc<Texture>)>,
-    /// What bends its normals.
-    pub relief: Option<Relief>,
-}
-
-/// What bends the normals of a surface.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Relief {
-    /// A height (m) above the surface.
-    Height {
-        /// Luminance of the texture, times the factor.
-        texture: Arc<Texture>,
-        /// Factor.
-        scale: f32,
-    },
-    /// Normals in the frame of the surface: `(x + 1)/2` in each channel.
-    Normals(Arc<Texture>),
-}
-
-/// A parameter of a surface that a texture may give.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Slot {
-    /// Diffuse reflectance.
-    Diffuse,
-    /// Factor on light reflected as by a mirror.
-    Specular,
-    /// Factor on transmitted light.
-    Transmitted,
-}
-
-impl Slot {
-    /// Sets the parameter; surfaces without it stay as they are.
-    pub fn put(self, surface: &mut Surface, value: Spectrum) {
-        let share = value.max(Spectrum::ZERO).min(Spectrum::ONE);
-        match (self, surface) {
-            (Self::Diffuse, Surface::Lambert { reflectance }) => *reflectance = share,
-            (
-                Self::Specular,
-                Surface::Mirror { reflectance }
-                | Surface::Dielectric { reflectance, .. }
-                | Surface::ThinDielectric { reflectance, .. }
-                | Surface::Conductor(Conductor { reflectance, .. })
-                | Surface::RoughConductor(RoughConductor { conductor: Conductor { reflectance, .. }, .. })
-                | Surface::RoughDielectric(RoughDielectric { reflectance, .. }),
-            ) => *reflectance = share,
-            (
-                Self::Transmitted,
-                Surface::Dielectric { transmittance, .. }
-                | Surface::ThinDielectric { transmittance, .. }
-                | Surface::RoughDielectric(RoughDielectric { transmittance, .. }),
-            ) => *transmittance = share,
-            (Self::Diffuse, Surface::Plastic(plastic)) => plastic.diffuse = share,
-            (Self::Specular, Surface::Plastic(plastic)) => plastic.specular = share,
-            (Self::Diffuse, Surface::RoughPlastic(rough)) => {
-                *rough = rough.with_colours(share, rough.plastic().specular)
-            }
-            (Self::Specular, Surface::RoughPlastic(rough)) => {
-                *rough = rough.with_colours(rough.plastic().diffuse, share)
-            }
-            // Both together must not reflect more than all light.
-            (Self::Diffuse, Surface::Phong { diffuse, specular, .. }) => {
-                *diffuse = share.min(Spectrum::ONE - *specular)
-            }
-            (Self::Specular, Surface::Phong { diffuse, specular, .. }) => {
-                *specular = share.min(Spectrum::ONE - *diffuse)
-            }
-            _ => {}
-        }
-    }
-}
-
-impl Material {
-    /// What the surface does to light at a place.
-    #[must_use]
-    pub fn surface_at(&self, place: &texture::Place<'_>) -> Surface {
-        let mut surface = self.surface;
-        for (slot, texture) in &self.textures {
-            slot.put(&mut surface, texture.at(place));
-        }
-        surface
-    }
 }
 
 /// A light without a surface.

@@ -5,20 +5,20 @@ use std::sync::Arc;
 use fogbow::spectrum::Spectrum;
 use fogbow::surface::Surface;
 
-use super::description::{Material, Slot};
 use super::element::Element;
+use super::material::{Material, Mix, Slot};
 use super::plugin::Plugin;
 use super::{bsdfs, textures};
 use crate::error::SceneError;
 use crate::texture::Texture;
 
-const KNOWN: &str = "diffuse, twosided, bumpmap, normalmap, null, conductor, roughconductor, dielectric, roughdielectric, \
-    thindielectric, plastic, roughplastic, phong";
+const KNOWN: &str = "diffuse, twosided, bumpmap, normalmap, blendbsdf, mask, null, conductor, roughconductor, dielectric, \
+    roughdielectric, thindielectric, plastic, roughplastic, principled, principledthin, phong";
 
 /// What a shape without a `<bsdf>` reflects; one that shines reflects nothing.
 pub(super) fn default_material(is_emitter: bool) -> Material {
     let reflectance = Spectrum::splat(if is_emitter { 0.0 } else { 0.5 });
-    Material { surface: Surface::Lambert { reflectance }, is_two_sided: false, textures: Vec::new(), relief: None }
+    Material::plain(Surface::Lambert { reflectance })
 }
 
 /// The material of a `<bsdf>`.
@@ -35,20 +35,57 @@ pub(super) fn read(element: &Element<'_>) -> Result<Material, SceneError> {
     }
     let material = if plugin.kind == "twosided" {
         let inner = plugin.nested("bsdf").ok_or_else(|| element.error("a <bsdf> is missing inside"))?;
-        let material = read(&inner)?;
-        if material.surface.transmits() {
-            return Err(inner.error("light passes through it, so it cannot be made two-sided"));
+        let one_side = |inner: &Element<'_>| {
+            let material = read(inner)?;
+            if material.transmits() {
+                return Err(inner.error("light passes through it, so it cannot be made two-sided"));
+            }
+            if material.is_two_sided {
+                return Err(inner.attribute_error("type", "a two-sided bsdf cannot stand inside another"));
+            }
+            Ok(Material { is_two_sided: true, ..material })
+        };
+        let front = one_side(&inner)?;
+        match plugin.nested("bsdf") {
+            None => front,
+            Some(back) => {
+                let back = one_side(&back)?;
+                Material {
+                    is_two_sided: true,
+                    mix: Some(Arc::new(Mix::Sides([front.clone(), back]))),
+                    ..Material::plain(front.surface)
+                }
+            }
         }
-        if material.is_two_sided {
-            return Err(inner.attribute_error("type", "a two-sided bsdf cannot stand inside another"));
-        }
-        Material { is_two_sided: true, ..material }
+    } else if let "blendbsdf" | "mask" = plugin.kind.as_str() {
+        blend(&plugin)?
     } else {
         let (surface, textures) = read_one(&plugin)?;
-        Material { surface, is_two_sided: false, textures, relief: None }
+        Material { textures, ..Material::plain(surface) }
     };
     plugin.finish()?;
     Ok(material)
+}
+
+/// `blendbsdf` of two others, or `mask` of one other and nothing.
+fn blend(plugin: &Plugin<'_>) -> Result<Material, SceneError> {
+    let inner = || {
+        let element = plugin.nested("bsdf").ok_or_else(|| plugin.element.error("a <bsdf> is missing inside"))?;
+        read(&element)
+    };
+    let (name, parts) = if plugin.kind == "mask" {
+        ("opacity", [Material::plain(Surface::Null), inner()?])
+    } else {
+        ("weight", [inner()?, inner()?])
+    };
+    let mut weight = None;
+    let mean = textures::share(plugin, name, Spectrum::splat(0.5), &mut |texture| weight = Some(texture))?;
+    let weight = weight.unwrap_or_else(|| Arc::new(Texture::Constant(mean)));
+    let typical = parts.iter().rev().map(|part| part.surface).find(|surface| *surface != Surface::Null);
+    Ok(Material {
+        mix: Some(Arc::new(Mix::Blend { weight, parts })),
+        ..Material::plain(typical.unwrap_or(Surface::Null))
+    })
 }
 
 /// What varies over a surface.

@@ -11,7 +11,7 @@
 //! | `volume` | `gridvolume` (`.vol`; `.vdb` and `.nvdb` with `grid`, `use_grid_bbox`), `constvolume` |
 //! | `phase` | `isotropic`, `hg`, `rayleigh`, `blendphase` |
 //! | `shape` | `rectangle`, `cube`, `sphere`, `disk`, `cylinder`, `ply`, `obj`, `serialized`, `linearcurve`, `bsplinecurve` (tubes of triangles), `shapegroup`, `instance`, `merge` |
-//! | `bsdf` | `diffuse`, `twosided`, `null`, `conductor`, `roughconductor`, `dielectric`, `roughdielectric`, `thindielectric`, `plastic`, `roughplastic`; and `phong`, which Mitsuba 3 does not know |
+//! | `bsdf` | `diffuse`, `twosided`, `null`, `conductor`, `roughconductor`, `dielectric`, `roughdielectric`, `thindielectric`, `plastic`, `roughplastic`, `principled`, `principledthin`, `blendbsdf`, `mask`; and `phong`, which Mitsuba 3 does not know |
 //! | `texture` | `bitmap`, `checkerboard`, `mesh_attribute`, `volume`, `uniform`, `rawconstant`: on reflectances |
 //! | `spectrum` | a number, pairs of wavelength and value, `filename`; `uniform`, `d65`, `srgb`, `blackbody`, `regular`, `irregular` |
 //! | `emitter` | `point`, `spot`, `area`, `directional`, `constant`, `envmap` |
@@ -34,6 +34,7 @@ mod film;
 mod fingerprint;
 mod gltf_scene;
 mod groups;
+mod material;
 mod materials;
 mod media;
 mod metals;
@@ -53,11 +54,12 @@ use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
 pub use description::{
-    Container, Emitter, FovAxis, Geometry, Integrator, Material, Matter, MediumDescription, Place, Projection, Relief,
-    SceneFile, Sensor, Shape, Slot,
+    Container, Emitter, FovAxis, Geometry, Integrator, Matter, MediumDescription, Place, Projection, SceneFile, Sensor,
+    Shape,
 };
 pub use film::MAX_PIXELS;
 pub use fingerprint::{fingerprint, fingerprint_with};
+pub use material::{Chosen, Material, Mix, Relief, Slot};
 pub use notes::{Note, NoteKind};
 
 use crate::error::SceneError;

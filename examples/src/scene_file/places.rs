@@ -39,7 +39,7 @@ pub(super) fn read<'a>(
     }
     let mut boundaries = Vec::new();
     for source in shapes {
-        let is_clear = source.shape.as_ref().is_none_or(|s| s.material.surface.transmits());
+        let is_clear = source.shape.as_ref().is_none_or(|s| s.material.transmits());
         if !is_clear {
             if source.interior.is_some() {
                 source.element.suspicious("light never reaches the medium inside an opaque shape");

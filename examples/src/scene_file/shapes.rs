@@ -8,6 +8,7 @@ use fogbow::surface::Surface;
 use super::description::{Container, Geometry, Shape};
 use super::element::Element;
 use super::groups::Groups;
+use super::material::Material;
 use super::plugin::Plugin;
 use super::{groups, materials, textures};
 use crate::error::SceneError;
@@ -74,13 +75,13 @@ fn read_one<'a>(plugin: &Plugin<'a>) -> Result<ShapeElement<'a>, SceneError> {
         Geometry::Mesh(mesh) => Some(mesh),
         _ => None,
     };
-    for (_, texture) in &material.textures {
+    for (_, texture) in material.leaves().into_iter().flat_map(|leaf| &leaf.textures) {
         textures::check_attributes(texture, mesh).map_err(|reason| element.error(reason))?;
     }
-    if radiance.is_some() && material.surface.transmits() {
+    if radiance.is_some() && material.transmits() {
         return Err(element.error("an area light needs a bsdf that light cannot pass through"));
     }
-    let is_visible = material.surface != Surface::Null;
+    let is_visible = material.surface != Surface::Null || material.mix.is_some();
     let shape = is_visible.then(|| Shape { geometry, is_flipped, material, radiance, line: element.line() });
     Ok(ShapeElement { element: *element, shape, container, is_inside_out, interior, exterior })
 }

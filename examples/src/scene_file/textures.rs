@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use fogbow::spectrum::Spectrum;
 
-use super::description::Relief;
 use super::element::Element;
+use super::material::Relief;
 use super::plugin::{Plugin, is_share};
 use crate::error::SceneError;
 use crate::mesh::Mesh;

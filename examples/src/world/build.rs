@@ -28,7 +28,7 @@ impl Pieces {
             pieces.materials.push(shape.material.clone());
             let light = shape.radiance.and_then(|_| lights.next());
             let is_smooth = matches!(&shape.geometry, Geometry::Mesh(mesh) if !mesh.normals.is_empty());
-            let varies = is_smooth || !shape.material.textures.is_empty() || shape.material.relief.is_some();
+            let varies = is_smooth || shape.material.varies();
             let part = Part { material: index, side: if shape.is_flipped { -1.0 } else { 1.0 }, light, varies };
             pieces.push(shape, part);
         }

@@ -30,8 +30,9 @@ use fogbow::host::{Hit, Medium, Scene};
 use fogbow::light::Light;
 use fogbow::math::{Bounds, Ray, Symmetric3, Vec3};
 use fogbow::phase::Phase;
+use fogbow::sampling::uniform::mix;
 use fogbow::surface::Surface;
-use fogbow::world::{Outline, World as LitWorld};
+use fogbow::world::{Outline, World as LitWorld, nearest_surface};
 
 pub use body::{Body, as_box};
 pub use build::bounds_of;
@@ -87,6 +88,8 @@ pub struct World<'a> {
     triangle_parts: Vec<Part>,
     triangle_numbers: Vec<u32>,
     triangles: Option<Triangles>,
+    /// Whether a part of some surface lets light pass as if it were not there.
+    has_masks: bool,
     lights: lights::Lights<'a>,
     media: Media<'a>,
     bounds: Bounds,
@@ -107,6 +110,7 @@ impl<'a> World<'a> {
         let many = (!is_few).then(|| Many::new(&pieces.primitives));
         let triangles = (!pieces.corners.is_empty()).then(|| Triangles::new(&pieces.corners));
         let bounds = build::scene_bounds(scene);
+        let has_masks = pieces.materials.iter().flat_map(Material::leaves).any(|leaf| leaf.surface == Surface::Null);
         Ok(Self {
             scene,
             materials: pieces.materials,
@@ -118,6 +122,7 @@ impl<'a> World<'a> {
             triangle_parts: pieces.triangle_parts,
             triangle_numbers: pieces.triangle_numbers,
             triangles,
+            has_masks,
             lights,
             media,
             bounds,
@@ -172,17 +177,22 @@ impl<'a> World<'a> {
         build::medium_bounds(self.scene)
     }
 
-    /// Whether any surface is a mirror or glass.
+    /// All materials that hits may have.
+    fn leaves(&self) -> impl Iterator<Item = &Material> {
+        self.materials.iter().flat_map(Material::leaves)
+    }
+
+    /// Whether any surface is a mirror or glass, or has lobes.
     #[must_use]
     pub fn has_mirrors(&self) -> bool {
-        self.materials.iter().any(|material| material.surface.is_followed() && material.surface != Surface::Null)
+        self.leaves().any(|leaf| leaf.surface.is_followed() && leaf.surface != Surface::Null)
     }
 
     /// Whether there is light that caches can hold: scattered by a medium, or by a surface that is no mirror and no glass.
     #[must_use]
     pub fn has_cacheable(&self) -> bool {
         let scatters = |surface: Surface| !surface.is_discrete() && !surface.albedo().is_black();
-        !self.media().phases().is_empty() || self.materials.iter().any(|material| scatters(material.surface))
+        !self.media().phases().is_empty() || self.leaves().any(|leaf| scatters(leaf.surface))
     }
 
     /// What methods must know beforehand of this world with one of its media: seen, but for what the scene says outright.
@@ -224,18 +234,33 @@ impl<'a> World<'a> {
         let is_front = normal.dot(ray.direction) < 0.0;
         // Seen from behind, a light is dark, whatever its bsdf does there.
         let light = if is_front { part.light } else { None };
-        let normal = if material.is_two_sided && !is_front { -normal } else { normal };
         if !part.varies {
+            let normal = if material.is_two_sided && !is_front { -normal } else { normal };
             return Some(Hit { distance, normal, shading: normal, surface: material.surface, light });
         }
-        let spot = place(&self.scene.shapes.get(part.material as usize)?.geometry, material.relief.is_some())?;
+        let has_tangent = material.has_tangent();
+        let spot = place(&self.scene.shapes.get(part.material as usize)?.geometry, has_tangent)?;
+        let share = if material.mix.is_some() { share_of(ray, distance) } else { 0.0 };
+        let chosen = material.chosen(&spot.place, is_front, share);
+        let normal = if chosen.is_two_sided && !is_front { -normal } else { normal };
         let mut shading = spot.normal;
-        if let Some(relief) = &material.relief {
+        if let Some(relief) = &chosen.material.relief {
             shading = spot.bent(relief, outward, part.side, ray.direction);
         }
         let shading = if normal.dot(outward) < 0.0 { -shading } else { shading };
-        Some(Hit { distance, normal, shading, surface: material.surface_at(&spot.place), light })
+        let surface = if has_tangent { spot.aligned(chosen.surface) } else { chosen.surface };
+        Some(Hit { distance, normal, shading, surface, light })
     }
+}
+
+/// A number in [0, 1) for the hit of a ray, as good as random: what is blended is chosen by it (decision 61).
+fn share_of(ray: &Ray, distance: f32) -> f32 {
+    let words = |a: f32, b: f32| u64::from(a.to_bits()) | u64::from(b.to_bits()) << 32;
+    let (o, d) = (ray.origin, ray.direction);
+    let number = [words(o.y, o.z), words(d.x, d.y), words(d.z, distance)]
+        .into_iter()
+        .fold(mix(words(o.x, 0.0)), |number, word| mix(number ^ word));
+    (number >> 40) as f32 * (1.0 / (1_u64 << 24) as f32)
 }
 
 impl<'a> Scene for World<'a> {
@@ -267,6 +292,10 @@ impl<'a> Scene for World<'a> {
 
     #[inline]
     fn is_blocked(&self, ray: &Ray) -> bool {
+        // Whether a masked surface is there is told by the hit.
+        if self.has_masks {
+            return nearest_surface(ray, self).is_some();
+        }
         let is_hit = match &self.many {
             Some(many) => many.is_hit(ray, ray.length),
             None => self.few.is_hit(ray, ray.length),

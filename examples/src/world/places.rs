@@ -1,6 +1,7 @@
 //! What a hit is asked for where surfaces vary: texture coordinates, and interpolated normals.
 
 use fogbow::math::{Vec2, Vec3, float::PI};
+use fogbow::surface::{RoughConductor, RoughDielectric, Surface};
 
 use super::analytic::Primitive;
 use crate::mesh::Mesh;
@@ -73,6 +74,18 @@ impl<'a> Spot<'a> {
     pub(super) fn of_form(geometry: &Geometry, primitive: &Primitive, point: Vec3, normal: Vec3) -> Self {
         let (uv, tangents) = uv_of(geometry, primitive, point);
         Self { place: Place::plain(point, uv), normal, tangents }
+    }
+
+    /// The surface with its roughness along the first texture coordinate.
+    pub(super) fn aligned(&self, mut surface: Surface) -> Surface {
+        match &mut surface {
+            Surface::RoughConductor(RoughConductor { roughness, .. })
+            | Surface::RoughDielectric(RoughDielectric { roughness, .. }) => roughness.tangent = self.tangents[0],
+            Surface::Principled(body) => body.tangent = self.tangents[0],
+            Surface::PrincipledThin(sheet) => sheet.tangent = self.tangents[0],
+            _ => {}
+        }
+        surface
     }
 
     /// The normal as a relief has it: on the side of `own`, and turned so that a ray from the side of `side · own` sees it.

@@ -12,7 +12,7 @@ use fogbow::surface::Surface;
 use super::data::Data;
 use super::{Source, label};
 use crate::picture::Picture;
-use crate::scene_file::description::{Material, Slot};
+use crate::scene_file::material::{Material, Slot};
 use crate::scene_file::notes::NoteKind;
 use crate::texture::{Texture, ToUv, Wrap};
 
@@ -41,10 +41,8 @@ impl Materials {
     pub(super) fn of(&self, material: &::gltf::Material<'_>) -> Ready {
         self.all.get(&material.index()).cloned().unwrap_or_else(|| Ready {
             surface: Material {
-                surface: Surface::Lambert { reflectance: Spectrum::ONE },
                 is_two_sided: true,
-                textures: Vec::new(),
-                relief: None,
+                ..Material::plain(Surface::Lambert { reflectance: Spectrum::ONE })
             },
             radiance: None,
             texcoords: None,
@@ -128,7 +126,7 @@ impl Reader<'_> {
         let surface =
             if radiance.is_some() && matches!(surface, Surface::Dielectric { .. }) { Surface::BLACK } else { surface };
         Ready {
-            surface: Material { surface, is_two_sided, textures: textures.into_iter().collect(), relief: None },
+            surface: Material { is_two_sided, textures: textures.into_iter().collect(), ..Material::plain(surface) },
             radiance,
             texcoords,
         }
