@@ -149,7 +149,7 @@ impl RoughPlastic {
         // The mean over as many angles as the model was defined with: 1.5 % less than the integral.
         const ANGLES: u32 = 64;
         let at = |i: u32| float::max(i as f32 / (ANGLES - 1) as f32, GRAZING);
-        let sum: f32 = (0..ANGLES).map(|i| at(i) * sent(&roughness, at(i), 1.0 / plastic.eta, false, 3)).sum();
+        let sum: f32 = (0..ANGLES).map(|i| at(i) * sent(&roughness, at(i), 1.0 / plastic.eta, false, 6)).sum();
         Self { plastic, distribution, alpha, internal: 2.0 * sum / ANGLES as f32, transmittance }
     }
 

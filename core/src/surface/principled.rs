@@ -296,7 +296,12 @@ impl Principled {
         } else if choice < transmitted_from {
             let alpha2 = self.coat_alpha() * self.coat_alpha();
             let cos2 = ((1.0 - float::powf(alpha2, 1.0 - u.y)) / (1.0 - alpha2)).clamp(0.0, 1.0);
-            (mirrored(eye, spherical(float::sqrt(cos2), float::sqrt(1.0 - cos2), u.x)), true)
+            let m = spherical(float::sqrt(cos2), float::sqrt(1.0 - cos2), u.x);
+            // These are not drawn as they are seen: some are from behind.
+            if eye.dot(m) <= 0.0 {
+                return None;
+            }
+            (mirrored(eye, m), true)
         } else if choice < reflected_from {
             (refraction.transmitted?, false)
         } else {
@@ -445,7 +450,12 @@ impl PrincipledThin {
         let (to_light, reflects) = if choice < reflected {
             (mirrored(front, self.facets().sample(front, u)), true)
         } else if choice < reflected + transmitted {
-            (turned(mirrored(front, self.far_facets().sample(front, u))), false)
+            let m = self.far_facets().sample(front, u);
+            let to_light = turned(mirrored(front, m));
+            if to_light.dot(m) >= 0.0 {
+                return None;
+            }
+            (to_light, false)
         } else if choice < reflected + transmitted + diffuse {
             (cosine_hemisphere(u), true)
         } else {

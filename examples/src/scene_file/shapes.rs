@@ -8,7 +8,6 @@ use fogbow::surface::Surface;
 use super::description::{Container, Geometry, Shape};
 use super::element::Element;
 use super::groups::Groups;
-use super::material::Material;
 use super::plugin::Plugin;
 use super::{groups, materials, textures};
 use crate::error::SceneError;
