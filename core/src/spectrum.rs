@@ -184,6 +184,21 @@ fn transmitted(thickness: f32) -> f32 {
     if thickness > float::OPAQUE { 0.0 } else { float::exp(-thickness) }
 }
 
+/// Red, green and blue.
+impl From<[f32; 3]> for Spectrum {
+    #[inline]
+    fn from(channels: [f32; 3]) -> Self {
+        Self(channels)
+    }
+}
+
+impl From<Spectrum> for [f32; 3] {
+    #[inline]
+    fn from(spectrum: Spectrum) -> Self {
+        spectrum.0
+    }
+}
+
 impl core::ops::IndexMut<usize> for Spectrum {
     #[inline]
     fn index_mut(&mut self, channel: usize) -> &mut f32 {

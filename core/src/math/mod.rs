@@ -8,7 +8,9 @@
 //! | [`bounds`] | [`Bounds`]: axis-aligned boxes |
 //! | [`quadrature`] | Gauss–Legendre nodes |
 //! | [`symmetric`] | symmetric 2×2 and 3×3 matrices |
+//! | [`arrays`] | vectors, boxes and maps as arrays; Bevy's versions |
 
+pub mod arrays;
 pub mod bounds;
 pub mod float;
 pub mod frame;
@@ -16,6 +18,7 @@ pub mod quadrature;
 pub mod ray;
 pub mod symmetric;
 
+pub use arrays::{affine_from_columns, affine_from_rows, affine_to_columns, affine_to_rows};
 pub use bounds::Bounds;
 pub use frame::Frame;
 pub use glam::{Affine3, Mat3, Vec2, Vec3};
