@@ -67,8 +67,10 @@ pub enum Wrap {
 }
 
 impl Wrap {
-    fn index(self, at: i64, count: usize) -> usize {
-        let n = count as i64;
+    /// The index of a pixel or cell among `count`.
+    #[must_use]
+    pub fn index(self, at: i64, count: usize) -> usize {
+        let n = count.max(1) as i64;
         let index = match self {
             Self::Repeat => at.rem_euclid(n),
             Self::Mirror => {

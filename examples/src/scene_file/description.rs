@@ -10,9 +10,10 @@ use super::material::Material;
 use crate::filter::Filter;
 use crate::mesh::Mesh;
 use crate::picture::Picture;
+use crate::texture::Wrap;
 use crate::transform::{Transform, to_array, to_vec3};
 use crate::vdb::BrickStorage;
-use crate::volume::Volume;
+use crate::volume::{Colours, Volume};
 use crate::world::Body;
 
 /// A scene as its file describes it: checked, with all files it names loaded.
@@ -138,6 +139,8 @@ pub struct MediumDescription {
     pub matter: Matter,
     /// Where it is.
     pub places: Vec<Place>,
+    /// Both corners (m) of a box beyond which nothing of it is, wherever its places reach.
+    pub limits: Option<[[f64; 3]; 2]>,
 }
 
 /// What a medium is made of.
@@ -165,6 +168,17 @@ pub enum Matter {
         /// Angular law.
         phase: Phase,
     },
+    /// Extinction and albedo that vary in colour.
+    Coloured {
+        /// σₜ (m⁻¹), but for the factor.
+        extinction: Field,
+        /// σₛ/σₜ, within [0, 1].
+        albedo: Field,
+        /// Factor on extinction.
+        scale: f32,
+        /// Angular law.
+        phase: Phase,
+    },
     /// Density on a sparse voxel grid.
     Sparse {
         /// The densities.
@@ -177,6 +191,24 @@ pub enum Matter {
         scattering: Spectrum,
         /// Angular law.
         phase: Phase,
+    },
+}
+
+/// A colour that may vary in space.
+#[derive(Debug, Clone)]
+pub enum Field {
+    /// The same everywhere.
+    Constant(Spectrum),
+    /// On a voxel grid.
+    Grid {
+        /// Its values.
+        colours: Arc<Colours>,
+        /// From the unit cube `[0, 1]³` of the grid to the world.
+        to_world: Transform,
+        /// Beyond the border, half a cell within the cube included.
+        wrap: Wrap,
+        /// Whether values are interpolated.
+        is_smooth: bool,
     },
 }
 

@@ -54,8 +54,8 @@ use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
 pub use description::{
-    Container, Emitter, FovAxis, Geometry, Integrator, Matter, MediumDescription, Place, Projection, SceneFile, Sensor,
-    Shape,
+    Container, Emitter, Field, FovAxis, Geometry, Integrator, Matter, MediumDescription, Place, Projection, SceneFile,
+    Sensor, Shape,
 };
 pub use film::MAX_PIXELS;
 pub use fingerprint::{fingerprint, fingerprint_with};

@@ -6,7 +6,7 @@
 
 use std::collections::HashMap;
 
-use super::description::{Container, Matter, MediumDescription, Place, SceneFile, Sensor};
+use super::description::{Container, Field, Matter, MediumDescription, Place, SceneFile, Sensor};
 use super::element::Element;
 use super::media;
 use super::shapes::ShapeElement;
@@ -99,6 +99,18 @@ pub(super) fn read<'a>(
             element.suspicious("no shape that light can enter has this medium as its interior: it is nowhere");
         }
     }
+    for medium in &mut found.media {
+        // What reaches nowhere beyond need not be cut.
+        let Some([low, high]) = medium.limits else { continue };
+        let reach = (0..3).map(|i| high[i] - low[i]).fold(0.0, f64::max) * 1e-4;
+        let is_within = |place: &Place| {
+            let [from, to] = place.container.bounds();
+            (0..3).all(|i| from[i] >= low[i] - reach && to[i] <= high[i] + reach)
+        };
+        if medium.places.iter().all(is_within) {
+            medium.limits = None;
+        }
+    }
     Ok(found.media.into_iter().map(|m| m.description).filter(|m| !m.places.is_empty()).collect())
 }
 
@@ -157,10 +169,10 @@ impl<'a> Found<'a> {
         if let Some(index) = self.index.get(&element.node.id()) {
             return Ok(*index);
         }
-        let matter = media::read(element)?;
+        let (matter, limits) = media::read(element)?;
         let id = element.optional("id").unwrap_or_else(|| format!("medium at line {}", element.line()));
         let index = self.media.len();
-        let description = MediumDescription { id, matter, places: Vec::new() };
+        let description = MediumDescription { id, matter, places: Vec::new(), limits };
         self.media.push(Medium { description, element: *element });
         self.index.insert(element.node.id(), index);
         Ok(index)
@@ -255,6 +267,13 @@ impl MediumDescription {
     pub fn bytes(&self) -> usize {
         match &self.matter {
             Matter::Homogeneous { .. } => 0,
+            Matter::Coloured { extinction, albedo, .. } => {
+                let of = |field: &Field| match field {
+                    Field::Constant(_) => 0,
+                    Field::Grid { colours, .. } => size_of_val(&*colours.values),
+                };
+                of(extinction) + of(albedo)
+            }
             Matter::Grid { volume, .. } => volume.bytes(),
             Matter::Sparse { bricks, .. } => bricks.bytes(),
         }

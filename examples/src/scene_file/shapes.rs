@@ -132,7 +132,14 @@ fn area_emitter(element: &Element<'_>) -> Result<Spectrum, SceneError> {
     if plugin.kind != "area" {
         return Err(plugin.unknown_type("area (inside a shape)"));
     }
-    let radiance = plugin.emission("radiance")?.map_or(Spectrum::ONE, |(value, _)| value);
+    let radiance = match plugin.get("radiance") {
+        Some(source) if source.tag() == "texture" => {
+            let mean = textures::read(&source, 0)?.mean().max(Spectrum::ZERO);
+            let error = source.error("light that varies over a surface is not supported");
+            element.instead(error, "its mean everywhere", || mean)?
+        }
+        _ => plugin.emission("radiance")?.map_or(Spectrum::ONE, |(value, _)| value),
+    };
     plugin.finish()?;
     Ok(radiance)
 }

@@ -4,10 +4,11 @@ use std::sync::Arc;
 
 use fogbow::host::{Face, Gradients, MajorantSegment, Medium, Properties};
 use fogbow::math::{Ray, Vec3};
-use fogbow::medium::{AnyMedium, Region};
+use fogbow::medium::Region;
 use fogbow::spectrum::{Gradient, Hessian, Spectrum};
 
 use super::body::Body;
+use super::coloured::Stuff;
 
 /// A part of space.
 #[derive(Debug, Clone)]
@@ -62,13 +63,13 @@ impl Solid {
 /// A medium where all of `within` are, and none of `holes`.
 #[derive(Debug, Clone)]
 pub struct Contained<'a> {
-    pub(super) medium: AnyMedium<'a>,
+    pub(super) medium: Stuff<'a>,
     pub(super) within: Vec<Solid>,
     pub(super) holes: Vec<Solid>,
 }
 
 impl<'a> Contained<'a> {
-    pub(super) fn medium(&self) -> &AnyMedium<'a> {
+    pub(super) fn medium(&self) -> &Stuff<'a> {
         &self.medium
     }
 
@@ -76,7 +77,7 @@ impl<'a> Contained<'a> {
         self.within.iter().all(|s| s.contains(point)) && !self.holes.iter().any(|s| s.contains(point))
     }
 
-    fn segment(&self, ray: &Ray, from: f32, ask: impl FnOnce(&AnyMedium<'a>) -> MajorantSegment) -> MajorantSegment {
+    fn segment(&self, ray: &Ray, from: f32, ask: impl FnOnce(&Stuff<'a>) -> MajorantSegment) -> MajorantSegment {
         let mut end = f32::INFINITY;
         for solid in &self.within {
             match solid.span(ray, from) {

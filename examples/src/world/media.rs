@@ -9,7 +9,9 @@ use fogbow::medium::{
 };
 
 use fogbow::phase::Phase;
+use fogbow::spectrum::Spectrum;
 
+use super::coloured::{Coloured, Stuff};
 use super::contained::{Contained, Solid};
 use super::rotated::{Padded, shows_border};
 use crate::error::SceneError;
@@ -36,7 +38,7 @@ impl MediumTable {
 
 pub(super) fn tables(scene: &SceneFile) -> Vec<MediumTable> {
     let table = |medium: &MediumDescription| match &medium.matter {
-        Matter::Homogeneous { .. } => MediumTable::default(),
+        Matter::Homogeneous { .. } | Matter::Coloured { .. } => MediumTable::default(),
         Matter::Sparse { bricks, .. } => {
             MediumTable { blocks: vec![MinMax::default(); bricks.bricks().slots.len()], ..MediumTable::default() }
         }
@@ -92,7 +94,9 @@ impl<'a> Media<'a> {
             let is_refused = |padded: &Padded| medium.places.iter().any(|p| padded.region(&p.container).is_err());
             table.padded.as_ref().is_some_and(is_refused)
         };
-        let has_cuts = scene.media.iter().zip(&*tables).any(is_cut);
+        let is_limited =
+            |medium: &MediumDescription| medium.limits.is_some() || matches!(medium.matter, Matter::Coloured { .. });
+        let has_cuts = scene.media.iter().zip(&*tables).any(is_cut) || scene.media.iter().any(is_limited);
         if has_cuts || scene.media.iter().flat_map(|m| &m.places).any(needs_solids) {
             return Self::contained(scene, tables);
         }
@@ -142,7 +146,13 @@ impl<'a> Media<'a> {
             let refused = |e: Refusal| fail(format!("<medium id=\"{}\">", description.id), e.to_string());
             let MediumTable { blocks, padded, .. } = table;
             let padded = padded.as_ref();
-            let medium = matter(description, padded, blocks).map_err(refused)?;
+            let medium = match &description.matter {
+                Matter::Coloured { extinction, albedo, scale, phase } => {
+                    let coloured = Coloured::new(extinction, albedo, *scale, *phase);
+                    Stuff::Coloured(coloured.ok_or_else(|| refused(MediumError::Coefficients.into()))?)
+                }
+                _ => Stuff::Core(matter(description, padded, blocks).map_err(refused)?),
+            };
             for place in &description.places {
                 let solids = |containers: &[Container]| containers.iter().map(solid).collect::<Result<Vec<_>, _>>();
                 let own = match &place.container {
@@ -154,6 +164,9 @@ impl<'a> Media<'a> {
                 let mut within = vec![own.map_err(|e| refused(e.into()))?];
                 if let Some(padded) = padded {
                     within.push(Solid::Region(padded.around().map_err(|e| refused(e.into()))?));
+                }
+                if let Some([low, high]) = description.limits {
+                    within.push(Solid::Region(straight(low, high).map_err(|e| refused(e.into()))?));
                 }
                 let holes = solids(&place.holes).map_err(|e| refused(e.into()))?;
                 media.push(Contained { medium, within, holes });
@@ -245,6 +258,12 @@ fn solid(container: &Container) -> Result<Solid, MediumError> {
     }
 }
 
+/// The box between two corners (m).
+pub(super) fn straight(low: [f64; 3], high: [f64; 3]) -> Result<Region, MediumError> {
+    let size = [0, 1, 2].map(|i| high[i] - low[i]);
+    Region::unit_cube(Transform::scaling(size).then(&Transform::translation(low)).to_affine())
+}
+
 /// The medium without its place.
 fn matter<'a>(
     medium: &'a MediumDescription,
@@ -252,6 +271,8 @@ fn matter<'a>(
     blocks: &'a mut [MinMax],
 ) -> Result<AnyMedium<'a>, Refusal> {
     Ok(match &medium.matter {
+        // Of the host: see `Media::contained`.
+        Matter::Coloured { .. } => AnyMedium::from(Homogeneous::new(Spectrum::ZERO, Spectrum::ZERO, Phase::ISOTROPIC)?),
         Matter::Homogeneous { absorption, scattering, phase } => {
             AnyMedium::from(Homogeneous::new(*absorption, *scattering, *phase)?)
         }

@@ -9,13 +9,14 @@
 //! | `triangles` | meshes in a tree |
 //! | `lights` | emitters and lent tables |
 //! | `media` | media and where they are |
-//! | `body`, `contained` | closed meshes, and media in them |
+//! | `body`, `contained`, `coloured` | closed meshes, and media in them; media whose colour varies |
 //! | `places` | texture coordinates and interpolated normals |
 //! | `rotated` | rotated grids, whose border reaches as far as Mitsuba's |
 
 mod analytic;
 mod body;
 mod build;
+mod coloured;
 mod contained;
 mod lights;
 mod many;

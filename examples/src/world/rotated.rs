@@ -7,7 +7,7 @@
 
 use fogbow::medium::Region;
 
-use super::media::{Refusal, region};
+use super::media::{Refusal, region, straight};
 use crate::scene_file::{Container, Place};
 use crate::transform::Transform;
 use crate::volume::{Values, Volume};
@@ -81,8 +81,7 @@ impl Padded {
     /// The box around the grid before.
     pub(super) fn around(&self) -> Result<Region, fogbow::medium::MediumError> {
         let [low, high] = self.around;
-        let size = [0, 1, 2].map(|i| high[i] - low[i]);
-        Region::unit_cube(Transform::scaling(size).then(&Transform::translation(low)).to_affine())
+        straight(low, high)
     }
 
     /// Where the medium is that a container holds: in the part of it that lies in the box around the grid.
@@ -239,7 +238,7 @@ mod tests {
             <film type=\"hdrfilm\"><rfilter type=\"box\"/></film></sensor></scene>";
         let mut scene = SceneFile::parse("test.xml".as_ref(), text).unwrap();
         let places = vec![Place { container: container.clone(), holes: Vec::new() }];
-        scene.media.push(MediumDescription { id: "smoke".to_owned(), matter, places });
+        scene.media.push(MediumDescription { id: "smoke".to_owned(), matter, places, limits: None });
         let mut tables = tables(&scene);
         Ok(Media::new(&scene, &mut tables).map_err(|e| e.to_string())?.with(Differences(&container)))
     }

@@ -7,6 +7,8 @@ line: scene, quadrant (row, column), mean radiance in three channels, their stan
 
 import glob
 import os
+import random
+import struct
 import sys
 
 import mitsuba as mi
@@ -16,7 +18,18 @@ HERE = os.path.dirname(os.path.abspath(__file__))
 RUNS, SAMPLES = 16, 256
 
 
+def grid(name, size, channels, seed, box):
+    """A volume of Mitsuba's format, version 3, of 32-bit floats."""
+    rng = random.Random(seed)
+    count = size[0] * size[1] * size[2] * channels
+    values = [round(rng.random(), 3) for _ in range(count)]
+    data = b"VOL\x03" + struct.pack("<iiiii6f", 1, *size, channels, *box) + struct.pack("<%df" % count, *values)
+    open(os.path.join(HERE, name), "wb").write(data)
+
+
 def main():
+    grid("grey.vol", (3, 2, 4), 1, 1, (0, 0, 0, 1, 1, 1))
+    grid("colour.vol", (2, 3, 3), 3, 2, (-0.8, -0.7, -0.9, 0.8, 0.9, 0.7))
     mi.set_variant("llvm_ad_rgb")
     names = sys.argv[1:] or sorted(os.path.basename(f)[6:-4] for f in glob.glob(os.path.join(HERE, "media-*.xml")))
     lines = []
