@@ -7,7 +7,7 @@
 //! | `film` | `hdrfilm`: size, crop |
 //! | `rfilter` | `box`, `tent`, `gaussian`, `mitchell`, `catmullrom`, `lanczos` |
 //! | `sampler` | any of Mitsuba's: `sample_count` |
-//! | `medium` | `homogeneous` (`sigma_t` and `albedo`, or `sigma_a` and `sigma_s`; `scale`), `heterogeneous` (`sigma_t` as `gridvolume` or `constvolume`) |
+//! | `medium` | `homogeneous` (`sigma_t` and `albedo`, or `sigma_a` and `sigma_s`; `scale`), `heterogeneous` (`sigma_t` and `albedo` as `gridvolume` or `constvolume`) |
 //! | `volume` | `gridvolume` (`.vol`; `.vdb` and `.nvdb` with `grid`, `use_grid_bbox`), `constvolume` |
 //! | `phase` | `isotropic`, `hg`, `rayleigh`, `blendphase` |
 //! | `shape` | `rectangle`, `cube`, `sphere`, `disk`, `cylinder`, `ply`, `obj`, `serialized`, `linearcurve`, `bsplinecurve` (tubes of triangles), `shapegroup`, `instance`, `merge` |
@@ -17,7 +17,7 @@
 //! | `emitter` | `point`, `spot`, `area`, `directional`, `constant`, `envmap` |
 //!
 //! `<include>`, `<path>`, `<default>` with `$name`, `<alias>`, `<ref>` to anything, and all transforms are understood; files of
-//! version 0.6 are upgraded. A medium fills the cube or sphere whose `interior` it is. What has no effect here is a
+//! version 0.6 are upgraded. A medium fills the closed shape whose `interior` it is. What has no effect here is a
 //! [`Note`]; anything else is a [`SceneError`]: nothing is skipped in silence.
 //!
 //! Of glTF are read: nodes with their transforms, triangles with normals and one set of texture coordinates, perspective cameras, base
