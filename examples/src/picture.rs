@@ -57,6 +57,14 @@ impl Picture {
         Self::decode(file, extension, bytes, false)
     }
 
+    /// The same, but as they are.
+    ///
+    /// # Errors
+    /// As [`Picture::read`].
+    pub fn from_raw_bytes(file: &Path, extension: &str, bytes: &[u8]) -> Result<Self, DataError> {
+        Self::decode(file, extension, bytes, true)
+    }
+
     fn decode(file: &Path, extension: &str, bytes: &[u8], is_raw: bool) -> Result<Self, DataError> {
         let picture = match extension {
             "exr" => read_with_adapter(fogbow_std::image::exr::decode, bytes),

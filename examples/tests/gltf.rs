@@ -5,7 +5,7 @@ use std::process::Command;
 
 use fogbow::math::Vec3;
 use fogbow::spectrum::Spectrum;
-use fogbow::surface::Surface;
+use fogbow::surface::{Conductor, Distribution, Plastic, RoughConductor, RoughPlastic, Roughness, Surface};
 use fogbow_examples::scene_file::{
     Emitter, Findings, Geometry, Matter, ReadOptions, SceneFile, fingerprint, fingerprint_with,
 };
@@ -239,6 +239,30 @@ fn lights_and_materials_mean_what_they_say() {
     assert!((axis[2] - 1.0).abs() < 1e-6 && (direction[2] - 1.0).abs() < 1e-6);
     assert!((beam - 0.25_f64.to_degrees()).abs() < 1e-5 && (cutoff - 0.5_f64.to_degrees()).abs() < 1e-5);
     assert_eq!((*intensity, *irradiance), (Spectrum::new(10.0, 10.0, 5.0), Spectrum::splat(3.0)));
+}
+
+#[test]
+fn metal_and_gloss_become_facets() {
+    let surface = |pbr: &str| {
+        let rest = format!(
+            ",\"nodes\":[{{\"mesh\":0}}],\"materials\":[{{\"pbrMetallicRoughness\":{{\"baseColorFactor\":[0.5,0.6,0.7,1],{pbr}}}}}]"
+        );
+        let findings = read(&triangle(",\"material\":0", &rest));
+        let scene = findings.scene.unwrap_or_else(|| panic!("{:?}", findings.errors));
+        assert!(scene.shapes[0].material.is_two_sided);
+        scene.shapes[0].material.surface
+    };
+    let colour = Spectrum::new(0.5, 0.6, 0.7);
+    let facets = |roughness: f32| Roughness::even(Distribution::Ggx, roughness * roughness);
+    let metal = RoughConductor { conductor: Conductor::mirror(colour), roughness: facets(0.5) };
+    assert_eq!(surface("\"metallicFactor\":1,\"roughnessFactor\":0.5"), Surface::RoughConductor(metal));
+    assert_eq!(surface("\"metallicFactor\":1,\"roughnessFactor\":0"), Surface::Mirror { reflectance: colour });
+    let plastic = Plastic { eta: 1.5, diffuse: colour, specular: Spectrum::ONE, nonlinear: false };
+    let rough = RoughPlastic::new(plastic, Distribution::Ggx, 0.25);
+    assert_eq!(surface("\"metallicFactor\":0,\"roughnessFactor\":0.5"), Surface::RoughPlastic(rough));
+    assert_eq!(surface("\"metallicFactor\":0,\"roughnessFactor\":0"), Surface::Plastic(plastic));
+    // What scatters evenly has no coat.
+    assert_eq!(surface("\"metallicFactor\":0"), Surface::Lambert { reflectance: colour });
 }
 
 #[test]

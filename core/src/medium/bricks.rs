@@ -126,7 +126,8 @@ impl Bricks<'_> {
         self.cells.get(entry * CELLS..)?.first_chunk()
     }
 
-    /// Bounds of every slot, over the cells that interpolation inside it touches, one more on each side; and those of all.
+    /// Bounds of every slot, over the cells that interpolation inside it touches, one more on each side; and those of all. Where there is
+    /// nothing, the lower bound is no bound, but tells how far nothing reaches: see [`gap`].
     ///
     /// # Errors
     /// Where a slot that is not there would have some: in a node that is missing beside a cell that is not empty. Outermost cells
@@ -135,6 +136,7 @@ impl Bricks<'_> {
         if bounds.len() != self.slots.len() {
             return Err(MediumError::Blocks);
         }
+        bounds.fill(MinMax::default());
         let along = nodes_along(self.size);
         let bricks = self.size.map(|n| n.div_ceil(BRICK));
         let mut whole = MinMax { min: 0.0, max: 0.0 };
@@ -167,6 +169,7 @@ impl Bricks<'_> {
                 }
             }
         }
+        bounds.as_chunks_mut::<SLOTS>().0.iter_mut().for_each(mark_gaps);
         Ok(whole)
     }
 
@@ -212,6 +215,33 @@ impl Bricks<'_> {
     }
 }
 
+/// Tells slots that belong to larger gaps so: aligned cubes of 2, 4 or 8 slots along each edge, or all of the node.
+fn mark_gaps(bounds: &mut [MinMax; SLOTS]) {
+    for edge in [2, 4, 8, NODE] {
+        for corner in positions([NODE / edge; 3]) {
+            let place = |offset: [u32; 3]| {
+                let [x, y, z] = [0, 1, 2].map(|axis| (corner[axis] * edge + offset[axis]) as usize);
+                (z * NODE as usize + y) * NODE as usize + x
+            };
+            // A gap is made of eight gaps of half its edge, or of slots.
+            let parts = positions([2; 3]).map(|part| part.map(|c| c * edge / 2));
+            let is_half =
+                |part: [u32; 3]| bounds.get(place(part)).is_some_and(|b| b.max == 0.0 && gap(b) >= (edge / 2) as i32);
+            if parts.into_iter().all(is_half) {
+                for offset in positions([edge; 3]) {
+                    bounds[place(offset)] = MinMax { min: -(edge as f32), max: 0.0 };
+                }
+            }
+        }
+    }
+}
+
+/// Slots along the edge of the aligned cube around an empty slot in which nothing is.
+#[inline]
+pub(super) fn gap(bounds: &MinMax) -> i32 {
+    (-bounds.min as i32).max(1)
+}
+
 /// Nodes along each axis.
 fn nodes_along(size: [u32; 3]) -> [u32; 3] {
     size.map(|n| n.div_ceil(NODE * BRICK))
@@ -249,22 +279,45 @@ impl Corners {
         const LAST: u32 = BRICK - 1;
         let is_within = x % BRICK < LAST && y % BRICK < LAST && z % BRICK < LAST;
         let is_inside = x < bricks.size[0] && y < bricks.size[1] && z < bricks.size[2];
+        const ROW: usize = BRICK as usize;
+        const LAYER: usize = ROW * ROW;
         let values = if is_within && is_inside {
             // All in one brick, as two thirds of all points are.
             bricks.brick([x, y, z].map(|c| c / BRICK)).map_or([0.0; 8], |cells| {
                 let at = within([x, y, z]);
-                const ROW: usize = BRICK as usize;
-                const LAYER: usize = ROW * ROW;
                 [0, 1, ROW, ROW + 1, LAYER, LAYER + 1, LAYER + ROW, LAYER + ROW + 1]
                     .map(|offset| cells.get(at + offset).copied().unwrap_or(0.0))
             })
         } else {
-            core::array::from_fn(|i| {
-                let corner = [i & 1, i >> 1 & 1, i >> 2].map(|c| c as i32);
-                bricks.value([0, 1, 2].map(|axis| lower[axis].wrapping_add(corner[axis])))
-            })
+            Self::apart(bricks, lower)
         };
         Self { values, fraction }
+    }
+
+    /// The values of cells in several bricks: each brick is looked up once.
+    fn apart(bricks: &Bricks<'_>, lower: [i32; 3]) -> [f32; 8] {
+        let mut values = [0.0; 8];
+        // Of each axis, the upper cell may be the first of the next brick; what wraps lies outside.
+        let cells = lower.map(|c| [c as u32, c.wrapping_add(1) as u32]);
+        let is_split = cells.map(|[low, high]| high % BRICK == 0 || low >= high);
+        for parts in 0..8_usize {
+            let part = [parts & 1, parts >> 1 & 1, parts >> 2];
+            if (0..3).any(|axis| part[axis] == 1 && !is_split[axis]) {
+                continue;
+            }
+            let place = core::array::from_fn(|axis| cells[axis][part[axis]] / BRICK);
+            let Some(brick) = bricks.brick(place) else { continue };
+            for corner in 0..8_usize {
+                let upper = [corner & 1, corner >> 1 & 1, corner >> 2];
+                let cell: [u32; 3] = core::array::from_fn(|axis| cells[axis][upper[axis]]);
+                let is_here =
+                    (0..3).all(|axis| (!is_split[axis] || upper[axis] == part[axis]) && cell[axis] < bricks.size[axis]);
+                if is_here {
+                    values[corner] = brick[within(cell)];
+                }
+            }
+        }
+        values
     }
 
     #[inline]

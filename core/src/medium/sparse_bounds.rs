@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 use super::SparseGrid;
-use super::bricks::{BRICK, Bricks, NODE};
+use super::bricks::{BRICK, Bricks, NODE, gap};
 use super::grid_bounds::{ENOUGH, SHORT, WASTE};
 use super::majorant::MinMax;
 use super::region::{LocalLine, lesser};
@@ -12,7 +12,7 @@ use crate::math::Ray;
 
 pub(super) use super::grid_bounds::Joining;
 
-/// The part of a line in one brick, or in a node that is not there.
+/// The part of a line in one brick, or in a larger cube of them with nothing in it.
 #[derive(Debug, Clone, Copy)]
 struct Span {
     bounds: MinMax,
@@ -21,7 +21,7 @@ struct Span {
     end: f32,
 }
 
-/// A walk through bricks along a line, and in one step through nodes that are not there; every distance is computed from the origin,
+/// A walk through bricks along a line, and in one step through gaps and through nodes that are not there; every distance is computed from the origin,
 /// since a sum of steps would drift.
 #[derive(Debug)]
 struct Walk<'w> {
@@ -49,8 +49,9 @@ impl<'w> Walk<'w> {
             (self.line.origin.to_array(), self.line.direction.to_array(), self.line.inverse.to_array());
         while !self.is_over {
             let brick = self.at.map(|c| c as u32);
-            let (step, found) = match table.slot(brick) {
-                Some(slot) => (1, bounds.get(slot).copied().unwrap_or_default()),
+            let (step, found) = match table.slot(brick).and_then(|slot| bounds.get(slot)) {
+                Some(bounds) if bounds.max > 0.0 => (1, *bounds),
+                Some(nothing) => (gap(nothing), MinMax::default()),
                 None => (NODE as i32, MinMax::default()),
             };
             // What ends where: the first brick that is not in it any more, and the distance to the face between.

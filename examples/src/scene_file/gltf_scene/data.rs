@@ -107,8 +107,13 @@ impl Data {
         bytes.get(view.offset()..)?.get(..view.length())
     }
 
-    /// The picture of a texture.
-    pub(super) fn picture(&self, source: &Source<'_>, image: &::gltf::Image<'_>) -> Result<Picture, SceneError> {
+    /// The picture of a texture: a colour, or raw numbers.
+    pub(super) fn picture(
+        &self,
+        source: &Source<'_>,
+        image: &::gltf::Image<'_>,
+        is_raw: bool,
+    ) -> Result<Picture, SceneError> {
         let element = label("image", image.index(), image.name());
         let (bytes, kind) = match image.source() {
             ImageSource::View { view, mime_type } => {
@@ -125,7 +130,8 @@ impl Data {
             Some([0xff, 0xd8, ..]) => "jpg",
             _ => return Err(source.error(&element, format!("is neither PNG nor JPEG ({})", kind.unwrap_or_default()))),
         };
-        Picture::from_bytes(source.file, extension, &bytes).map_err(|e| source.error(&element, e.reason))
+        let decode = if is_raw { Picture::from_raw_bytes } else { Picture::from_bytes };
+        decode(source.file, extension, &bytes).map_err(|e| source.error(&element, e.reason))
     }
 
     /// The elements of an accessor, as `N` numbers each; whole numbers as shares of the largest where they are normalised.

@@ -7,7 +7,9 @@ use ::gltf::Document;
 use ::gltf::material::AlphaMode;
 use ::gltf::texture::{MagFilter, WrappingMode};
 use fogbow::spectrum::Spectrum;
-use fogbow::surface::Surface;
+use fogbow::surface::{
+    Conductor, Distribution, Plastic, RoughConductor, RoughDielectric, RoughPlastic, Roughness, Surface,
+};
 
 use super::data::Data;
 use super::{Source, label};
@@ -53,12 +55,18 @@ impl Materials {
 struct Reader<'a> {
     source: &'a Source<'a>,
     data: &'a Data,
-    /// Pictures by their index.
-    pictures: HashMap<usize, Option<Arc<Picture>>>,
+    /// Pictures by their index, and whether they are raw.
+    pictures: HashMap<(usize, bool), Option<Arc<Picture>>>,
 }
 
 /// Share of transmitted light, and of metal, from which a surface counts as glass or as metal.
 const MOSTLY: f32 = 0.5;
+
+/// Roughness below which a surface is smooth: lobes become narrower than what a picture shows.
+const SMOOTH: f32 = 0.05;
+
+/// Index of refraction of everything that does not say another.
+const IOR: f32 = 1.5;
 
 impl Reader<'_> {
     fn material(&mut self, material: &::gltf::Material<'_>) -> Ready {
@@ -68,14 +76,18 @@ impl Reader<'_> {
         let pbr = material.pbr_metallic_roughness();
         let [r, g, b, _] = pbr.base_color_factor();
         let base = Spectrum([r, g, b]).max(Spectrum::ZERO).min(Spectrum::ONE);
-        let (metallic, roughness) = (pbr.metallic_factor(), pbr.roughness_factor());
+        let (mut metallic, mut roughness) = (pbr.metallic_factor(), pbr.roughness_factor());
+        if let Some(texture) = pbr.metallic_roughness_texture().and_then(|info| self.texture(&info, true)) {
+            let [_, green, blue] = texture.mean().0;
+            (metallic, roughness) = (metallic * blue, roughness * green);
+            note(NoteKind::Replaced, "metallicRoughnessTexture: its means, everywhere");
+        }
         if material.alpha_mode() != AlphaMode::Opaque {
             note(NoteKind::Replaced, "alpha has no effect: it is opaque");
         }
         for (name, is_there) in [
             ("normalTexture", material.normal_texture().is_some()),
             ("occlusionTexture", material.occlusion_texture().is_some()),
-            ("metallicRoughnessTexture", pbr.metallic_roughness_texture().is_some()),
         ] {
             if is_there {
                 note(NoteKind::Ignored, &format!("{name} has no effect"));
@@ -84,37 +96,55 @@ impl Reader<'_> {
         let mut texcoords = None;
         let texture = pbr.base_color_texture().and_then(|info| {
             texcoords = Some(info.tex_coord());
-            self.texture(&info)
+            self.texture(&info, false)
         });
         let mean = texture.as_ref().map_or(Spectrum::ONE, |texture| texture.mean());
         let colour = base * mean.max(Spectrum::ZERO).min(Spectrum::ONE);
         let scaled = |slot: Slot| texture.clone().map(|t| (slot, Arc::new(Texture::Scaled(t, base))));
         let transmission = material.transmission().map_or(0.0, |t| t.transmission_factor());
+        let eta = material.ior().unwrap_or(IOR);
+        let eta = if eta > 0.0 && eta.is_finite() { eta } else { IOR };
+        let (one, is_smooth) = (Spectrum::ONE, roughness < SMOOTH);
+        let facets = Roughness::even(Distribution::Ggx, (roughness * roughness).clamp(0.0, 1.0));
         let (surface, textures, is_two_sided) = if transmission > MOSTLY {
-            if roughness > 0.0 {
-                note(NoteKind::Replaced, "rough glass: smooth");
-            }
-            let thickness = material.volume().map_or(0.0, |volume| volume.thickness_factor());
             if material.volume().is_some_and(|volume| volume.attenuation_distance().is_finite()) {
                 note(NoteKind::Replaced, "attenuation within glass: clear");
             }
-            // A sheet without thickness bends no light.
-            let eta = if thickness > 0.0 { material.ior().unwrap_or(1.5).max(1e-3) } else { 1.0 };
-            let surface = Surface::Dielectric { eta, reflectance: Spectrum::ONE, transmittance: colour };
+            let surface = if material.volume().is_none_or(|volume| volume.thickness_factor() <= 0.0) {
+                if !is_smooth {
+                    note(NoteKind::Replaced, "a thin pane of rough glass: smooth");
+                }
+                Surface::ThinDielectric { eta, reflectance: one, transmittance: colour }
+            } else if is_smooth || eta == 1.0 {
+                Surface::Dielectric { eta, reflectance: one, transmittance: colour }
+            } else {
+                let glass = RoughDielectric { eta, reflectance: one, transmittance: colour, roughness: facets };
+                Surface::RoughDielectric(glass)
+            };
             (surface, scaled(Slot::Transmitted), false)
-        } else if metallic > MOSTLY && pbr.metallic_roughness_texture().is_none() && roughness < MOSTLY {
-            if roughness > 0.0 {
-                note(NoteKind::Replaced, "rough metal: a mirror of its colour");
-            }
-            (Surface::Mirror { reflectance: colour }, scaled(Slot::Specular), true)
+        } else if metallic > MOSTLY {
+            let surface = if is_smooth {
+                Surface::Mirror { reflectance: colour }
+            } else {
+                Surface::RoughConductor(RoughConductor { conductor: Conductor::mirror(colour), roughness: facets })
+            };
+            (surface, scaled(Slot::Specular), true)
         } else {
-            if metallic < 1.0 && roughness < 1.0 || metallic > 0.0 {
-                note(NoteKind::Replaced, "a glossy surface: one that scatters evenly, of its base colour");
-            }
-            (Surface::Lambert { reflectance: colour }, scaled(Slot::Diffuse), true)
+            let plastic = Plastic { eta, diffuse: colour, specular: one, nonlinear: false };
+            let surface = if roughness >= 1.0 || eta == 1.0 {
+                Surface::Lambert { reflectance: colour }
+            } else if is_smooth {
+                Surface::Plastic(plastic)
+            } else {
+                Surface::RoughPlastic(RoughPlastic::new(plastic, Distribution::Ggx, roughness * roughness))
+            };
+            (surface, scaled(Slot::Diffuse), true)
         };
+        if (0.1..0.9).contains(&metallic) && transmission <= MOSTLY {
+            note(NoteKind::Replaced, "half a metal: what it is mostly");
+        }
         let emitted = Spectrum(material.emissive_factor()) * material.emissive_strength().unwrap_or(1.0);
-        let emitted = match material.emissive_texture().and_then(|info| self.texture(&info)) {
+        let emitted = match material.emissive_texture().and_then(|info| self.texture(&info, false)) {
             Some(texture) => {
                 note(NoteKind::Replaced, "emissiveTexture: its mean, everywhere");
                 emitted * texture.mean().max(Spectrum::ZERO)
@@ -123,8 +153,8 @@ impl Reader<'_> {
         };
         let radiance = (emitted.is_valid() && !emitted.is_black()).then_some(emitted);
         // What shines and lets light pass is something no light here is.
-        let surface =
-            if radiance.is_some() && matches!(surface, Surface::Dielectric { .. }) { Surface::BLACK } else { surface };
+        let is_glass = transmission > MOSTLY;
+        let surface = if radiance.is_some() && is_glass { Surface::BLACK } else { surface };
         Ready {
             surface: Material { is_two_sided, textures: textures.into_iter().collect(), ..Material::plain(surface) },
             radiance,
@@ -133,13 +163,13 @@ impl Reader<'_> {
     }
 
     /// A texture; `None`, and a kept error, where its picture cannot be read.
-    fn texture(&mut self, info: &::gltf::texture::Info<'_>) -> Option<Arc<Texture>> {
+    fn texture(&mut self, info: &::gltf::texture::Info<'_>, is_raw: bool) -> Option<Arc<Texture>> {
         let texture = info.texture();
         let image = texture.source();
         let (source, data) = (self.source, self.data);
-        let picture = self.pictures.entry(image.index());
+        let picture = self.pictures.entry((image.index(), is_raw));
         let picture =
-            picture.or_insert_with(|| source.sink.keep(data.picture(source, &image)).map(Arc::new)).clone()?;
+            picture.or_insert_with(|| source.sink.keep(data.picture(source, &image, is_raw)).map(Arc::new)).clone()?;
         let sampler = texture.sampler();
         let wrap = match sampler.wrap_s() {
             WrappingMode::Repeat => Wrap::Repeat,
