@@ -266,6 +266,44 @@ fn metal_and_gloss_become_facets() {
 }
 
 #[test]
+fn coloured_glass_absorbs_within() {
+    let points = [[0.0_f32, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+    let sides = [0_u16, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3];
+    let mut data: Vec<u8> = sides.iter().flat_map(|i| i.to_le_bytes()).collect();
+    data.extend(points.iter().flatten().flat_map(|c| c.to_le_bytes()));
+    let glass = |count: usize| {
+        let text = format!(
+            "{{\"asset\":{{\"version\":\"2.0\"}},\"scenes\":[{{\"nodes\":[0]}}],\"nodes\":[{{\"mesh\":0}}],\
+            \"buffers\":[{{\"byteLength\":72}}],\"bufferViews\":[{{\"buffer\":0,\"byteLength\":24}},{{\"buffer\":0,\"byteOffset\":24,\"byteLength\":48}}],\
+            \"accessors\":[{{\"bufferView\":0,\"componentType\":5123,\"count\":{count},\"type\":\"SCALAR\"}},\
+            {{\"bufferView\":1,\"componentType\":5126,\"count\":4,\"type\":\"VEC3\",\"min\":[0,0,0],\"max\":[1,1,1]}}],\
+            \"meshes\":[{{\"primitives\":[{{\"attributes\":{{\"POSITION\":1}},\"indices\":0,\"material\":0}}]}}],\
+            \"materials\":[{{\"pbrMetallicRoughness\":{{\"roughnessFactor\":0.5}},\"extensions\":{{\
+            \"KHR_materials_transmission\":{{\"transmissionFactor\":1}},\"KHR_materials_volume\":{{\"thicknessFactor\":1,\
+            \"attenuationDistance\":2,\"attenuationColor\":[1,0.5,0.25]}}}}}}]}}"
+        );
+        let findings = SceneFile::from_gltf(Path::new("room.glb"), &glb(&text, &data), &ReadOptions::default());
+        let notes: Vec<String> = findings.notes.iter().map(|n| n.to_string()).collect();
+        (findings.scene.unwrap_or_else(|| panic!("{:?}", findings.errors)), notes)
+    };
+    let (scene, _) = glass(12);
+    assert!(matches!(scene.shapes[0].material.surface, Surface::RoughDielectric(_)));
+    let [medium] = &scene.media[..] else { panic!("{} media", scene.media.len()) };
+    let Matter::Homogeneous { absorption, scattering, .. } = medium.matter else { panic!("{medium:?}") };
+    // After two metres, a half and a quarter are left.
+    let left = absorption.map(|a| (-2.0 * a).exp());
+    assert!(
+        (left - Spectrum::new(1.0, 0.5, 0.25)).map(f32::abs).max_element() < 1e-6 && scattering.is_black(),
+        "{left:?}"
+    );
+    let inside = [[0.1, 0.1, 0.1], [0.5, 0.5, 0.5]].map(|point| medium.places[0].container.contains(point));
+    assert_eq!(inside, [true, false]);
+    // Without its last side, it is not closed.
+    let (scene, notes) = glass(9);
+    assert!(scene.media.is_empty() && notes.iter().any(|note| note.contains("not closed")), "{notes:?}");
+}
+
+#[test]
 fn broken_files_say_what_is_wrong() {
     let good = triangle("", ",\"nodes\":[{\"mesh\":0}]");
     assert!(read(&good).scene.is_some_and(|scene| matches!(scene.emitters[..], [Emitter::Constant { .. }])));

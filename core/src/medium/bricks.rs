@@ -307,13 +307,13 @@ impl Corners {
             }
             let place = core::array::from_fn(|axis| cells[axis][part[axis]] / BRICK);
             let Some(brick) = bricks.brick(place) else { continue };
-            for corner in 0..8_usize {
+            for (corner, value) in values.iter_mut().enumerate() {
                 let upper = [corner & 1, corner >> 1 & 1, corner >> 2];
                 let cell: [u32; 3] = core::array::from_fn(|axis| cells[axis][upper[axis]]);
                 let is_here =
                     (0..3).all(|axis| (!is_split[axis] || upper[axis] == part[axis]) && cell[axis] < bricks.size[axis]);
                 if is_here {
-                    values[corner] = brick[within(cell)];
+                    *value = brick[within(cell)];
                 }
             }
         }

@@ -23,6 +23,8 @@ use crate::texture::{Texture, ToUv, Wrap};
 pub(super) struct Ready {
     pub(super) surface: Material,
     pub(super) radiance: Option<Spectrum>,
+    /// What absorbs light within (m⁻¹).
+    pub(super) attenuation: Option<Spectrum>,
     /// Which of the texture coordinates of a mesh its textures are looked up with.
     pub(super) texcoords: Option<u32>,
 }
@@ -47,6 +49,7 @@ impl Materials {
                 ..Material::plain(Surface::Lambert { reflectance: Spectrum::ONE })
             },
             radiance: None,
+            attenuation: None,
             texcoords: None,
         })
     }
@@ -107,9 +110,6 @@ impl Reader<'_> {
         let (one, is_smooth) = (Spectrum::ONE, roughness < SMOOTH);
         let facets = Roughness::even(Distribution::Ggx, (roughness * roughness).clamp(0.0, 1.0));
         let (surface, textures, is_two_sided) = if transmission > MOSTLY {
-            if material.volume().is_some_and(|volume| volume.attenuation_distance().is_finite()) {
-                note(NoteKind::Replaced, "attenuation within glass: clear");
-            }
             let surface = if material.volume().is_none_or(|volume| volume.thickness_factor() <= 0.0) {
                 if !is_smooth {
                     note(NoteKind::Replaced, "a thin pane of rough glass: smooth");
@@ -158,6 +158,7 @@ impl Reader<'_> {
         Ready {
             surface: Material { is_two_sided, textures: textures.into_iter().collect(), ..Material::plain(surface) },
             radiance,
+            attenuation: material.volume().filter(|_| is_glass).and_then(|volume| attenuation(&volume)),
             texcoords,
         }
     }
@@ -188,4 +189,13 @@ impl Reader<'_> {
         let is_smooth = sampler.mag_filter() != Some(MagFilter::Nearest);
         Some(Arc::new(Texture::Bitmap { picture, wrap, is_smooth, to_uv }))
     }
+}
+
+/// `−ln(colour)/distance`: a white light has that colour when it has gone so far. `None` where nothing is absorbed, or nothing is within.
+fn attenuation(volume: &::gltf::material::Volume<'_>) -> Option<Spectrum> {
+    // Black would absorb everything at once.
+    let share = Spectrum(volume.attenuation_color()).max(Spectrum::splat(1e-6)).min(Spectrum::ONE);
+    let absorption = share.map(|c| -c.ln() / volume.attenuation_distance());
+    let is_thick = volume.thickness_factor() > 0.0;
+    (is_thick && absorption.is_valid() && !absorption.is_black()).then_some(absorption)
 }

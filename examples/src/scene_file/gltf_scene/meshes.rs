@@ -2,16 +2,21 @@
 
 use ::gltf::Semantic;
 use ::gltf::mesh::Mode;
+use std::sync::Arc;
+
 use fogbow::math::{Vec2, Vec3};
+use fogbow::phase::Phase;
+use fogbow::spectrum::Spectrum;
 
 use super::data::Data;
 use super::materials::Materials;
 use super::{Source, label};
 use crate::error::SceneError;
 use crate::mesh::Mesh;
-use crate::scene_file::description::{Geometry, Shape};
+use crate::scene_file::description::{Container, Geometry, Matter, MediumDescription, Place, Shape};
 use crate::scene_file::notes::NoteKind;
 use crate::transform::Transform;
+use crate::world::Body;
 
 /// Most triangles of a scene, instances included: about 4 GB with all that is built from them.
 const MAX_TRIANGLES: usize = 1 << 25;
@@ -23,7 +28,7 @@ pub(super) fn read(
     to_world: &Transform,
     data: &Data,
     materials: &Materials,
-    shapes: &mut Vec<Shape>,
+    (shapes, media): (&mut Vec<Shape>, &mut Vec<MediumDescription>),
 ) -> Result<(), SceneError> {
     for primitive in mesh.primitives() {
         let element = format!("{}, primitive {}", label("mesh", mesh.index(), mesh.name()), primitive.index());
@@ -79,6 +84,18 @@ pub(super) fn read(
         }
         let geometry =
             vertices.transformed(to_world, source.file).map_err(|e| error(format!("{} {}", e.place, e.reason)))?;
+        if let Some(absorption) = material.attenuation {
+            match Body::new(&geometry) {
+                Ok(body) => media.push(MediumDescription {
+                    id: format!("glass of {element}"),
+                    matter: Matter::Homogeneous { absorption, scattering: Spectrum::ZERO, phase: Phase::ISOTROPIC },
+                    places: vec![Place { container: Container::Body(Arc::new(body)), holes: Vec::new() }],
+                }),
+                Err(reason) => {
+                    source.note(NoteKind::Replaced, &*element, format!("attenuation within: clear, for {reason}"))
+                }
+            }
+        }
         shapes.push(Shape {
             geometry: Geometry::Mesh(geometry),
             is_flipped: false,

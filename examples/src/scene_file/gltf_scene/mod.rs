@@ -183,16 +183,16 @@ fn read_scene(source: &Source<'_>, bytes: &[u8], options: &ReadOptions) -> Resul
         source.note(NoteKind::Ignored, "animations", "are not played: the scene stands as its nodes say");
     }
     let materials = materials::Materials::new(source, &document, &data);
-    let mut shapes = Vec::new();
+    let (mut shapes, mut media) = (Vec::new(), Vec::new());
     for (mesh, to_world) in &found.meshes {
-        meshes::read(source, mesh, to_world, &data, &materials, &mut shapes)?;
+        meshes::read(source, mesh, to_world, &data, &materials, (&mut shapes, &mut media))?;
     }
     let emitters = found.lights.iter().map(|(light, to_world)| emitter(source, light, to_world));
     let mut scene_file = SceneFile {
         file: source.file.to_owned(),
         integrator: Integrator::default(),
         sensor: default_sensor(Bounds::EMPTY),
-        media: Vec::new(),
+        media,
         shapes,
         emitters: emitters.collect::<Result<Vec<_>, _>>()?,
     };
