@@ -89,6 +89,7 @@ pub(super) fn read(
                 Ok(body) => media.push(MediumDescription {
                     id: format!("glass of {element}"),
                     matter: Matter::Homogeneous { absorption, scattering: Spectrum::ZERO, phase: Phase::ISOTROPIC },
+                    limits: None,
                     places: vec![Place { container: Container::Body(Arc::new(body)), holes: Vec::new() }],
                 }),
                 Err(reason) => {
