@@ -7,7 +7,7 @@ import { execFile } from "node:child_process";
 import { cp, mkdir, mkdtemp, readFile, rm, stat, writeFile } from "node:fs/promises";
 import { tmpdir } from "node:os";
 import { dirname, join, resolve } from "node:path";
-import { fileURLToPath } from "node:url";
+import { fileURLToPath, pathToFileURL } from "node:url";
 import { promisify } from "node:util";
 import { brotliCompressSync, constants, gzipSync } from "node:zlib";
 
@@ -29,6 +29,13 @@ for (const file of ["fogbow.wasm", "fogbow-simd.wasm"]) {
   const imports = WebAssembly.Module.imports(new WebAssembly.Module(bytes));
   check(`${file} imports nothing`, imports.length === 0, imports.map(({ name }) => name).join());
 }
+
+const versions = [
+  JSON.parse(await readFile(join(folder, "package.json"), "utf8")).version,
+  (await import(pathToFileURL(join(folder, "api.js")).href)).version,
+  /^version = "(.*)"$/m.exec(await readFile(join(own, "../../../Cargo.toml"), "utf8"))[1],
+];
+check("the package's version is the library's", new Set(versions).size === 1, versions.join(", "));
 
 const empty = await mkdtemp(join(tmpdir(), "fogbow-user-"));
 try {
