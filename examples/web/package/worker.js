@@ -50,6 +50,8 @@ class Peer {
     this.started = started;
     started.listen(
       ({ id, result, error }) => {
+        // Answers may still come when the worker has been ended.
+        if (!this.#waiting.has(id)) return;
         const { resolve, reject } = this.#waiting.get(id);
         this.#waiting.delete(id);
         if (!this.#waiting.size) started.unref();
