@@ -102,6 +102,11 @@ impl<'a> Element<'a> {
         self.context.sink.keep(result)
     }
 
+    /// Whether something inside it sends out light.
+    pub(super) fn is_emitter(&self) -> bool {
+        self.children().is_ok_and(|children| children.iter().any(|child| child.tag() == "emitter"))
+    }
+
     /// An error of one attribute.
     pub(super) fn attribute_error(&self, attribute: &str, reason: impl core::fmt::Display) -> SceneError {
         SceneError { attribute: Some(attribute.to_owned()), ..self.error(reason) }

@@ -9,8 +9,13 @@ use crate::error::SceneError;
 use crate::picture::Picture;
 use crate::transform::{Transform, normalized};
 
-pub(super) fn read(element: &Element<'_>) -> Result<Emitter, SceneError> {
+const KNOWN: &str = "point, spot, directional, constant, envmap; area inside a shape";
+
+/// An emitter; none where it is left out by the user's leave.
+pub(super) fn read(element: &Element<'_>) -> Result<Option<Emitter>, SceneError> {
     let plugin = Plugin::new(*element)?;
+    // How often it is chosen among lights changes noise only.
+    plugin.skip(&["sampling_weight"]);
     let emitter = match plugin.kind.as_str() {
         "point" => {
             let to_world = plugin.to_world()?;
@@ -27,6 +32,10 @@ pub(super) fn read(element: &Element<'_>) -> Result<Emitter, SceneError> {
             let to_world = plugin.to_world()?.map_or(Transform::IDENTITY, |(t, _)| t);
             let cutoff = plugin.number_in("cutoff_angle", 20.0, 1e-3..=180.0)?;
             let beam = plugin.number_in("beam_width", cutoff * 0.75, 0.0..=cutoff)?;
+            if let Some(texture) = plugin.get("texture") {
+                let error = texture.error("a spot light cannot show a texture here");
+                texture.instead(error, "without it", || ())?;
+            }
             let axis = to_world.column(2);
             Emitter::Spot {
                 position: to_world.column(3),
@@ -49,11 +58,18 @@ pub(super) fn read(element: &Element<'_>) -> Result<Emitter, SceneError> {
         }
         "constant" => Emitter::Constant { radiance: strength(&plugin, "radiance")? },
         "envmap" => environment(&plugin)?,
-        "area" => return Err(element.attribute_error("type", "an area light must stand inside a shape")),
-        _ => return Err(plugin.unknown_type("point, spot, directional, constant, envmap; area inside a shape")),
+        "area" => {
+            element.suspicious("no shape refers to it: an area light must stand inside a shape");
+            return Ok(None);
+        }
+        "projector" | "directionalarea" | "sky" | "sunsky" | "sun" | "timed_sunsky" => {
+            let reason = format!("\"{}\" cannot be rendered here yet; known here: {KNOWN}", plugin.kind);
+            return element.instead(element.attribute_error("type", reason), "left out", || None);
+        }
+        _ => return element.instead(plugin.unknown_type(KNOWN), "left out", || None),
     };
     plugin.finish()?;
-    Ok(emitter)
+    Ok(Some(emitter))
 }
 
 fn strength(plugin: &Plugin<'_>, name: &str) -> Result<Spectrum, SceneError> {
@@ -62,6 +78,8 @@ fn strength(plugin: &Plugin<'_>, name: &str) -> Result<Spectrum, SceneError> {
 
 fn environment(plugin: &Plugin<'_>) -> Result<Emitter, SceneError> {
     let scale = plugin.number_in("scale", 1.0, 0.0..=1e12)? as f32;
+    // How Mitsuba samples it.
+    plugin.skip(&["mis_compensation", "sampling_weight"]);
     let to_world = match plugin.to_world()? {
         Some((t, source)) if !t.is_rigid() || t.determinant() < 0.0 => {
             return Err(source.error("an environment can be rotated only"));

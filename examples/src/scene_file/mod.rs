@@ -45,6 +45,7 @@ mod preprocess;
 mod sensor;
 mod shapes;
 mod spectra;
+mod suspicions;
 mod textures;
 mod transforms;
 mod tree;
@@ -172,6 +173,7 @@ fn read_scene(scene: &Element<'_>, options: &ReadOptions) -> Result<SceneFile, S
     let is_referred_to = referred_to(scene);
     let (mut integrators, mut sensors) = (Vec::new(), Vec::new());
     let (mut shapes, mut emitters, mut media) = (Vec::new(), Vec::new(), Vec::new());
+    let mut lamps = Vec::new();
     let mut groups = groups::Groups::default();
     for child in scene.children()? {
         match child.tag() {
@@ -186,7 +188,10 @@ fn read_scene(scene: &Element<'_>, options: &ReadOptions) -> Result<SceneFile, S
                 }
             }
             "emitter" if !is_referred_to.contains(&child.node.id()) => {
-                emitters.extend(child.keep(read_emitter(&child, &emitters)));
+                if let Some(emitter) = child.keep(read_emitter(&child, &emitters)).flatten() {
+                    emitters.push(emitter);
+                    lamps.push(child);
+                }
             }
             "bsdf" | "emitter" | "texture" | "volume" | "phase" | "sampler" | "film" | "rfilter" | "spectrum" => {}
             other => {
@@ -214,10 +219,11 @@ fn read_scene(scene: &Element<'_>, options: &ReadOptions) -> Result<SceneFile, S
         }
     };
     let media = places::read(&media, &shapes, &sensor, &sensor_element, sensor_medium)?;
-    let shapes = shapes.into_iter().filter_map(|s| s.shape).collect();
     let file = scene.context.tree.file(scene.node).to_owned();
     let integrator = integrator.unwrap_or_default();
-    let scene_file = SceneFile { file, integrator, sensor, media, shapes, emitters };
+    let mut scene_file = SceneFile { file, integrator, sensor, media, shapes: Vec::new(), emitters };
+    suspicions::look(scene, &scene_file, &shapes, &lamps);
+    scene_file.shapes = shapes.into_iter().filter_map(|s| s.shape).collect();
     if let Err(error) = places::check_far_plane(&scene_file, &sensor_element) {
         sensor_element.instead(error, "nothing is cut off", || ())?;
     }
@@ -231,11 +237,12 @@ fn referred_to(scene: &Element<'_>) -> HashSet<tree::NodeId> {
     references.filter_map(|n| tree.ids.get(n.attribute("id")?).copied()).collect()
 }
 
-fn read_emitter(element: &Element<'_>, others: &[Emitter]) -> Result<Emitter, SceneError> {
-    let emitter = emitters::read(element)?;
+/// The emitter; none where a user wants what cannot be rendered left out.
+fn read_emitter(element: &Element<'_>, others: &[Emitter]) -> Result<Option<Emitter>, SceneError> {
+    let Some(emitter) = emitters::read(element)? else { return Ok(None) };
     let is_around = |e: &Emitter| matches!(e, Emitter::Constant { .. } | Emitter::Environment { .. });
     if is_around(&emitter) && others.iter().any(is_around) {
         return Err(element.error("only one emitter can surround the scene"));
     }
-    Ok(emitter)
+    Ok(Some(emitter))
 }

@@ -51,7 +51,12 @@ pub(super) struct Plugin<'a> {
 impl<'a> Plugin<'a> {
     pub(super) fn new(element: Element<'a>) -> Result<Self, SceneError> {
         element.allow(&["type", "id", "name"])?;
-        let kind = element.required("type")?;
+        let mut kind = element.required("type")?;
+        if kind.contains(|c: char| c.is_ascii_uppercase()) {
+            element
+                .suspicious(format!("\"{kind}\" is written \"{}\"; Mitsuba 3 refuses it", kind.to_ascii_lowercase()));
+            kind.make_ascii_lowercase();
+        }
         let mut children: Vec<Child<'a>> = Vec::new();
         for child in element.children()? {
             let is_value = VALUES.contains(&child.tag());

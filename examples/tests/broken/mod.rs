@@ -3,4 +3,5 @@
 mod common;
 mod data;
 mod fuzz;
+mod reading;
 mod scenes;
