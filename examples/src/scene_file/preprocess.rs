@@ -148,7 +148,8 @@ impl Reader<'_> {
         }
         let id = NodeId(self.tree.nodes.len() as u32);
         let mut attributes = Vec::new();
-        for attribute in node.attributes() {
+        let is_included = node == node.document().root_element() && !node.has_tag_name("scene");
+        for attribute in node.attributes().filter(|a| !(is_included && a.name() == "version")) {
             let value = match self.substitute(attribute.value()) {
                 Ok(value) => value,
                 Err(_) => {
