@@ -1,6 +1,7 @@
 //! Vectors, boxes and maps as arrays: for hosts with vectors of their own, or of another glam.
 //!
-//! `[f32; 3]` and [`Vec3`] turn into each other by `into()`, and so do `[f32; 3]` and [`Spectrum`](crate::spectrum::Spectrum), `[[f32; 3]; 2]` and
+//! `[f32; 3]` and [`Vec3`] turn into each other by `into()`, and so do `[f32; 3]` and [`Spectrum`](crate::spectrum::Spectrum),
+//! `[[f32; 3]; 2]` and
 //! [`Bounds`]. For maps, rows or columns are in the name:
 //!
 //! ```
@@ -20,7 +21,7 @@
 //! | 0.17 | 0.30 | the same |
 //! | 0.18 | 0.30 | the same |
 //! | 0.19 | 0.32 | the same |
-//! | 0.20 | 0.33 | nothing to cross: this crate takes glam from 0.33.11 to 0.34, and `cargo update -p glam@0.34.2 --precise 0.33.12` makes both the same, where it is not already |
+//! | 0.20 | 0.33 | nothing to cross, after `cargo update -p glam@0.34.2 --precise 0.33.12`: this crate takes 0.33.11 to 0.34 |
 //!
 //! `tests/bevy` compiles and runs this with the last three.
 
@@ -43,7 +44,8 @@ impl From<Bounds> for [[f32; 3]; 2] {
     }
 }
 
-/// The map of a 4 × 4 matrix, row after row: numbers 3, 7 and 11 are the translation. `None` if its last row is not `0 0 0 1`, as that of a projection.
+/// The map of a 4 × 4 matrix, row after row: numbers 3, 7 and 11 are the translation. `None` if its last row is not `0 0 0 1`, as
+/// that of a projection.
 ///
 /// ```
 /// # use fogbow::math::{Vec3, affine_from_rows, affine_to_rows};
@@ -78,12 +80,24 @@ pub fn affine_from_columns(columns: &[f32; 16]) -> Option<Affine3> {
 }
 
 /// The 4 × 4 matrix of a map, row after row: see [`affine_from_rows`].
+///
+/// ```
+/// # use fogbow::math::{Affine3, Vec3, affine_to_rows};
+/// let moved = Affine3::from_translation(Vec3::new(1.0, 2.0, 3.0));
+/// assert_eq!(affine_to_rows(&moved)[..8], [1.0, 0.0, 0.0, 1.0, 0.0, 1.0, 0.0, 2.0]);
+/// ```
 #[must_use]
 pub fn affine_to_rows(map: &Affine3) -> [f32; 16] {
     transposed(&affine_to_columns(map))
 }
 
 /// The 4 × 4 matrix of a map, column after column: see [`affine_from_columns`].
+///
+/// ```
+/// # use fogbow::math::{Affine3, Vec3, affine_to_columns};
+/// let moved = Affine3::from_translation(Vec3::new(1.0, 2.0, 3.0));
+/// assert_eq!(affine_to_columns(&moved)[12..], [1.0, 2.0, 3.0, 1.0]);
+/// ```
 #[must_use]
 pub fn affine_to_columns(map: &Affine3) -> [f32; 16] {
     let Affine3 { matrix3: m, translation: t } = map;

@@ -26,10 +26,10 @@ static int32_t closest_hit(void *context, const fogbow_ray *ray, fogbow_hit *hit
 }
 
 int main(void) {
-    fogbow_properties fog = {.absorption = {0.1f, 0.1f, 0.1f}, .scattering = {0.9f, 0.9f, 0.9f}, .phase = {FOGBOW_PHASE_HENYEY_GREENSTEIN, 0.5f, 0}};
+    fogbow_properties fog = {.absorption = {0.1f, 0.1f, 0.1f}, .scattering = {0.9f, 0.9f, 0.9f}, .phase = {FOGBOW_PHASE_RAYLEIGH, 0, 0}};
     fogbow_light lamp = {.kind = FOGBOW_LIGHT_POINT, .position = {-0.3f, 0.4f, 0}, .emission = {0.3f, 0.27f, 0.2f}};
     fogbow_host_scene room = {.size = sizeof room, .closest_hit = closest_hit};
-    fogbow_world_parts parts = {.size = sizeof parts, .scene = &room, .lights = &lamp, .light_count = 1, .bounds = {{-1, -1, -1}, {1, 1, 1}}};
+    fogbow_world_parts parts = {sizeof parts, .scene = &room, .lights = &lamp, .light_count = 1, .bounds = {{-1, -1, -1}, {1, 1, 1}}};
     fogbow_camera camera = {.eye = {0, 0, 0.95f}, .target = {0, 0, 0}, .up = {0, 1, 0}, .field_of_view = 1.2f, .aspect = 1};
     fogbow_view view = {.size = sizeof view, .pixel = 1.2f / SIDE, .context = &camera, .ray = fogbow_camera_ray};
     fogbow_settings settings = {.size = sizeof settings, .error = 0.1f};
@@ -50,7 +50,7 @@ int main(void) {
         float sum[3] = {0}, light[3];
         for (uint32_t s = 0; s < SAMPLES; s++) {
             fogbow_ray ray;
-            fogbow_camera_ray(&camera, (float[]){(i % SIDE + 0.25f + 0.5f * (s & 1)) / SIDE, (i / SIDE + 0.25f + 0.5f * (s >> 1)) / SIDE}, &ray);
+            fogbow_camera_ray(&camera, (float[]){(i % SIDE + 0.25f + s % 2 * 0.5f) / SIDE, (i / SIDE + 0.25f + s / 2 * 0.5f) / SIDE}, &ray);
             check(fogbow_radiance(caches, world, &ray, 1, (fogbow_chance){.first_key = i, .sample = s}, light, NULL));
             for (int k = 0; k < 3; k++) sum[k] += light[k] / SAMPLES;
         }

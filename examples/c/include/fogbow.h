@@ -82,7 +82,8 @@
 // Rough glass (GGX), of the parameters of a dielectric, `eta` not 1, and `roughness`.
 #define FOGBOW_SURFACE_ROUGH_DIELECTRIC 7
 
-// A diffuse base of `reflectance` under a smooth coat of index `eta`, whose reflections have the factor `specular`; on the side of the normal.
+// A diffuse base of `reflectance` under a smooth coat of index `eta`, whose reflections have the factor `specular`; on the side of
+// the normal.
 #define FOGBOW_SURFACE_PLASTIC 8
 
 // The hit is on no lamp.
@@ -97,7 +98,8 @@
 // cos^exponent around `direction`; `emission` is intensity (W/sr) along it.
 #define FOGBOW_LIGHT_PHONG 2
 
-// A parallelogram of the corner `position` and the edges `edge_u` and `edge_v` that shines towards edge_u × edge_v; `emission` is radiance (W/(m² sr)).
+// A parallelogram of the corner `position` and the edges `edge_u` and `edge_v` that shines towards edge_u × edge_v; `emission` is
+// radiance (W/(m² sr)).
 // Its surface is one of the scene: `closest_hit` must find it.
 #define FOGBOW_LIGHT_QUAD 3
 
@@ -232,7 +234,8 @@ typedef struct fogbow_result fogbow_result;
 //
 // `fogbow_work_jobs` tells the numbers of the jobs whose results are due. `fogbow_work_run` runs one of them, on any thread, many at a
 // time, in any order. `fogbow_work_accept` takes results back, from any thread, in any order: those that come early are kept
-// until it is their turn. When all of a round are in, the next begins. Whatever the order and the number of threads, the result has the same bits.
+// until it is their turn. When all of a round are in, the next begins. Whatever the order and the number of threads, the result has
+// the same bits.
 // To cancel is to stop calling; a job whose result never came back is asked for again.
 typedef struct fogbow_work fogbow_work;
 
@@ -267,7 +270,8 @@ typedef struct {
     uint32_t size;
     // Cells along x, y and z; each at least 1.
     uint32_t counts[3];
-    // One density for each cell, x fastest: cell (x, y, z) is number (z * counts[1] + y) * counts[0] + x. Finite, not negative. They are copied.
+    // One density for each cell, x fastest: cell (x, y, z) is number (z * counts[1] + y) * counts[0] + x. Finite, not negative.
+    // They are copied.
     const float *densities;
     // How many there are: the product of `counts`.
     size_t density_count;
@@ -358,7 +362,8 @@ typedef struct {
     float distance;
     // Geometric normal (unit); surfaces shine and reflect on the side it points to. For two-sided ones, turn it against the ray.
     float normal[3];
-    // The normal (unit) that scattering goes by, on the side of the other: interpolated between vertices, or bent by a texture. Zeros: the geometric one.
+    // The normal (unit) that scattering goes by, on the side of the other: interpolated between vertices, or bent by a texture.
+    // Zeros: the geometric one.
     float shading[3];
     // `FOGBOW_SURFACE_…`.
     uint32_t surface;
@@ -502,7 +507,8 @@ typedef struct {
     float pixel;
     // Passed to `ray`.
     const void *context;
-    // Writes the ray through the point `at` of the picture: (0, 0) is the upper left corner, (1, 1) the lower right one. Pure, and called by every
+    // Writes the ray through the point `at` of the picture: (0, 0) is the upper left corner, (1, 1) the lower right one. Pure,
+    // and called by every
     // thread that runs jobs. `fogbow_camera_ray` is one.
     void (*ray)(const void *context, const float *at, fogbow_ray *ray);
 } fogbow_view;
@@ -756,8 +762,10 @@ fogbow_status fogbow_medium_in_ball(const fogbow_medium *inner,
                                     float radius,
                                     fogbow_medium **medium);
 
-// Several media in the same space: coefficients and emission add up, phase functions mix by scattering. There should be no more than four different
-// phase functions; where more meet, that of the medium which scatters most stands for all. No media are vacuum. `media` may be freed afterwards.
+// Several media in the same space: coefficients and emission add up, phase functions mix by scattering. There should be no more than
+// four different
+// phase functions; where more meet, that of the medium which scatters most stands for all. No media are vacuum. `media` may be freed
+// afterwards.
 fogbow_status fogbow_medium_overlap(const fogbow_medium *const *media,
                                     size_t count,
                                     fogbow_medium **medium);
@@ -789,13 +797,15 @@ fogbow_status fogbow_path_trace(const fogbow_world *world,
 
 // Numbers of the jobs that are due: from `first` to below `end`; equal ones if all is done.
 //
-// They stay due until it is their turn: hand each number out once, or work is done twice. Those of results that never came back are due again. Safe on any
+// They stay due until it is their turn: hand each number out once, or work is done twice. Those of results that never came back are
+// due again. Safe on any
 // thread.
 fogbow_status fogbow_work_jobs(const fogbow_work *work,
                                uint32_t *first,
                                uint32_t *end);
 
-// Runs a job. Safe on any thread, many at a time. The result is to be accepted, or freed; it is null for a job whose result is there already or whose
+// Runs a job. Safe on any thread, many at a time. The result is to be accepted, or freed; it is null for a job whose result is there
+// already or whose
 // round is over, which is not run again.
 fogbow_status fogbow_work_run(const fogbow_work *work,
                               uint32_t job,
@@ -817,7 +827,8 @@ fogbow_status fogbow_work_step(fogbow_work *work,
 // What is being done, in a word or two ("search", "bake"); valid for ever.
 fogbow_status fogbow_work_stage(const fogbow_work *work, const char **stage);
 
-// About what share of a bake is done, in [0, 1]; of other work 1 when it is done, and 0 before: how many rounds there will be, nobody knows.
+// About what share of a bake is done, in [0, 1]; of other work 1 when it is done, and 0 before: how many rounds there will be,
+// nobody knows.
 fogbow_status fogbow_work_share(const fogbow_work *work,
                                 float *share);
 
@@ -861,15 +872,18 @@ fogbow_status fogbow_caches_save(const fogbow_caches *caches,
                                  size_t capacity,
                                  size_t *needed);
 
-// Reads caches that were saved with the same tag, in place of what is there. The settings must be those they were made with, or ask for less. Where it fails,
+// Reads caches that were saved with the same tag, in place of what is there. The settings must be those they were made with, or ask
+// for less. Where it fails,
 // some of what was there may be lost.
 fogbow_status fogbow_caches_load(fogbow_caches *caches,
                                  uint64_t tag,
                                  const uint8_t *bytes,
                                  size_t count);
 
-// Radiance (W/(m² sr), three channels a ray) that arrives at the origins of rays: one sample each of what caches say, with light straight from the lights
-// and what is not cached sampled. `parts` may be null; else it has room for `count` elements. On any thread, also while the caches are filled.
+// Radiance (W/(m² sr), three channels a ray) that arrives at the origins of rays: one sample each of what caches say, with light
+// straight from the lights
+// and what is not cached sampled. `parts` may be null; else it has room for `count` elements. On any thread, also while the caches
+// are filled.
 fogbow_status fogbow_radiance(const fogbow_caches *caches,
                               const fogbow_world *world,
                               const fogbow_ray *rays,
@@ -878,7 +892,8 @@ fogbow_status fogbow_radiance(const fogbow_caches *caches,
                               float *radiance,
                               fogbow_light_parts *parts);
 
-// In-scattered radiance (W/(m² sr), three channels a point, without the scattering coefficient) at points (x, y, z; m) towards eyes (unit vectors
+// In-scattered radiance (W/(m² sr), three channels a point, without the scattering coefficient) at points (x, y, z; m) towards eyes
+// (unit vectors
 // from the points), all light together; what no record tells is sampled.
 fogbow_status fogbow_in_scattered(const fogbow_caches *caches,
                                   const fogbow_world *world,
@@ -888,7 +903,8 @@ fogbow_status fogbow_in_scattered(const fogbow_caches *caches,
                                   fogbow_chance chance,
                                   float *radiance);
 
-// What caches say at points of the light that is scattered there, in spherical harmonics up to `degree` (0 to 8): (degree + 1)² coefficients of three
+// What caches say at points of the light that is scattered there, in spherical harmonics up to `degree` (0 to 8): (degree + 1)²
+// coefficients of three
 // channels each, point after point; zeros where no record reaches. `missing` (may be null): how many points those are.
 //
 // Without light straight from the lights, unless the settings cache it. See `fogbow_sh_evaluate` for the functions.
@@ -899,7 +915,8 @@ fogbow_status fogbow_in_scattered_sh(const fogbow_caches *caches,
                                      float *answers,
                                      size_t *missing);
 
-// Fluence (W/m², three channels a point), the integral of radiance over all directions, of the light whose scattering is cached; zeros where no record reaches.
+// Fluence (W/m², three channels a point), the integral of radiance over all directions, of the light whose scattering is cached;
+// zeros where no record reaches.
 // `missing` (may be null): how many points those are.
 fogbow_status fogbow_fluence(const fogbow_caches *caches,
                              const float *points,
@@ -907,7 +924,8 @@ fogbow_status fogbow_fluence(const fogbow_caches *caches,
                              float *fluences,
                              size_t *missing);
 
-// Irradiance (W/m², three channels a point), without light straight from the lights, at points of surfaces with unit normals; zeros where no record reaches.
+// Irradiance (W/m², three channels a point), without light straight from the lights, at points of surfaces with unit normals; zeros
+// where no record reaches.
 // `missing` (may be null): how many points those are.
 fogbow_status fogbow_irradiance(const fogbow_caches *caches,
                                 const float *points,
@@ -916,7 +934,8 @@ fogbow_status fogbow_irradiance(const fogbow_caches *caches,
                                 float *irradiances,
                                 size_t *missing);
 
-// Work that compares the caches with path tracing along about `rays` eye rays of a view (0 for 16384; four times as many halve the error of what is found).
+// Work that compares the caches with path tracing along about `rays` eye rays of a view (0 for 16384; four times as many halve the
+// error of what is found).
 // Meanwhile the caches can be read, but not filled.
 fogbow_status fogbow_audit(const fogbow_caches *caches,
                            const fogbow_world *world,
@@ -927,13 +946,15 @@ fogbow_status fogbow_audit(const fogbow_caches *caches,
 // What an audit has found so far.
 fogbow_status fogbow_audit_findings(const fogbow_work *work, fogbow_findings *findings);
 
-// Drops the records that an audit has found off by certainly more than `error` (0.001 to 0.5); the next fill makes finer ones. `is_dropped`: 1 if any
+// Drops the records that an audit has found off by certainly more than `error` (0.001 to 0.5); the next fill makes finer ones.
+// `is_dropped`: 1 if any
 // were, else 0. The audit is over then, and its work is to be freed.
 fogbow_status fogbow_audit_drop_wrong(fogbow_work *work,
                                       float error,
                                       int32_t *is_dropped);
 
-// Work that bakes light into a grid of probes; see `fogbow_work`. `caches` may be null: then all light is sampled, without bias. Else what the caches tell is read from
+// Work that bakes light into a grid of probes; see `fogbow_work`. `caches` may be null: then all light is sampled, without bias.
+// Else what the caches tell is read from
 // them, which is quick, and as far off as they are; they should be filled for all of the box, and cannot be filled meanwhile.
 fogbow_status fogbow_bake(const fogbow_world *world,
                           const fogbow_caches *caches,
@@ -949,7 +970,8 @@ fogbow_status fogbow_probes_free(fogbow_probes *probes);
 // Tells what a grid of probes is.
 fogbow_status fogbow_probes_look(const fogbow_probes *probes, fogbow_probes_state *state);
 
-// Copies all probes: `held` has room for `held_count` floats, three for each number of each probe, probe after probe; `states` for `probe_count` bytes,
+// Copies all probes: `held` has room for `held_count` floats, three for each number of each probe, probe after probe; `states` for
+// `probe_count` bytes,
 // `FOGBOW_PROBE_…`. Either may be null, with a count of 0.
 fogbow_status fogbow_probes_copy(const fogbow_probes *probes,
                                  float *held,
@@ -957,7 +979,8 @@ fogbow_status fogbow_probes_copy(const fogbow_probes *probes,
                                  uint8_t *states,
                                  size_t probe_count);
 
-// The light (three channels a point) at points (x, y, z; m) in directions (unit): towards an eye, or along a normal, as was baked. From the eight probes around,
+// The light (three channels a point) at points (x, y, z; m) in directions (unit): towards an eye, or along a normal, as was baked.
+// From the eight probes around,
 // those that hold no light left out; beyond the outermost probes that of the nearest of them.
 fogbow_status fogbow_probes_value(const fogbow_probes *probes,
                                   const float *points,
@@ -965,7 +988,8 @@ fogbow_status fogbow_probes_value(const fogbow_probes *probes,
                                   size_t count,
                                   float *light);
 
-// All numbers of the light at points: three floats for each number that a probe holds, point after point. `shares` (may be null): what share of
+// All numbers of the light at points: three floats for each number that a probe holds, point after point. `shares` (may be null):
+// what share of
 // the probes around each point holds light.
 fogbow_status fogbow_probes_look_up(const fogbow_probes *probes,
                                     const float *points,
@@ -973,7 +997,8 @@ fogbow_status fogbow_probes_look_up(const fogbow_probes *probes,
                                     float *held,
                                     float *shares);
 
-// Lets light spread into probes that hold none, for engines that mix all eight probes whatever they are. `reached` (may be null): how many it reached.
+// Lets light spread into probes that hold none, for engines that mix all eight probes whatever they are. `reached` (may be null):
+// how many it reached.
 fogbow_status fogbow_probes_dilate(fogbow_probes *probes,
                                    size_t *reached);
 
@@ -999,7 +1024,8 @@ fogbow_status fogbow_phase_derivative(const fogbow_phase *phase,
 // The Legendre moment of a phase function for a degree from 0 to 16: 1 for degree 0, the mean cosine for degree 1.
 fogbow_status fogbow_phase_moment(const fogbow_phase *phase, uint32_t degree, float *moment);
 
-// Draws a direction (x, y, z; unit) from which light comes that leaves towards `to_eye` (unit), by two numbers `u` in [0, 1). `density` (1/sr; may be null): with which it
+// Draws a direction (x, y, z; unit) from which light comes that leaves towards `to_eye` (unit), by two numbers `u` in [0, 1).
+// `density` (1/sr; may be null): with which it
 // was drawn, the value of the phase function.
 fogbow_status fogbow_phase_sample(const fogbow_phase *phase,
                                   const float *to_eye,
@@ -1007,13 +1033,15 @@ fogbow_status fogbow_phase_sample(const fogbow_phase *phase,
                                   float *to_light,
                                   float *density);
 
-// Real spherical harmonics up to a degree from 0 to 16 in a direction (x, y, z; unit): (degree + 1)² values, number l² + l + m of degree l and order m, without the
+// Real spherical harmonics up to a degree from 0 to 16 in a direction (x, y, z; unit): (degree + 1)² values, number l² + l + m of
+// degree l and order m, without the
 // Condon–Shortley phase.
 fogbow_status fogbow_sh_evaluate(const float *direction,
                                  uint32_t degree,
                                  float *values);
 
-// Transmittance along rays with its gradients: Jarosz et al. 2008, Eq. 16 to 22. Exact where the medium says that it is constant; elsewhere marched, in
+// Transmittance along rays with its gradients: Jarosz et al. 2008, Eq. 16 to 22. Exact where the medium says that it is constant;
+// elsewhere marched, in
 // `step_count` steps (`FOGBOW_STEPS_…`) of every part of a ray in between. A medium of the host is asked by its callbacks.
 fogbow_status fogbow_transmittance_along(const fogbow_medium *medium,
                                          const fogbow_ray *rays,
@@ -1036,7 +1064,8 @@ fogbow_status fogbow_covariance_attenuated(const fogbow_covariance *light,
                                            float distance,
                                            fogbow_covariance *changed);
 
-// Scattered by a lobe of angular covariance `lobe` (cycles²/rad²; see `fogbow_phase_covariance`), turned by an angle of cosine `cos_alpha` in the plane of u: Eq. 11 to 13.
+// Scattered by a lobe of angular covariance `lobe` (cycles²/rad²; see `fogbow_phase_covariance`), turned by an angle of cosine
+// `cos_alpha` in the plane of u: Eq. 11 to 13.
 fogbow_status fogbow_covariance_scattered(const fogbow_covariance *light,
                                           float cos_alpha,
                                           const fogbow_symmetric2 *lobe,
@@ -1049,7 +1078,8 @@ fogbow_status fogbow_covariance_rotated(const fogbow_covariance *light,
                                         fogbow_covariance *changed);
 
 // Reflected by a surface: met at an angle of this cosine in the plane of u, of curvature `curvature` (1/m, convex positive; first axis in
-// the plane of incidence), with a lobe of angular covariance `lobe` (cycles²/rad²; see `fogbow_phong_covariance`), and left at an angle of cosine `cos_out`.
+// the plane of incidence), with a lobe of angular covariance `lobe` (cycles²/rad²; see `fogbow_phong_covariance`), and left at an
+// angle of cosine `cos_out`.
 fogbow_status fogbow_covariance_reflected(const fogbow_covariance *light,
                                           const float *cosines,
                                           const fogbow_symmetric2 *curvature,
@@ -1072,7 +1102,8 @@ fogbow_status fogbow_phase_covariance(const fogbow_phase *phase, float cos_defle
 // Angular covariance (cycles²/rad²) of a Phong lobe of an exponent (not negative).
 fogbow_status fogbow_phong_covariance(float exponent, fogbow_symmetric2 *lobe);
 
-// What records say about the light at a point (x, y, z; m), three channels: those whose balls hold it, each with a weight that falls to 0 at its
+// What records say about the light at a point (x, y, z; m), three channels: those whose balls hold it, each with a weight that falls
+// to 0 at its
 // radius. `tolerance` bounds exponents; 0 for 1. `reached` (may be null): how many there were; the light is 0 if none.
 fogbow_status fogbow_extrapolate(const fogbow_record *records,
                                  size_t count,
@@ -1082,13 +1113,15 @@ fogbow_status fogbow_extrapolate(const fogbow_record *records,
                                  float *light,
                                  size_t *reached);
 
-// How far (m) a value may be carried where its logarithm may change by `tolerance`: the least of tolerance · L/|grad L| over channels (Eq. 34 for one sample); infinite where nothing changes.
+// How far (m) a value may be carried where its logarithm may change by `tolerance`: the least of tolerance · L/|grad L| over
+// channels (Eq. 34 for one sample); infinite where nothing changes.
 fogbow_status fogbow_record_radius(const float *value,
                                    const fogbow_gradient *gradient,
                                    float tolerance,
                                    float *radius);
 
-// What clamping within `radius` (m, above 0) leaves and takes of a connection over `distance` (m, above 0) with the product of cosines `cosines` (1 in a medium): `clamped` is
+// What clamping within `radius` (m, above 0) leaves and takes of a connection over `distance` (m, above 0) with the product of
+// cosines `cosines` (1 in a medium): `clamped` is
 // min(G, 1/radius²) (1/m²) with G = cosines/distance², `missing` the share of G that is taken. Each may be null.
 fogbow_status fogbow_clamped_connection(float radius,
                                         float distance,
@@ -1096,7 +1129,8 @@ fogbow_status fogbow_clamped_connection(float radius,
                                         float *clamped,
                                         float *missing);
 
-// What one step of compensation within `radius` (m) makes of the light it is given, in an even isotropic medium of this extinction (1/m) and albedo: after n steps
+// What one step of compensation within `radius` (m) makes of the light it is given, in an even isotropic medium of this extinction
+// (1/m) and albedo: after n steps
 // its n-th power is still missing.
 fogbow_status fogbow_contraction(float extinction,
                                  float albedo,

@@ -73,7 +73,8 @@ const USUAL_RAYS: u32 = 16384;
 /// More are a mistake.
 const MOST_RAYS: u32 = 1 << 24;
 
-/// Work that compares the caches with path tracing along about `rays` eye rays of a view (0 for 16384; four times as many halve the error of what is found).
+/// Work that compares the caches with path tracing along about `rays` eye rays of a view (0 for 16384; four times as many halve the
+/// error of what is found).
 /// Meanwhile the caches can be read, but not filled.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn fogbow_audit(
@@ -167,7 +168,8 @@ pub unsafe extern "C" fn fogbow_audit_findings(
     })
 }
 
-/// Drops the records that an audit has found off by certainly more than `error` (0.001 to 0.5); the next fill makes finer ones. `is_dropped`: 1 if any
+/// Drops the records that an audit has found off by certainly more than `error` (0.001 to 0.5); the next fill makes finer ones.
+/// `is_dropped`: 1 if any
 /// were, else 0. The audit is over then, and its work is to be freed.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn fogbow_audit_drop_wrong(

@@ -402,7 +402,8 @@ pub unsafe extern "C" fn fogbow_caches_save(
     })
 }
 
-/// Reads caches that were saved with the same tag, in place of what is there. The settings must be those they were made with, or ask for less. Where it fails,
+/// Reads caches that were saved with the same tag, in place of what is there. The settings must be those they were made with, or ask
+/// for less. Where it fails,
 /// some of what was there may be lost.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn fogbow_caches_load(

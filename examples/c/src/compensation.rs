@@ -13,7 +13,8 @@ fn bound_of(radius: f32) -> Outcome<Bound> {
     Bound::within(radius).map_err(|error| crate::status::refused("radius")(&error))
 }
 
-/// What clamping within `radius` (m, above 0) leaves and takes of a connection over `distance` (m, above 0) with the product of cosines `cosines` (1 in a medium): `clamped` is
+/// What clamping within `radius` (m, above 0) leaves and takes of a connection over `distance` (m, above 0) with the product of
+/// cosines `cosines` (1 in a medium): `clamped` is
 /// min(G, 1/radius²) (1/m²) with G = cosines/distance², `missing` the share of G that is taken. Each may be null.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn fogbow_clamped_connection(
@@ -37,7 +38,8 @@ pub unsafe extern "C" fn fogbow_clamped_connection(
     })
 }
 
-/// What one step of compensation within `radius` (m) makes of the light it is given, in an even isotropic medium of this extinction (1/m) and albedo: after n steps
+/// What one step of compensation within `radius` (m) makes of the light it is given, in an even isotropic medium of this extinction
+/// (1/m) and albedo: after n steps
 /// its n-th power is still missing.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn fogbow_contraction(

@@ -142,7 +142,8 @@ pub unsafe extern "C" fn fogbow_covariance_attenuated(
     })
 }
 
-/// Scattered by a lobe of angular covariance `lobe` (cycles²/rad²; see `fogbow_phase_covariance`), turned by an angle of cosine `cos_alpha` in the plane of u: Eq. 11 to 13.
+/// Scattered by a lobe of angular covariance `lobe` (cycles²/rad²; see `fogbow_phase_covariance`), turned by an angle of cosine
+/// `cos_alpha` in the plane of u: Eq. 11 to 13.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn fogbow_covariance_scattered(
     light: *const fogbow_covariance,
@@ -175,7 +176,8 @@ pub unsafe extern "C" fn fogbow_covariance_rotated(
 }
 
 /// Reflected by a surface: met at an angle of this cosine in the plane of u, of curvature `curvature` (1/m, convex positive; first axis in
-/// the plane of incidence), with a lobe of angular covariance `lobe` (cycles²/rad²; see `fogbow_phong_covariance`), and left at an angle of cosine `cos_out`.
+/// the plane of incidence), with a lobe of angular covariance `lobe` (cycles²/rad²; see `fogbow_phong_covariance`), and left at an
+/// angle of cosine `cos_out`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn fogbow_covariance_reflected(
     light: *const fogbow_covariance,

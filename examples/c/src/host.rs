@@ -285,7 +285,8 @@ pub const FOGBOW_SURFACE_PANE: u32 = 5;
 pub const FOGBOW_SURFACE_ROUGH_METAL: u32 = 6;
 /// Rough glass (GGX), of the parameters of a dielectric, `eta` not 1, and `roughness`.
 pub const FOGBOW_SURFACE_ROUGH_DIELECTRIC: u32 = 7;
-/// A diffuse base of `reflectance` under a smooth coat of index `eta`, whose reflections have the factor `specular`; on the side of the normal.
+/// A diffuse base of `reflectance` under a smooth coat of index `eta`, whose reflections have the factor `specular`; on the side of
+/// the normal.
 pub const FOGBOW_SURFACE_PLASTIC: u32 = 8;
 
 /// The hit is on no lamp.
@@ -299,7 +300,8 @@ pub struct fogbow_hit {
     pub distance: f32,
     /// Geometric normal (unit); surfaces shine and reflect on the side it points to. For two-sided ones, turn it against the ray.
     pub normal: [f32; 3],
-    /// The normal (unit) that scattering goes by, on the side of the other: interpolated between vertices, or bent by a texture. Zeros: the geometric one.
+    /// The normal (unit) that scattering goes by, on the side of the other: interpolated between vertices, or bent by a texture.
+    /// Zeros: the geometric one.
     pub shading: [f32; 3],
     /// `FOGBOW_SURFACE_…`.
     pub surface: u32,

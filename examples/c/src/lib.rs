@@ -1,4 +1,5 @@
-//! fogbow for C and C++: what `include/fogbow.h` declares. The interface is explained there, and in the README beside this crate's manifest.
+//! fogbow for C and C++: what `include/fogbow.h` declares. The interface is explained there, and in the README beside this crate's
+//! manifest.
 //!
 //! | file | holds |
 //! |---|---|

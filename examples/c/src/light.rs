@@ -11,7 +11,8 @@ pub const FOGBOW_LIGHT_POINT: u32 = 0;
 pub const FOGBOW_LIGHT_SPOT: u32 = 1;
 /// cos^exponent around `direction`; `emission` is intensity (W/sr) along it.
 pub const FOGBOW_LIGHT_PHONG: u32 = 2;
-/// A parallelogram of the corner `position` and the edges `edge_u` and `edge_v` that shines towards edge_u × edge_v; `emission` is radiance (W/(m² sr)).
+/// A parallelogram of the corner `position` and the edges `edge_u` and `edge_v` that shines towards edge_u × edge_v; `emission` is
+/// radiance (W/(m² sr)).
 /// Its surface is one of the scene: `closest_hit` must find it.
 pub const FOGBOW_LIGHT_QUAD: u32 = 3;
 /// A ball of `position` and `radius`; `emission` is radiance (W/(m² sr)). Its surface is one of the scene: `closest_hit` must find it.

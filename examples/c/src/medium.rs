@@ -193,7 +193,8 @@ pub struct fogbow_grid {
     pub size: u32,
     /// Cells along x, y and z; each at least 1.
     pub counts: [u32; 3],
-    /// One density for each cell, x fastest: cell (x, y, z) is number (z * counts[1] + y) * counts[0] + x. Finite, not negative. They are copied.
+    /// One density for each cell, x fastest: cell (x, y, z) is number (z * counts[1] + y) * counts[0] + x. Finite, not negative.
+    /// They are copied.
     pub densities: *const f32,
     /// How many there are: the product of `counts`.
     pub density_count: usize,
@@ -362,8 +363,10 @@ pub unsafe extern "C" fn fogbow_medium_in_ball(
     })
 }
 
-/// Several media in the same space: coefficients and emission add up, phase functions mix by scattering. There should be no more than four different
-/// phase functions; where more meet, that of the medium which scatters most stands for all. No media are vacuum. `media` may be freed afterwards.
+/// Several media in the same space: coefficients and emission add up, phase functions mix by scattering. There should be no more than
+/// four different
+/// phase functions; where more meet, that of the medium which scatters most stands for all. No media are vacuum. `media` may be freed
+/// afterwards.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn fogbow_medium_overlap(
     media: *const *const fogbow_medium,

@@ -75,7 +75,8 @@ pub unsafe extern "C" fn fogbow_phase_moment(
     })
 }
 
-/// Draws a direction (x, y, z; unit) from which light comes that leaves towards `to_eye` (unit), by two numbers `u` in [0, 1). `density` (1/sr; may be null): with which it
+/// Draws a direction (x, y, z; unit) from which light comes that leaves towards `to_eye` (unit), by two numbers `u` in [0, 1).
+/// `density` (1/sr; may be null): with which it
 /// was drawn, the value of the phase function.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn fogbow_phase_sample(
@@ -103,7 +104,8 @@ pub unsafe extern "C" fn fogbow_phase_sample(
     })
 }
 
-/// Real spherical harmonics up to a degree from 0 to 16 in a direction (x, y, z; unit): (degree + 1)² values, number l² + l + m of degree l and order m, without the
+/// Real spherical harmonics up to a degree from 0 to 16 in a direction (x, y, z; unit): (degree + 1)² values, number l² + l + m of
+/// degree l and order m, without the
 /// Condon–Shortley phase.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn fogbow_sh_evaluate(direction: *const f32, degree: u32, values: *mut f32) -> fogbow_status {

@@ -234,7 +234,8 @@ fn check_memory(settings: &BakeSettings) -> Outcome {
     bytes.and_then(|bytes| trial.try_reserve_exact(bytes).ok()).ok_or_else(|| no_memory("the probes"))
 }
 
-/// Work that bakes light into a grid of probes; see `fogbow_work`. `caches` may be null: then all light is sampled, without bias. Else what the caches tell is read from
+/// Work that bakes light into a grid of probes; see `fogbow_work`. `caches` may be null: then all light is sampled, without bias.
+/// Else what the caches tell is read from
 /// them, which is quick, and as far off as they are; they should be filled for all of the box, and cannot be filled meanwhile.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn fogbow_bake(
@@ -352,7 +353,8 @@ pub const FOGBOW_PROBE_IN_WALL: u8 = 2;
 /// No medium is near.
 pub const FOGBOW_PROBE_EMPTY: u8 = 3;
 
-/// Copies all probes: `held` has room for `held_count` floats, three for each number of each probe, probe after probe; `states` for `probe_count` bytes,
+/// Copies all probes: `held` has room for `held_count` floats, three for each number of each probe, probe after probe; `states` for
+/// `probe_count` bytes,
 /// `FOGBOW_PROBE_…`. Either may be null, with a count of 0.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn fogbow_probes_copy(
@@ -384,7 +386,8 @@ pub unsafe extern "C" fn fogbow_probes_copy(
     })
 }
 
-/// The light (three channels a point) at points (x, y, z; m) in directions (unit): towards an eye, or along a normal, as was baked. From the eight probes around,
+/// The light (three channels a point) at points (x, y, z; m) in directions (unit): towards an eye, or along a normal, as was baked.
+/// From the eight probes around,
 /// those that hold no light left out; beyond the outermost probes that of the nearest of them.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn fogbow_probes_value(
@@ -411,7 +414,8 @@ pub unsafe extern "C" fn fogbow_probes_value(
     })
 }
 
-/// All numbers of the light at points: three floats for each number that a probe holds, point after point. `shares` (may be null): what share of
+/// All numbers of the light at points: three floats for each number that a probe holds, point after point. `shares` (may be null):
+/// what share of
 /// the probes around each point holds light.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn fogbow_probes_look_up(
@@ -444,7 +448,8 @@ pub unsafe extern "C" fn fogbow_probes_look_up(
     })
 }
 
-/// Lets light spread into probes that hold none, for engines that mix all eight probes whatever they are. `reached` (may be null): how many it reached.
+/// Lets light spread into probes that hold none, for engines that mix all eight probes whatever they are. `reached` (may be null):
+/// how many it reached.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn fogbow_probes_dilate(probes: *mut fogbow_probes, reached: *mut usize) -> fogbow_status {
     guard(|| {

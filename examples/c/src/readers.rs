@@ -32,8 +32,10 @@ pub struct fogbow_light_parts {
     pub misses: u32,
 }
 
-/// Radiance (W/(m² sr), three channels a ray) that arrives at the origins of rays: one sample each of what caches say, with light straight from the lights
-/// and what is not cached sampled. `parts` may be null; else it has room for `count` elements. On any thread, also while the caches are filled.
+/// Radiance (W/(m² sr), three channels a ray) that arrives at the origins of rays: one sample each of what caches say, with light
+/// straight from the lights
+/// and what is not cached sampled. `parts` may be null; else it has room for `count` elements. On any thread, also while the caches
+/// are filled.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn fogbow_radiance(
     caches: *const fogbow_caches,
@@ -79,7 +81,8 @@ fn parts_of(seen: &CachedRadiance) -> fogbow_light_parts {
     }
 }
 
-/// In-scattered radiance (W/(m² sr), three channels a point, without the scattering coefficient) at points (x, y, z; m) towards eyes (unit vectors
+/// In-scattered radiance (W/(m² sr), three channels a point, without the scattering coefficient) at points (x, y, z; m) towards eyes
+/// (unit vectors
 /// from the points), all light together; what no record tells is sampled.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn fogbow_in_scattered(
@@ -120,7 +123,8 @@ fn coefficients(degree: u32) -> Outcome<usize> {
     Ok((degree as usize + 1) * (degree as usize + 1))
 }
 
-/// What caches say at points of the light that is scattered there, in spherical harmonics up to `degree` (0 to 8): (degree + 1)² coefficients of three
+/// What caches say at points of the light that is scattered there, in spherical harmonics up to `degree` (0 to 8): (degree + 1)²
+/// coefficients of three
 /// channels each, point after point; zeros where no record reaches. `missing` (may be null): how many points those are.
 ///
 /// Without light straight from the lights, unless the settings cache it. See `fogbow_sh_evaluate` for the functions.
@@ -157,7 +161,8 @@ pub unsafe extern "C" fn fogbow_in_scattered_sh(
     })
 }
 
-/// Fluence (W/m², three channels a point), the integral of radiance over all directions, of the light whose scattering is cached; zeros where no record reaches.
+/// Fluence (W/m², three channels a point), the integral of radiance over all directions, of the light whose scattering is cached;
+/// zeros where no record reaches.
 /// `missing` (may be null): how many points those are.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn fogbow_fluence(
@@ -189,7 +194,8 @@ pub unsafe extern "C" fn fogbow_fluence(
     })
 }
 
-/// Irradiance (W/m², three channels a point), without light straight from the lights, at points of surfaces with unit normals; zeros where no record reaches.
+/// Irradiance (W/m², three channels a point), without light straight from the lights, at points of surfaces with unit normals; zeros
+/// where no record reaches.
 /// `missing` (may be null): how many points those are.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn fogbow_irradiance(

@@ -36,7 +36,8 @@ fn gradient_of(of: &fogbow_gradient, name: &str) -> Outcome<Gradient> {
     if gradient.is_finite() { Ok(gradient) } else { wrong(format!("`{name}` is not finite")) }
 }
 
-/// What records say about the light at a point (x, y, z; m), three channels: those whose balls hold it, each with a weight that falls to 0 at its
+/// What records say about the light at a point (x, y, z; m), three channels: those whose balls hold it, each with a weight that falls
+/// to 0 at its
 /// radius. `tolerance` bounds exponents; 0 for 1. `reached` (may be null): how many there were; the light is 0 if none.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn fogbow_extrapolate(
@@ -84,7 +85,8 @@ pub unsafe extern "C" fn fogbow_extrapolate(
     })
 }
 
-/// How far (m) a value may be carried where its logarithm may change by `tolerance`: the least of tolerance · L/|grad L| over channels (Eq. 34 for one sample); infinite where nothing changes.
+/// How far (m) a value may be carried where its logarithm may change by `tolerance`: the least of tolerance · L/|grad L| over
+/// channels (Eq. 34 for one sample); infinite where nothing changes.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn fogbow_record_radius(
     value: *const f32,

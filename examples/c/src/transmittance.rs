@@ -58,7 +58,8 @@ fn marching(kind: u32, count: u32) -> Outcome<Marching> {
     }
 }
 
-/// Transmittance along rays with its gradients: Jarosz et al. 2008, Eq. 16 to 22. Exact where the medium says that it is constant; elsewhere marched, in
+/// Transmittance along rays with its gradients: Jarosz et al. 2008, Eq. 16 to 22. Exact where the medium says that it is constant;
+/// elsewhere marched, in
 /// `step_count` steps (`FOGBOW_STEPS_…`) of every part of a ray in between. A medium of the host is asked by its callbacks.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn fogbow_transmittance_along(

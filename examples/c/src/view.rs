@@ -18,7 +18,8 @@ pub struct fogbow_view {
     pub pixel: f32,
     /// Passed to `ray`.
     pub context: *const c_void,
-    /// Writes the ray through the point `at` of the picture: (0, 0) is the upper left corner, (1, 1) the lower right one. Pure, and called by every
+    /// Writes the ray through the point `at` of the picture: (0, 0) is the upper left corner, (1, 1) the lower right one. Pure,
+    /// and called by every
     /// thread that runs jobs. `fogbow_camera_ray` is one.
     pub ray: Option<unsafe extern "C" fn(context: *const c_void, at: *const f32, ray: *mut fogbow_ray)>,
 }

@@ -26,7 +26,8 @@ use crate::world::{AnyScene, OwnedWorld};
 ///
 /// `fogbow_work_jobs` tells the numbers of the jobs whose results are due. `fogbow_work_run` runs one of them, on any thread, many at a
 /// time, in any order. `fogbow_work_accept` takes results back, from any thread, in any order: those that come early are kept
-/// until it is their turn. When all of a round are in, the next begins. Whatever the order and the number of threads, the result has the same bits.
+/// until it is their turn. When all of a round are in, the next begins. Whatever the order and the number of threads, the result has
+/// the same bits.
 /// To cancel is to stop calling; a job whose result never came back is asked for again.
 #[derive(Debug)]
 pub struct fogbow_work {
@@ -99,7 +100,8 @@ struct State {
     is_broken: bool,
 }
 
-/// Results that are kept, without waiting for jobs that run to end: then the work changes, which it cannot while jobs look at it. Fewer: threads wait
+/// Results that are kept, without waiting for jobs that run to end: then the work changes, which it cannot while jobs look at it.
+/// Fewer: threads wait
 /// for each other; more: memory.
 const MOST_EARLY: usize = 256;
 
@@ -243,7 +245,8 @@ pub(crate) fn get(work: *const fogbow_work) -> Outcome<Arc<Work>> {
 
 /// Numbers of the jobs that are due: from `first` to below `end`; equal ones if all is done.
 ///
-/// They stay due until it is their turn: hand each number out once, or work is done twice. Those of results that never came back are due again. Safe on any
+/// They stay due until it is their turn: hand each number out once, or work is done twice. Those of results that never came back are
+/// due again. Safe on any
 /// thread.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn fogbow_work_jobs(work: *const fogbow_work, first: *mut u32, end: *mut u32) -> fogbow_status {
@@ -259,7 +262,8 @@ pub unsafe extern "C" fn fogbow_work_jobs(work: *const fogbow_work, first: *mut 
     })
 }
 
-/// Runs a job. Safe on any thread, many at a time. The result is to be accepted, or freed; it is null for a job whose result is there already or whose
+/// Runs a job. Safe on any thread, many at a time. The result is to be accepted, or freed; it is null for a job whose result is there
+/// already or whose
 /// round is over, which is not run again.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn fogbow_work_run(
@@ -342,7 +346,8 @@ pub unsafe extern "C" fn fogbow_work_stage(work: *const fogbow_work, stage: *mut
     })
 }
 
-/// About what share of a bake is done, in [0, 1]; of other work 1 when it is done, and 0 before: how many rounds there will be, nobody knows.
+/// About what share of a bake is done, in [0, 1]; of other work 1 when it is done, and 0 before: how many rounds there will be,
+/// nobody knows.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn fogbow_work_share(work: *const fogbow_work, share: *mut f32) -> fogbow_status {
     guard(|| {

@@ -276,7 +276,7 @@ int main(void) {
         FAILS(ARGUMENT, fogbow_world_new(&bad, &made_world));
         bad = parts, bad.bounds.lower[0] = NAN;
         FAILS(ARGUMENT, fogbow_world_new(&bad, &made_world));
-        SIZED(fogbow_host_scene, scene, (bad = parts, bad.scene = structure, structure ? fogbow_world_new(&bad, &made_world) : FOGBOW_ERROR_NULL));
+        SIZED(fogbow_host_scene, scene, (bad = parts, bad.scene = structure, fogbow_world_new(structure ? &bad : NULL, &made_world)));
         fogbow_host_scene deaf = scene;
         deaf.closest_hit = NULL;
         bad = parts, bad.scene = &deaf;

@@ -47,7 +47,8 @@ foreach(kind fogbow static)
     target_link_libraries(with_${kind} PRIVATE fogbow::${kind} m)
 endforeach()
 CMAKE
-cmake -S "$out" -B "$out/cmake" -DCMAKE_PREFIX_PATH="$prefix" -DSOURCE="$PWD/examples/formulas.c" >"$out/log" && cmake --build "$out/cmake" >>"$out/log" || {
+cmake -S "$out" -B "$out/cmake" -DCMAKE_PREFIX_PATH="$prefix" -DSOURCE="$PWD/examples/formulas.c" >"$out/log" &&
+    cmake --build "$out/cmake" >>"$out/log" || {
     cat "$out/log"
     exit 1
 }
@@ -56,6 +57,7 @@ env -u LD_LIBRARY_PATH "$out/cmake/with_static" | diff "$out/formulas" -
 echo "CMake: shared and static"
 
 for program in misuse formulas; do
-    (cd "$out" && valgrind -q --leak-check=full --errors-for-leak-kinds=definite,indirect,possible --error-exitcode=9 "gcc/$program" >/dev/null)
+    (cd "$out" && valgrind -q --leak-check=full --errors-for-leak-kinds=definite,indirect,possible --error-exitcode=9 \
+        "gcc/$program" >/dev/null)
     echo "valgrind: no error and no leak in $program"
 done
