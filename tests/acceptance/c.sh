@@ -1,0 +1,48 @@
+#!/usr/bin/env bash
+# What of the interface for C takes longer than CI has: the same bits on AArch64, under emulation, and the job example under
+# ThreadSanitizer. Both build Rust's own library, ten minutes of CPU time in all:
+#
+#   tests/acceptance/c.sh [aarch64] [threads]
+#
+# Needs Debian's rustc-web and rust-web-src; for aarch64 also gcc-aarch64-linux-gnu, libc6-dev-arm64-cross and qemu-user;
+# for threads g++.
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/../.."
+target=${CARGO_TARGET_DIR:-$PWD/target}/acceptance
+out=$(mktemp -d)
+trap 'rm -rf "$out"' EXIT
+
+# The static library for a target, with the compiler that has its library's source.
+build() {
+    env RUSTC=/usr/bin/rustc RUSTDOC=/usr/bin/rustdoc RUSTC_BOOTSTRAP=1 RUSTFLAGS="$2" \
+        cargo rustc --locked --release -Zbuild-std=std,panic_unwind --target "$1" --lib -p fogbow-c --target-dir "$3" \
+        --crate-type staticlib
+}
+
+step_aarch64() {
+    local triple=aarch64-unknown-linux-gnu
+    build $triple "" "$target/aarch64"
+    aarch64-linux-gnu-gcc -std=c99 -O2 -Wall -Wextra -Werror -Iexamples/c/include -o "$out/smoke_box" \
+        examples/c/examples/smoke_box.c "$target/aarch64/$triple/release/libfogbow_c.a" -static -lm -lpthread -ldl 2>"$out/log" || {
+        cat "$out/log"
+        return 1
+    }
+    qemu-aarch64 "$out/smoke_box" | tee "$out/digests"
+    diff examples/c/examples/smoke_box.txt "$out/digests"
+    echo "AArch64: the same bits"
+}
+
+step_threads() {
+    local triple=x86_64-unknown-linux-gnu
+    build $triple "-Zsanitizer=thread -Zexternal-clangrt" "$target/threads"
+    g++ -std=c++17 -g -O2 -fsanitize=thread -Iexamples/c/include -o "$out/jobs" examples/c/examples/jobs.cpp \
+        "$target/threads/$triple/release/libfogbow_c.a" -lpthread -lm -ldl
+    TSAN_OPTIONS=halt_on_error=1 "$out/jobs"
+    echo "ThreadSanitizer: no race"
+}
+
+asked=("$@")
+((${#asked[@]})) || asked=(aarch64 threads)
+for step in "${asked[@]}"; do
+    "step_$step"
+done
