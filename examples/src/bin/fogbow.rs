@@ -2,9 +2,11 @@
 
 use std::process::ExitCode;
 
-use clap::Parser;
-use fogbow_examples::cli::{Arguments, run};
+use fogbow_examples::cli::{parse, run};
 
 fn main() -> ExitCode {
-    run(Arguments::parse())
+    match parse(std::env::args_os()) {
+        Ok(arguments) => run(arguments),
+        Err(answer) => answer.exit(),
+    }
 }

@@ -11,6 +11,7 @@ pub(crate) mod covariance;
 mod defaults;
 mod ellipsoids;
 mod figures;
+mod help;
 mod image_sampling;
 mod keep;
 mod march;
@@ -34,6 +35,7 @@ pub use check::CheckArguments;
 pub use compare::CompareArguments;
 pub use covariance::{CovarianceArguments, MarchArguments, Step};
 pub use figures::{FiguresArguments, Paper};
+pub use help::{Answer, CompletionsArguments, ManArguments, parse};
 pub use image_sampling::{ImageSampling, SamplingArguments};
 pub use keep::KeepArguments;
 pub use photon_beams::{BeamArguments, Kernel};
@@ -73,6 +75,10 @@ pub enum Command {
     Plume(PlumeArguments),
     /// Rebuilds the figures of a paper, with a page that explains them.
     Figures(FiguresArguments),
+    /// Writes completions for a shell to standard output.
+    Completions(CompletionsArguments),
+    /// Writes the pages of the manual.
+    Man(ManArguments),
 }
 
 /// How a command ended well enough to leave a result.
@@ -95,6 +101,8 @@ pub fn run(arguments: Arguments) -> ExitCode {
         Command::Probe(arguments) => probe::run(&arguments),
         Command::Plume(arguments) => plume::run(&arguments),
         Command::Figures(arguments) => figures::run(&arguments),
+        Command::Completions(arguments) => Ok(help::completions(&arguments)),
+        Command::Man(arguments) => help::man(&arguments),
     };
     match result {
         Ok(Ending::Done) => ExitCode::SUCCESS,

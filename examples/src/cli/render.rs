@@ -100,6 +100,9 @@ pub struct RenderArguments {
     /// Progress for other programs: a JSON object per line on standard output, with "event" and what belongs to it.
     #[arg(long, conflicts_with = "quiet")]
     pub json: bool,
+    /// Names of the options that the user has given, if [`super::parse`] has read them.
+    #[arg(skip)]
+    pub given: Vec<String>,
     /// Of renders that may be interrupted.
     #[command(flatten)]
     pub keep: KeepArguments,
@@ -302,6 +305,7 @@ pub(crate) fn render(arguments: &RenderArguments) -> Result<Rendered, Failure> {
     let world = statistics.time("build", || World::new(&scene, &mut storage))?;
     let choice = Choice::of(arguments, &paths, &world)?;
     let method = choice.method;
+    arguments.check_given(method, choice.instead.as_deref())?;
     if arguments.method.is_none() && !arguments.quiet {
         eprintln!("{}", choice.line());
     }
@@ -499,7 +503,7 @@ impl RenderArguments {
     }
 
     /// Whether anything asked for takes a covariance grid.
-    fn needs_grid(&self) -> bool {
+    pub(super) fn needs_grid(&self) -> bool {
         if !self.sampling.is_uniform() {
             return true;
         }
@@ -526,6 +530,9 @@ fn outputs(arguments: &RenderArguments) -> Result<Vec<PathBuf>, Failure> {
             .into();
     }
     outputs.iter().try_for_each(|file| output::check(file))?;
+    if let Some(method) = arguments.method {
+        arguments.check_given(method, None)?;
+    }
     if arguments.aov && !outputs.iter().any(|f| f.extension().is_some_and(|e| e.eq_ignore_ascii_case("exr"))) {
         return Err("--aov needs an .exr file to write to (-o FILE.exr)".into());
     }

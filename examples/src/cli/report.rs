@@ -12,10 +12,10 @@ use fogbow_std::stats::Seconds;
 use fogbow_std::tiles::{Outcome, Reason};
 use indicatif::{ProgressBar, ProgressStyle};
 
+use super::RenderArguments;
 use super::choice::Choice;
 use super::radiance_cache::Audited;
 use super::vpl::Audit;
-use super::{Method, RenderArguments};
 use crate::statistics::Statistics;
 
 /// Steps of the progress bar.
@@ -321,13 +321,7 @@ impl Report<'_> {
              \"collisions\": {}, \"medium_lookups\": {}, \"medium_segments\": {}, \"cache_lookups\": {}, \"cache_misses\": {}, \"non_finite\": {}}},\n  \
              {energy}{findings}{noise}\"records\": {{{records}}},\n  \"bytes\": {{{bytes}}}\n}}\n",
             quoted(&self.arguments.scene.file.display().to_string()),
-            match self.choice.method {
-                Method::Path => "path",
-                Method::RadianceCache => "radiance-cache",
-                Method::PhotonBeams => "photon-beams",
-                Method::March => "march",
-                Method::Vpl => "vpl",
-            },
+            self.choice.method.name(),
             self.size.0,
             self.size.1,
             self.samples_per_pixel(),

@@ -229,3 +229,39 @@ fn a_preview_and_events_tell_how_far_it_is() {
     assert_eq!(refused.status.code(), Some(2));
     assert!(said(&refused).contains("--preview: small.jpg must end in .png"), "{}", said(&refused));
 }
+
+#[test]
+fn a_scene_alone_is_a_hint_and_idle_options_are_refused() {
+    let folder = Folder::new("care-hints");
+    let hint = folder.run(&["box.xml"]);
+    assert_eq!(
+        (hint.status.code(), said(&hint).as_str()),
+        (Some(2), "fogbow: to render a scene: fogbow render box.xml\n")
+    );
+    for (options, word) in [
+        (
+            &["--method", "path", "--tolerance", "1"][..],
+            "--tolerance has no effect with --method path; it belongs to --method radiance-cache",
+        ),
+        (
+            &["--max-depth", "4", "--error", "0.1"],
+            "--error has no effect with --method path (taken because caches hold light of paths of any depth",
+        ),
+        (&["--method", "vpl", "--alpha", "0.5"], "it belongs to --method photon-beams"),
+        (
+            &["--method", "march", "--grid-cells", "9"],
+            "--grid-cells has no effect without something that uses covariances",
+        ),
+        (&["--image-share", "0.5"], "--image-share has no effect"),
+    ] {
+        let refused = folder.run(&[&["render", SCENE, "--size", "8x8", "-o", "a.pfm"], options].concat());
+        assert_eq!(refused.status.code(), Some(2), "{options:?}");
+        assert!(said(&refused).contains(word), "{options:?}: {}", said(&refused));
+    }
+    assert!(folder.names().is_empty());
+    let help = folder.run(&["render", "--help", "vpl"]);
+    assert!(help.status.success() && String::from_utf8_lossy(&help.stdout).contains("--light-points"));
+    assert!(folder.run(&["man", "."]).status.success() && folder.names().contains(&"fogbow-render.1".to_owned()));
+    let completions = folder.run(&["completions", "bash"]);
+    assert!(completions.status.success() && String::from_utf8_lossy(&completions.stdout).contains("--light-points"));
+}
