@@ -29,13 +29,6 @@ impl Choice {
         let Some(reason) = obstacle(paths, world) else {
             return Ok(Self { method: Method::RadianceCache, instead: None });
         };
-        if arguments.cache.has_files() {
-            return Err(format!(
-                "--cache-in and --cache-out need radiance caching, which is not taken here: {reason}; \
-                 --method radiance-cache insists on it"
-            )
-            .into());
-        }
         Ok(Self { method: Method::Path, instead: Some(reason) })
     }
 

@@ -185,7 +185,7 @@ impl RenderArguments {
                 .into());
             }
         }
-        let grid = ["grid_paths", "grid_cells", "image_share"];
+        let grid = ["grid_paths", "grid_cells", "grid_in", "grid_out", "image_share"];
         let is_idle = |id: &str| match id {
             "image_share" => self.sampling.is_uniform(),
             _ => !self.needs_grid(),

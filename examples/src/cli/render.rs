@@ -298,9 +298,6 @@ pub(crate) fn render(arguments: &RenderArguments) -> Result<Rendered, Failure> {
             "--noise: the noise of photon beams and virtual lights is that of whole passes; use --spp or --time".into(),
         );
     }
-    if arguments.march.bake.is_some() && arguments.method != Some(Method::March) {
-        return Err("--bake: light that was baked is marched: it needs --method march".into());
-    }
     let mut storage = Storage::new(&scene);
     let world = statistics.time("build", || World::new(&scene, &mut storage))?;
     let choice = Choice::of(arguments, &paths, &world)?;
@@ -540,27 +537,10 @@ fn outputs(arguments: &RenderArguments) -> Result<Vec<PathBuf>, Failure> {
         output::check_place(file)?;
     }
     let caches = &arguments.cache;
-    if arguments.method.is_some_and(|method| method != Method::RadianceCache) && caches.has_files() {
-        return Err("--cache-in and --cache-out need --method radiance-cache".into());
-    }
     caches.check()?;
     arguments.keep.check()?;
-    if arguments.march.step != Step::Uniform && arguments.method != Some(Method::March) {
-        return Err("--step covariance and frequency need --method march".into());
-    }
-    if arguments.beams.kernel != Kernel::Progressive && arguments.method != Some(Method::PhotonBeams) {
-        return Err("--kernel covariance needs --method photon-beams".into());
-    }
     arguments.vpl.check()?;
-    if arguments.vpl.is_named() && arguments.method != Some(Method::Vpl) {
-        return Err("options of virtual lights need --method vpl".into());
-    }
     arguments.covariance.check()?;
-    if arguments.covariance.is_named() && !arguments.needs_grid() {
-        return Err(
-            "--grid-in and --grid-out need something that uses covariances: --kernel, --step or --image-sampling covariance".into()
-        );
-    }
     if !arguments.exposure.is_finite() {
         return Err("--exposure must be a finite number".into());
     }

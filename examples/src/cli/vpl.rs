@@ -146,19 +146,6 @@ impl VplArguments {
             _ => Ok(()),
         }
     }
-
-    /// Whether any option was given.
-    pub(super) fn is_named(&self) -> bool {
-        self.clamp != Clamp::Auto
-            || self.compensation != Recovery::Abc
-            || self.steps.is_some()
-            || self.local_visibility.is_some()
-            || self.share.is_some()
-            || self.lights.is_some()
-            || self.candidates.is_some()
-            || self.light_points.is_some()
-    }
-
     fn compensation(&self) -> Option<Compensation> {
         let base = match self.compensation {
             Recovery::None => return None,

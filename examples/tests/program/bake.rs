@@ -325,7 +325,7 @@ fn pictures_are_marched_from_bakes_of_their_scene() {
         ("march", "surfaces.bake", "surfaces.bake: holds irradiance of surfaces"),
         ("march", "light-light0.bake", "light-light0.bake: was made for another scene"),
         ("march", "two.xml", "two.xml: is no grid of probes"),
-        ("path", "a.bake", "--bake: light that was baked is marched"),
+        ("path", "a.bake", "--bake has no effect with --method path; it belongs to --method march"),
     ] {
         let output = render("two.xml", &["--method", method, "--bake", file]);
         assert_eq!(output.status.code(), Some(2), "{file}");
