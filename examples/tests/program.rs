@@ -202,8 +202,11 @@ fn the_same_bits_come_from_any_number_of_threads() {
 #[test]
 fn bad_input_is_exit_code_2_and_no_image() {
     let folder = Folder::new("bad");
-    std::fs::write(folder.0.join("bad.xml"), "<scene version=\"3.0.0\"><shape type=\"sphere\"><bsdf type=\"magic\" id=\"x\"/></shape></scene>")
-        .unwrap();
+    std::fs::write(
+        folder.0.join("bad.xml"),
+        "<scene version=\"3.0.0\"><shape type=\"sphere\"><bsdf type=\"magic\" id=\"x\"/></shape></scene>",
+    )
+    .unwrap();
     let cases: &[(&[&str], &str)] = &[
         (&["render", "none.xml"], "none.xml: cannot be read"),
         (&["render", "bad.xml"], "bad.xml:1: <bsdf type=\"magic\" id=\"x\">: attribute \"type\""),

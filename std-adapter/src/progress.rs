@@ -5,7 +5,7 @@ use core::sync::atomic::{AtomicBool, Ordering};
 use core::time::Duration;
 
 use crate::stats::Stopwatch;
-use crate::tiles::Glimpse;
+use crate::tiles::Watched;
 
 /// How far a render is.
 ///
@@ -68,11 +68,11 @@ pub struct Control<'a> {
     /// Set by the host (from another thread, a signal handler, the progress function) to stop soon.
     pub cancel: Option<&'a AtomicBool>,
     /// Called at most twenty times a second, by the thread that renders, and once at the end.
-    pub progress: Option<&'a (dyn Fn(&Progress) + Sync)>,
-    /// Called after every batch of jobs, which take some milliseconds each, with the picture as it is: to show it, or to save what there is
-    /// by [`Glimpse::to_bytes`]. How often that pays is for the host to say.
-    pub watch: Option<&'a (dyn Fn(&Glimpse<'_>) + Sync)>,
-    /// What [`Glimpse::to_bytes`] has saved, and its tag: the picture goes on from there, to the same bits.
+    pub progress: Option<&'a dyn Fn(&Progress)>,
+    /// Called by the thread that renders after every batch of jobs, some milliseconds apart, with the picture as it is, and once at the end,
+    /// with `true`: to show it, or to save it by [`Tiles::to_bytes`](fogbow::picture::Tiles::to_bytes).
+    pub watch: Option<&'a dyn Fn(&Watched, bool)>,
+    /// What [`Tiles::to_bytes`](fogbow::picture::Tiles::to_bytes) has saved, and its tag: the picture goes on from there, to the same bits.
     pub resume: Option<(&'a [u8], u64)>,
 }
 

@@ -142,14 +142,14 @@ where
         }
         let batch = &mut outputs[..count];
         let stop = AtomicBool::new(false);
-        let frozen = &*work;
+        let (frozen, cancel) = (&*work, control.cancel);
         threads.each(batch, |i, (is_done, output)| {
             *is_done = !stop.load(Ordering::Relaxed);
             if !*is_done {
                 return;
             }
             frozen.run(jobs.start + i as u32, world, output);
-            if control.is_cancelled() || is_late() {
+            if cancel.is_some_and(|flag| flag.load(Ordering::Relaxed)) || is_late() {
                 stop.store(true, Ordering::Relaxed);
             }
         });

@@ -12,7 +12,7 @@ pub use fogbow::picture::Goal;
 use fogbow::picture::{self, Integrand, PictureBytesError, Tiles, affordable};
 use fogbow::spectrum::Spectrum;
 
-use crate::film::{Film, Image, SizeError};
+use crate::film::Film;
 use crate::progress::{Control, Reporter};
 use crate::seed::{SampleRng, Sequence};
 use crate::stats::{Counters, Queries, Seconds, Stopwatch};
@@ -160,70 +160,30 @@ pub struct Passes {
     pub may_break: bool,
 }
 
-/// The picture as it is now, between two batches of jobs: for [`Control::watch`].
+/// The picture as it is between two batches of jobs: for [`Control::watch`].
 ///
 /// ```
-/// use core::cell::Cell;
-/// use std::sync::Mutex;
+/// use core::cell::RefCell;
 /// use fogbow::{sampling::uniform, spectrum::Spectrum};
-/// use fogbow_std::{film::Film, progress::Control, tiles::{Glimpse, Sample, Settings, render}, seed::SampleRng};
+/// use fogbow_std::{film::Film, progress::Control, tiles::{Sample, Settings, Watched, render}, seed::SampleRng};
 /// let noise = |_: &Sample<'_>, rng: &mut SampleRng, layers: &mut [Spectrum]| layers[0] = Spectrum::splat(uniform(rng));
 /// let settings = Settings { samples: 64, ..Settings::default() };
 /// // Saved once half the samples are there.
-/// let saved = Mutex::new(Vec::new());
-/// let watch = |glimpse: &Glimpse<'_>| {
-///     if glimpse.samples() == 32 && saved.lock().unwrap().is_empty() {
-///         *saved.lock().unwrap() = glimpse.to_bytes(7);
+/// let saved = RefCell::new(Vec::new());
+/// let watch = |tiles: &Watched, _: bool| {
+///     if tiles.least_count() == 32 {
+///         *saved.borrow_mut() = tiles.to_bytes(7);
 ///     }
 /// };
-/// let mut whole = Film::new(8, 8, &["total"])?;
+/// let (mut whole, mut resumed) = (Film::new(8, 8, &["total"])?, Film::new(8, 8, &["total"])?);
 /// render(&mut whole, &settings, &Control { watch: Some(&watch), ..Control::default() }, noise)?;
 /// // The program was killed; the next run goes on.
-/// let saved = saved.into_inner().unwrap();
-/// let mut resumed = Film::new(8, 8, &["total"])?;
+/// let saved = saved.into_inner();
 /// render(&mut resumed, &settings, &Control { resume: Some((&saved, 7)), ..Control::default() }, noise)?;
 /// assert_eq!(resumed, whole);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-#[derive(Debug)]
-pub struct Glimpse<'a> {
-    tiles: &'a Tiles<'static, Sequence, Counters>,
-    size: [u32; 2],
-    is_last: bool,
-}
-
-impl Glimpse<'_> {
-    /// Samples that every pixel has at least; 0 means that some have none.
-    #[must_use]
-    pub fn samples(&self) -> u32 {
-        self.tiles.least_count()
-    }
-
-    /// Whether the render ends with it, done or stopped.
-    #[must_use]
-    pub fn is_last(&self) -> bool {
-        self.is_last
-    }
-
-    /// All that is needed to go on by [`Control::resume`], for a picture with this tag.
-    #[must_use]
-    pub fn to_bytes(&self, tag: u64) -> Vec<u8> {
-        self.tiles.to_bytes(tag)
-    }
-
-    /// The means of layer 0. Pixels without samples are black.
-    ///
-    /// # Errors
-    /// [`SizeError::Memory`].
-    pub fn image(&self) -> Result<Image, SizeError> {
-        let [width, height] = self.size;
-        let mut image = Image::new(width, height, Spectrum::ZERO)?;
-        for (pixel, at) in image.pixels.iter_mut().zip(0..) {
-            *pixel = self.tiles.mean(at % width, at / width, 0);
-        }
-        Ok(image)
-    }
-}
+pub type Watched = Tiles<'static, Sequence, Counters>;
 
 /// An integrand whose queries of the world are counted.
 struct Counted<F>(F);
@@ -296,7 +256,7 @@ impl<'a> Render<'a> {
     pub(crate) fn outcome(self, reason: Reason) -> Outcome {
         self.reporter.tell();
         if let (Some(watch), Some(tiles)) = (self.control.watch, &self.tiles) {
-            watch(&Glimpse { tiles, size: [self.film.width(), self.film.height()], is_last: true });
+            watch(tiles, true);
         }
         let counters = self.tiles.as_ref().map_or_else(Counters::default, |tiles| {
             let picture::Counts { samples, non_finite } = tiles.counts();
@@ -324,7 +284,7 @@ impl<'a> Render<'a> {
     where
         F: Fn(&Sample<'_>, &mut SampleRng, &mut [Spectrum]) + Sync,
     {
-        let (size, control) = ([self.film.width(), self.film.height()], self.control);
+        let control = self.control;
         let Some(tiles) = &mut self.tiles else { return false };
         let mut before = tiles.counts().samples;
         let reporter = &mut self.reporter;
@@ -332,7 +292,7 @@ impl<'a> Render<'a> {
             reporter.add(tiles.counts().samples - before);
             before = tiles.counts().samples;
             if let Some(watch) = control.watch {
-                watch(&Glimpse { tiles, size, is_last: false });
+                watch(tiles, false);
             }
         });
         ran.ending == Ending::Done

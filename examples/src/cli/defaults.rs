@@ -1,7 +1,6 @@
 //! What `--help` says about options that are not given: the numbers of the core's presets.
 
 use core::fmt::Display;
-use std::sync::OnceLock;
 
 use clap::Arg;
 use fogbow::host::Empty;
@@ -11,11 +10,13 @@ use fogbow::world::{Outline, World};
 /// A world without anything in it whose diagonal is 1: lengths of its presets are shares of the diagonal.
 pub(super) fn unit_outline() -> Outline {
     // Asked for by every option, at every start.
-    static OUTLINE: OnceLock<Outline> = OnceLock::new();
-    *OUTLINE.get_or_init(|| {
-        let world = World { medium: &Empty, scene: &Empty, lights: (&[]).into() };
-        Outline::of(&world, Bounds { min: Vec3::ZERO, max: Vec3::X })
-    })
+    thread_local! {
+        static OUTLINE: Outline = {
+            let world = World { medium: &Empty, scene: &Empty, lights: (&[]).into() };
+            Outline::of(&world, Bounds { min: Vec3::ZERO, max: Vec3::X })
+        };
+    }
+    OUTLINE.with(|outline| *outline)
 }
 
 /// The option with its default at the end of its help.

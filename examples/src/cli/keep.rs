@@ -4,16 +4,17 @@
 //! [`Crc`] of all else; then the caches and the picture as the core writes them. It is replaced as a whole, so whatever ends the program
 //! leaves the last one.
 
+use core::cell::{Cell, RefCell};
 use std::path::{Path, PathBuf};
-use std::sync::Mutex;
-use std::time::{Duration, Instant};
 
 use clap::Args;
 use fogbow::bytes::Crc;
+use fogbow::spectrum::Spectrum;
 use fogbow_std::files::write;
 use fogbow_std::film::Image;
 use fogbow_std::image::{self, Layer};
-use fogbow_std::tiles::Glimpse;
+use fogbow_std::stats::Stopwatch;
+use fogbow_std::tiles::Watched;
 
 use super::{Failure, output};
 use crate::error::read_file;
@@ -25,8 +26,8 @@ const HEADER_BYTES: usize = 8 + 4 + 8 + 8 + 8 + 4 + 4 + 4 + 8;
 /// Longest side of a preview (pixels): more takes longer to write than to render.
 const PREVIEW_SIDE: u32 = 512;
 
-/// How often a preview is written.
-const PREVIEW_EVERY: Duration = Duration::from_secs(1);
+/// Seconds between two previews.
+const PREVIEW_EVERY: f64 = 1.0;
 
 /// Of renders that may be interrupted.
 #[derive(Debug, Clone, Args)]
@@ -84,11 +85,14 @@ pub(super) struct Keeper<'a> {
     tag: u64,
     left: Option<Left>,
     /// Of finished caches.
-    caches: Mutex<(Vec<u8>, Measured)>,
-    /// When a checkpoint and a preview were written last.
-    last: Mutex<[Instant; 2]>,
+    caches: RefCell<(Vec<u8>, Measured)>,
+    /// Columns and rows of the picture.
+    size: [u32; 2],
+    clock: Stopwatch,
+    /// When a checkpoint and a preview were written last (s).
+    last: Cell<[f64; 2]>,
     /// The first thing that went wrong; a render is not given up for it.
-    problem: Mutex<Option<String>>,
+    problem: RefCell<Option<String>>,
 }
 
 impl<'a> Keeper<'a> {
@@ -96,7 +100,7 @@ impl<'a> Keeper<'a> {
     ///
     /// # Errors
     /// A checkpoint that is damaged, or of another render.
-    pub(super) fn new(arguments: &'a KeepArguments, tag: u64) -> Result<Self, Failure> {
+    pub(super) fn new(arguments: &'a KeepArguments, size: [u32; 2], tag: u64) -> Result<Self, Failure> {
         let left = match &arguments.checkpoint {
             Some(file) if arguments.resume && file.exists() => Some(read(file, tag)?),
             _ => None,
@@ -106,9 +110,11 @@ impl<'a> Keeper<'a> {
             arguments,
             tag,
             left,
-            caches: Mutex::new((Vec::new(), none)),
-            last: Mutex::new([Instant::now(); 2]),
-            problem: Mutex::new(None),
+            caches: RefCell::new((Vec::new(), none)),
+            size,
+            clock: Stopwatch::start(),
+            last: Cell::new([0.0; 2]),
+            problem: RefCell::new(None),
         })
     }
 
@@ -129,45 +135,47 @@ impl<'a> Keeper<'a> {
 
     /// Caches are filled: from now on they belong to what is kept.
     pub(super) fn keep_caches(&self, bytes: Vec<u8>, measured: Measured) {
-        if let Ok(mut caches) = self.caches.lock() {
-            *caches = (bytes, measured);
-        }
+        *self.caches.borrow_mut() = (bytes, measured);
     }
 
-    /// Is shown the picture after every batch of jobs.
-    pub(super) fn watch(&self, glimpse: &Glimpse<'_>) {
-        let due = |index: usize, every: Duration| {
-            let mut last = self.last.lock().ok()?;
-            let now = Instant::now();
-            (glimpse.is_last() || now - last[index] >= every).then(|| last[index] = now)
-        };
-        if let Some(file) = &self.arguments.checkpoint {
-            let every = Duration::try_from_secs_f64(self.arguments.checkpoint_every).unwrap_or(Duration::MAX);
-            if due(0, every).is_some() {
-                self.note(self.write(file, &glimpse.to_bytes(self.tag)));
+    /// Is shown the picture after every batch of jobs, and at the end.
+    pub(super) fn watch(&self, tiles: &Watched, is_last: bool) {
+        let now = self.clock.elapsed().wall;
+        let is_due = |index: usize, every: f64| {
+            let mut last = self.last.get();
+            let is_due = is_last || now - last[index] >= every;
+            if is_due {
+                last[index] = now;
+                self.last.set(last);
             }
-        }
-        if let Some(file) = self.arguments.preview.as_ref().filter(|_| glimpse.samples() > 0)
-            && due(1, PREVIEW_EVERY).is_some()
+            is_due
+        };
+        if let Some(file) = &self.arguments.checkpoint
+            && is_due(0, self.arguments.checkpoint_every)
         {
-            self.note(preview(file, glimpse));
+            self.note(self.write(file, &tiles.to_bytes(self.tag)));
+        }
+        if let Some(file) = &self.arguments.preview
+            && tiles.least_count() > 0
+            && is_due(1, PREVIEW_EVERY)
+        {
+            self.note(self.preview(file, tiles));
         }
     }
 
     fn note(&self, result: Result<(), String>) {
-        if let (Err(problem), Ok(mut first)) = (result, self.problem.lock()) {
-            first.get_or_insert(problem);
+        if let Err(problem) = result {
+            self.problem.borrow_mut().get_or_insert(problem);
         }
     }
 
     /// The first file that could not be written.
     pub(super) fn problem(&self) -> Option<String> {
-        self.problem.lock().ok().and_then(|mut problem| problem.take())
+        self.problem.take()
     }
 
     fn write(&self, file: &Path, picture: &[u8]) -> Result<(), String> {
-        let Ok(kept) = self.caches.lock() else { return Ok(()) };
-        let (caches, measured) = &*kept;
+        let (caches, measured) = &*self.caches.borrow();
         let mut bytes = Vec::with_capacity(HEADER_BYTES + caches.len() + picture.len());
         bytes.extend(MAGIC);
         bytes.extend(VERSION.to_le_bytes());
@@ -181,6 +189,26 @@ impl<'a> Keeper<'a> {
         let crc = checksum(&bytes);
         bytes[HEADER_BYTES - 8..HEADER_BYTES].copy_from_slice(&crc.to_le_bytes());
         write(file, &bytes).map_err(|error| error.to_string())
+    }
+
+    /// Writes the picture, small: means of square blocks of pixels.
+    fn preview(&self, file: &Path, tiles: &Watched) -> Result<(), String> {
+        let [width, height] = self.size;
+        let step = width.max(height).div_ceil(PREVIEW_SIDE).max(1);
+        let [columns, rows] = [width, height].map(|side| (side / step).max(1));
+        let mut small = Image::new(columns, rows, Spectrum::ZERO).map_err(|error| error.to_string())?;
+        for (pixel, at) in small.pixels.iter_mut().zip(0..) {
+            let [x, y] = [at % columns * step, at / columns * step];
+            let inside = (0..step * step).map(|inner| (x + inner % step, y + inner / step));
+            let inside = inside.filter(|&(x, y)| x < width && y < height);
+            let (mut sum, mut count) = (Spectrum::ZERO, 0.0);
+            for (x, y) in inside {
+                sum += tiles.mean(x, y, 0);
+                count += 1.0;
+            }
+            *pixel = sum * (1.0 / count);
+        }
+        image::write(file, &[Layer { name: "total", image: &small }], 0.0).map_err(|error| error.to_string())
     }
 }
 
@@ -215,21 +243,4 @@ fn read(file: &Path, tag: u64) -> Result<Left, Failure> {
     let measured = Measured { noise: f32::from_bits(word(36)), audit_rays: word(40) };
     let (caches, picture) = bytes[HEADER_BYTES..].split_at(caches as usize);
     Ok(Left { caches: caches.to_vec(), measured, picture: picture.to_vec() })
-}
-
-/// The picture, with every so many pixels of it at most.
-fn preview(file: &Path, glimpse: &Glimpse<'_>) -> Result<(), String> {
-    let whole = glimpse.image().map_err(|error| error.to_string())?;
-    let step = whole.width.max(whole.height).div_ceil(PREVIEW_SIDE).max(1);
-    let [width, height] = [whole.width, whole.height].map(|side| (side / step).max(1));
-    let mut small = Image::new(width, height, fogbow::spectrum::Spectrum::ZERO).map_err(|error| error.to_string())?;
-    for (pixel, at) in small.pixels.iter_mut().zip(0..) {
-        let [x, y] = [at % width * step, at / width * step];
-        let mut sum = fogbow::spectrum::Spectrum::ZERO;
-        for inner in 0..step * step {
-            sum += whole.get(x + inner % step, y + inner / step).unwrap_or_default();
-        }
-        *pixel = sum * (1.0 / (step * step) as f32);
-    }
-    image::write(file, &[Layer { name: "total", image: &small }], 0.0).map_err(|error| error.to_string())
 }

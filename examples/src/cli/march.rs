@@ -10,6 +10,7 @@ use fogbow::sampling::{Generator, uniform};
 use fogbow::spectrum::Spectrum;
 use fogbow::world::World as LitWorld;
 use fogbow_std::film::Film;
+use fogbow_std::progress::Control;
 use fogbow_std::stats::{CountingMedium, CountingScene};
 use fogbow_std::tiles::{self, Outcome};
 
@@ -24,6 +25,7 @@ use crate::world::{WithMedium, World};
 /// A render by ray marching, to be done with a medium of any type.
 pub(super) struct MarchJob<'a> {
     pub(super) shot: Shot<'a>,
+    pub(super) control: &'a Control<'a>,
     pub(super) film: &'a mut Film,
     pub(super) arguments: &'a MarchArguments,
     /// Baked light of the medium.
@@ -78,7 +80,7 @@ impl WithMedium for MarchJob<'_> {
         // An even sky is in indirect light.
         let lamps: Vec<Light<'_>> = shot.lights.iter().filter(|light| !light.is_sky()).copied().collect();
         let is_whole = self.baked.as_ref().is_some_and(|grid| grid.orders() == Orders::All);
-        let outcome = tiles::render(self.film, shot.settings, shot.control, |sample, rng, layers| {
+        let outcome = tiles::render(self.film, shot.settings, self.control, |sample, rng, layers| {
             let world = LitWorld {
                 medium: &CountingMedium { medium, tally: sample.tally },
                 scene: &CountingScene { scene: shot.world, tally: sample.tally },

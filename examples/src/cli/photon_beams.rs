@@ -10,6 +10,7 @@ use fogbow::math::Vec3;
 use fogbow::vpl;
 use fogbow::world::{Outline, World as LitWorld};
 use fogbow_std::film::Film;
+use fogbow_std::progress::Control;
 use fogbow_std::progressive;
 use fogbow_std::stats::{CountingMedium, CountingScene};
 use fogbow_std::threads::{self, Threads};
@@ -103,6 +104,7 @@ impl BeamArguments {
 /// A render by photon beams, to be done with a medium of any type.
 pub(super) struct BeamJob<'a> {
     pub(super) shot: Shot<'a>,
+    pub(super) control: &'a Control<'a>,
     pub(super) film: &'a mut Film,
     pub(super) arguments: &'a BeamArguments,
 }
@@ -119,7 +121,7 @@ impl WithMedium for BeamJob<'_> {
         if self.arguments.beams.is_none() {
             let mut pilot = beams::BeamPass::pilot(&settings);
             let threads = Threads::new(shot.settings.threads)?;
-            threads::run(&mut pilot, &world, &threads, shot.control, None, |_| {});
+            threads::run(&mut pilot, &world, &threads, self.control, None, |_| {});
             settings = pilot.settings_for_pieces();
         }
         let grid = shot.grid.filter(|_| self.arguments.kernel == Kernel::Covariance);
@@ -138,7 +140,7 @@ impl WithMedium for BeamJob<'_> {
         let outcome = progressive::render(
             self.film,
             shot.settings,
-            shot.control,
+            self.control,
             Passes { length, may_break: false },
             |pass, runner| {
                 let mut pass = beams::BeamPass::new(&settings, pass, radius);

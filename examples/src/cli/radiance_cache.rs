@@ -238,7 +238,7 @@ pub(super) struct CacheJob<'a> {
     pub(super) has_usual_goal: bool,
     pub(super) control: &'a Control<'a>,
     /// Is told of every stage of filling, again and again, and which share of its jobs is done.
-    pub(super) tell: &'a (dyn Fn(&'static str, f32) + Sync),
+    pub(super) tell: &'a dyn Fn(&'static str, f32),
     /// What is kept of the render, if anything, and what it goes on with.
     pub(super) keeper: Option<&'a Keeper<'a>>,
     pub(super) arguments: &'a CacheArguments,
@@ -382,8 +382,10 @@ impl<M: Medium + Sync> Stages<'_, '_, M> {
         LitWorld { medium: self.medium, scene: self.job.world, lights: self.job.lights }
     }
 
-    fn ray(&self, at: [f32; 2]) -> Ray {
-        self.job.camera.ray(Vec2::from(at))
+    /// Eye rays by where they cross the film.
+    fn rays(&self) -> impl Fn([f32; 2]) -> Ray + Copy + use<M> {
+        let camera = self.job.camera;
+        move |at| camera.ray(Vec2::from(at))
     }
 
     /// Fills caches until nothing is missing, or `time` is up; audits them, and, where time is not limited, makes anew what is wrong.
@@ -395,7 +397,7 @@ impl<M: Medium + Sync> Stages<'_, '_, M> {
         spent: &mut Spent,
     ) -> Filled {
         let (job, world) = (self.job, self.world());
-        let ray = |at: [f32; 2]| self.ray(at);
+        let ray = self.rays();
         let width = job.film.width() as f32;
         let apart = ray([0.5, 0.5]).direction.angle_between(ray([0.5 + 1.0 / width, 0.5]).direction);
         let tell = |filling: &Filling<'_, _>| {
@@ -444,7 +446,7 @@ impl<M: Medium + Sync> Stages<'_, '_, M> {
         if measured.audit_rays == 0 || job.paths.max_scatterings == 0 {
             return Ok(Filled::new(caches, (Ending::Done, measured), None));
         }
-        let mut audit = Audit::new(&caches, |at| self.ray(at), measured.audit_rays);
+        let mut audit = Audit::new(&caches, self.rays(), measured.audit_rays);
         let ran = threads::run(&mut audit, &world, &self.pool, job.control, None, |_| (job.tell)("audit", 0.0));
         add_times(&mut spent.filled, ran.stages);
         let (findings, map) = (audit.findings(), Box::new(audit.map()));
@@ -459,23 +461,25 @@ impl<M: Medium + Sync> Stages<'_, '_, M> {
         caches: &RadianceCaches<'static>,
         settings: &tiles::Settings,
     ) -> Result<Outcome, Failure> {
-        let job = self.job;
+        // Threads share no more of the job than they need.
+        let CacheJob { world: scene, lights, camera, filter, paths, plan, .. } = *self.job;
+        let medium = self.medium;
         let has_layers = film.layers().len() > 1;
         let (width, height) = (film.width(), film.height());
-        Ok(tiles::render(film, settings, job.control, |sample, rng, layers| {
+        Ok(tiles::render(film, settings, self.job.control, |sample, rng, layers| {
             let world = LitWorld {
-                medium: &CountingMedium { medium: self.medium, tally: sample.tally },
-                scene: &CountingScene { scene: job.world, tally: sample.tally },
-                lights: job.lights,
+                medium: &CountingMedium { medium, tally: sample.tally },
+                scene: &CountingScene { scene, tally: sample.tally },
+                lights,
             };
-            let eye = Eye { camera: job.camera, filter: job.filter };
+            let eye = Eye { camera, filter };
             let (ray, weight) = eye.ray([sample.x, sample.y], [width, height], rng);
-            let seen = if job.paths.max_scatterings == 0 {
+            let seen = if paths.max_scatterings == 0 {
                 CachedRadiance {
-                    emitted: path::radiance(&ray, &world, &job.paths, rng).emitted,
+                    emitted: path::radiance(&ray, &world, &paths, rng).emitted,
                     ..CachedRadiance::default()
                 }
-            } else if is_computed(job.plan, sample, width) {
+            } else if is_computed(plan, sample, width) {
                 caches.radiance(&ray, &world, rng)
             } else {
                 caches.radiance_beyond(&ray, &world, rng)

@@ -322,7 +322,7 @@ pub(crate) fn render(arguments: &RenderArguments) -> Result<Rendered, Failure> {
 
     let bar = Bar::new(arguments.voice());
     let progress = |progress: &Progress| bar.show(progress, u64::from(width) * u64::from(height));
-    let keeper = Keeper::new(&arguments.keep, arguments.keep_tag(method, &scene)?)?;
+    let keeper = Keeper::new(&arguments.keep, [width, height], arguments.keep_tag(method, &scene)?)?;
     if keeper.is_asked() && arguments.time.is_some() && method == Method::RadianceCache {
         return Err(
             "--checkpoint: radiance caching with --time makes several pictures, of which none can be gone on with; \
@@ -330,7 +330,7 @@ pub(crate) fn render(arguments: &RenderArguments) -> Result<Rendered, Failure> {
                 .into(),
         );
     }
-    let watch = |glimpse: &tiles::Glimpse<'_>| keeper.watch(glimpse);
+    let watch = |tiles: &tiles::Watched, is_last: bool| keeper.watch(tiles, is_last);
     let control =
         Control { cancel: Some(stop_flag()), progress: Some(&progress), watch: Some(&watch), resume: keeper.picture() };
     let (samples, noise) = arguments.samples(method, scene.sensor.samples);
@@ -379,17 +379,18 @@ pub(crate) fn render(arguments: &RenderArguments) -> Result<Rendered, Failure> {
         filter: &filter,
         paths,
         settings: &settings,
-        control: &control,
         grid: grid.as_ref(),
         plan: plan.as_ref(),
     };
     let (mut cached, mut audit) = (None, None);
     let outcome = match method {
-        Method::Path => world.media().with(Job { shot, film: &mut film })?,
-        Method::PhotonBeams => world.media().with(BeamJob { shot, film: &mut film, arguments: &arguments.beams })?,
+        Method::Path => world.media().with(Job { shot, control: &control, film: &mut film })?,
+        Method::PhotonBeams => {
+            world.media().with(BeamJob { shot, control: &control, film: &mut film, arguments: &arguments.beams })?
+        }
         Method::Vpl => {
             let pass_samples = arguments.beams.pass_samples;
-            let job = VplJob { shot, film: &mut film, arguments: &arguments.vpl, pass_samples };
+            let job = VplJob { shot, control: &control, film: &mut film, arguments: &arguments.vpl, pass_samples };
             let (outcome, settings) = world.media().with(job)?;
             let bytes = u64::from(settings.lights) * size_of::<VirtualLight>() as u64;
             statistics.bytes.push(("virtual lights".to_owned(), bytes));
@@ -398,7 +399,13 @@ pub(crate) fn render(arguments: &RenderArguments) -> Result<Rendered, Failure> {
         }
         Method::March => {
             let baked = march::baked(&arguments.march, &arguments.scene, &paths, &world)?;
-            world.media().with(MarchJob { shot, film: &mut film, arguments: &arguments.march, baked })?
+            world.media().with(MarchJob {
+                shot,
+                control: &control,
+                film: &mut film,
+                arguments: &arguments.march,
+                baked,
+            })?
         }
         Method::RadianceCache => {
             let done = world.media().with(CacheJob {
@@ -566,7 +573,6 @@ pub(super) struct Shot<'a> {
     pub(super) filter: &'a FilterTable,
     pub(super) paths: path::Settings,
     pub(super) settings: &'a tiles::Settings,
-    pub(super) control: &'a Control<'a>,
     pub(super) grid: Option<&'a GridView<'a>>,
     pub(super) plan: Option<&'a Plan<'a>>,
 }
@@ -589,6 +595,7 @@ impl Shot<'_> {
 /// A render by path tracing, to be done with a medium of any type.
 struct Job<'a> {
     shot: Shot<'a>,
+    control: &'a Control<'a>,
     film: &'a mut Film,
 }
 
@@ -598,7 +605,7 @@ impl WithMedium for Job<'_> {
     fn with<M: Medium + Sync>(self, medium: &M) -> Self::Output {
         let shot = self.shot;
         let (width, height) = (self.film.width(), self.film.height());
-        tiles::render(self.film, shot.settings, shot.control, |sample, rng, layers| {
+        tiles::render(self.film, shot.settings, self.control, |sample, rng, layers| {
             let world = LitWorld {
                 medium: &CountingMedium { medium, tally: sample.tally },
                 scene: &CountingScene { scene: shot.world, tally: sample.tally },

@@ -1,14 +1,13 @@
 //! What the user sees of a render: the bar, the summary, the file of statistics.
 
+use core::cell::Cell;
 use core::fmt::Write;
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
-use std::sync::Mutex;
-use std::time::{Duration, Instant};
 
 use fogbow::cache::{AuditedRegion, BiasMap, Deviation, Findings, Kind, MeanLight};
 use fogbow_std::progress::Progress;
-use fogbow_std::stats::Seconds;
+use fogbow_std::stats::{Seconds, Stopwatch};
 use fogbow_std::tiles::{Outcome, Reason};
 use indicatif::{ProgressBar, ProgressStyle};
 
@@ -21,11 +20,11 @@ use crate::statistics::Statistics;
 /// Steps of the progress bar.
 const STEPS: u64 = 1000;
 
-/// How often a line says how far the work is, where there is no terminal to draw a bar on: often enough for a log.
-const BETWEEN_LINES: Duration = Duration::from_secs(10);
+/// Seconds between two lines that say how far the work is, where there is no terminal to draw a bar on: often enough for a log.
+const BETWEEN_LINES: f64 = 10.0;
 
-/// How often other programs are told.
-const BETWEEN_EVENTS: Duration = Duration::from_millis(500);
+/// Seconds between two words to other programs.
+const BETWEEN_EVENTS: f64 = 0.5;
 
 /// How a user sees progress.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -49,8 +48,9 @@ pub(super) struct Bar {
     voice: Voice,
     /// On a terminal.
     bar: Option<ProgressBar>,
-    clock: Instant,
-    last: Mutex<Instant>,
+    clock: Stopwatch,
+    /// When something was said last (s).
+    last: Cell<f64>,
 }
 
 impl Bar {
@@ -64,8 +64,7 @@ impl Bar {
             }
             bar
         });
-        let now = Instant::now();
-        Self { voice, bar, clock: now, last: Mutex::new(now) }
+        Self { voice, bar, clock: Stopwatch::start(), last: Cell::new(0.0) }
     }
 
     /// Shows which share of a stage is done, and how long it may still take (s).
@@ -83,12 +82,11 @@ impl Bar {
             Voice::Bar => BETWEEN_LINES,
             Voice::Json => BETWEEN_EVENTS,
         };
-        let Ok(mut last) = self.last.lock() else { return };
-        if last.elapsed() < every {
+        let elapsed = self.clock.elapsed().wall;
+        if elapsed - self.last.get() < every {
             return;
         }
-        *last = Instant::now();
-        let elapsed = self.clock.elapsed().as_secs_f64();
+        self.last.set(elapsed);
         if self.voice == Voice::Json {
             let left =
                 left.filter(|left| left.is_finite()).map_or_else(|| "null".to_owned(), |left| format!("{left:.1}"));

@@ -12,6 +12,7 @@ use fogbow::spectrum::Spectrum;
 use fogbow::vpl::{self, Bound, Compensation, EyeSettings, LEVELS, MOST_CANDIDATES, Settings, VplRadiance};
 use fogbow::world::{Outline, World as LitWorld};
 use fogbow_std::film::Film;
+use fogbow_std::progress::Control;
 use fogbow_std::progressive;
 use fogbow_std::seed::Sequence;
 use fogbow_std::stats::{CountingMedium, CountingScene};
@@ -189,6 +190,7 @@ pub(super) const OWN: [&str; 2 + LEVELS] =
 /// A render by virtual lights, to be done with a medium of any type.
 pub(super) struct VplJob<'a> {
     pub(super) shot: Shot<'a>,
+    pub(super) control: &'a Control<'a>,
     pub(super) film: &'a mut Film,
     pub(super) arguments: &'a VplArguments,
     pub(super) pass_samples: Option<NonZero<u32>>,
@@ -215,7 +217,7 @@ impl WithMedium for VplJob<'_> {
         let outcome = progressive::render(
             self.film,
             shot.settings,
-            shot.control,
+            self.control,
             Passes { length, may_break: true },
             |pass, runner| {
                 let settings = *piloted.get_or_insert_with(|| {
