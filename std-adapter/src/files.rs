@@ -60,7 +60,22 @@ impl<E> Problem<E> {
 }
 
 /// Reads a file and makes something of its bytes.
-pub(crate) fn load<T, E>(path: &Path, decode: impl FnOnce(&[u8]) -> Result<T, E>) -> Result<T, FileError<E>> {
+///
+/// # Errors
+/// What the system says, or what is wrong with the bytes.
+///
+/// ```
+/// use fogbow::cache::{RadianceCaches, Settings};
+/// use fogbow_std::files::{load, write};
+/// let file = std::env::temp_dir().join("fogbow-std-caches.fog");
+/// write(&file, &RadianceCaches::new(Settings::default()).to_bytes(7))?;
+/// let mut caches = RadianceCaches::new(Settings::default());
+/// load(&file, |bytes| caches.read(bytes, 7))?;
+/// assert!(load(&file, |bytes| caches.read(bytes, 8)).is_err());
+/// # std::fs::remove_file(&file)?;
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn load<T, E>(path: &Path, decode: impl FnOnce(&[u8]) -> Result<T, E>) -> Result<T, FileError<E>> {
     let bytes = read(path).map_err(Problem::Io).and_then(|bytes| bytes.ok_or(Problem::NoFile));
     bytes.and_then(|bytes| decode(&bytes).map_err(Problem::Content)).map_err(|problem| problem.of(path))
 }
@@ -69,14 +84,6 @@ pub(crate) fn load<T, E>(path: &Path, decode: impl FnOnce(&[u8]) -> Result<T, E>
 ///
 /// # Errors
 /// What the system says.
-///
-/// ```
-/// let file = std::env::temp_dir().join("fogbow-std-files-write");
-/// fogbow_std::files::write(&file, b"all of it")?;
-/// assert_eq!(std::fs::read(&file)?, b"all of it");
-/// # std::fs::remove_file(&file)?;
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
 pub fn write(path: &Path, bytes: &[u8]) -> Result<(), FileError<Infallible>> {
     save(path, bytes)
 }

@@ -2,14 +2,12 @@
 //!
 //! | module | holds |
 //! |---|---|
-//! | [`files`] | what can be wrong with a file |
+//! | [`files`] | files of caches and grids, and what can be wrong with a file |
 //! | [`film`] | sums of samples per pixel, in named layers; pictures |
 //! | [`seed`] | the random numbers of each pixel and sample: independent, or low-discrepancy |
 //! | [`tiles`] | parallel rendering, the same bits for any number of threads |
 //! | [`progress`] | progress, cancellation |
-//! | [`covariance`] | files of covariance grids |
 //! | [`progressive`] | pictures in passes: photon beams, virtual lights |
-//! | [`radiance_cache`] | files of radiance caches |
 //! | [`threads`] | the one driver: runs any work in rounds on threads |
 //! | [`image`] | PNG, PFM and (feature `exr`, on by default) OpenEXR files |
 //! | [`stats`] | the clock, queries of the world |
@@ -39,13 +37,11 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-pub mod covariance;
 pub mod files;
 pub mod film;
 pub mod image;
 pub mod progress;
 pub mod progressive;
-pub mod radiance_cache;
 pub mod seed;
 pub mod stats;
 pub mod threads;

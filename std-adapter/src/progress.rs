@@ -5,7 +5,7 @@ use core::sync::atomic::{AtomicBool, Ordering};
 use core::time::Duration;
 
 use crate::stats::Stopwatch;
-use crate::tiles::Watched;
+use crate::tiles::Watch;
 
 /// How far a render is.
 ///
@@ -71,7 +71,7 @@ pub struct Control<'a> {
     pub progress: Option<&'a dyn Fn(&Progress)>,
     /// Called by the thread that renders after every batch of jobs, some milliseconds apart, with the picture as it is, and once at the end,
     /// with `true`: to show it, or to save it by [`Tiles::to_bytes`](fogbow::picture::Tiles::to_bytes).
-    pub watch: Option<&'a dyn Fn(&Watched, bool)>,
+    pub watch: Option<Watch<'a>>,
     /// What [`Tiles::to_bytes`](fogbow::picture::Tiles::to_bytes) has saved, and its tag: the picture goes on from there, to the same bits.
     pub resume: Option<(&'a [u8], u64)>,
 }

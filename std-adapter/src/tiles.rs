@@ -89,12 +89,6 @@ pub enum RenderError {
     Resume(PictureBytesError),
 }
 
-impl From<PictureBytesError> for RenderError {
-    fn from(error: PictureBytesError) -> Self {
-        Self::Resume(error)
-    }
-}
-
 impl From<ThreadsError> for RenderError {
     fn from(error: ThreadsError) -> Self {
         Self::Threads(error)
@@ -185,6 +179,9 @@ pub struct Passes {
 /// ```
 pub type Watched = Tiles<'static, Sequence, Counters>;
 
+/// Is shown the picture, and whether the render ends with it.
+pub type Watch<'a> = &'a dyn Fn(&Watched, bool);
+
 /// An integrand whose queries of the world are counted.
 struct Counted<F>(F);
 
@@ -240,7 +237,7 @@ impl<'a> Render<'a> {
         };
         let before = film.total_count();
         let tiles = match control.resume {
-            Some((bytes, tag)) => Tiles::read(of, settings.sequence, tag, bytes)?,
+            Some((bytes, tag)) => Tiles::read(of, settings.sequence, tag, bytes).map_err(RenderError::Resume)?,
             None => {
                 let (sums, counts) = film.take();
                 Tiles::of(of, settings.sequence, sums, counts)
@@ -269,23 +266,16 @@ impl<'a> Render<'a> {
         self.tiles.as_ref().map_or(0, Tiles::least_count)
     }
 
-    /// Takes every pixel to `until` samples; whether it was not stopped.
-    fn pass<F>(&mut self, until: u32, integrand: &Counted<F>) -> bool
-    where
-        F: Fn(&Sample<'_>, &mut SampleRng, &mut [Spectrum]) + Sync,
-    {
-        let Some(tiles) = &mut self.tiles else { return false };
-        tiles.begin(until);
-        self.run_pass(integrand)
-    }
-
-    /// Takes the pass at hand to its end; whether it was not stopped.
-    fn run_pass<F>(&mut self, integrand: &Counted<F>) -> bool
+    /// Takes every pixel to `until` samples, or without that the pass at hand to its end; whether it was not stopped.
+    fn pass<F>(&mut self, until: Option<u32>, integrand: &Counted<F>) -> bool
     where
         F: Fn(&Sample<'_>, &mut SampleRng, &mut [Spectrum]) + Sync,
     {
         let control = self.control;
         let Some(tiles) = &mut self.tiles else { return false };
+        if let Some(until) = until {
+            tiles.begin(until);
+        }
         let mut before = tiles.counts().samples;
         let reporter = &mut self.reporter;
         let ran = run(tiles, integrand, &self.threads, self.control, None, |tiles| {
@@ -315,11 +305,7 @@ impl<'a> Render<'a> {
         }
         loop {
             let before = self.reporter.elapsed();
-            if self.control.is_cancelled() {
-                return Reason::Cancelled;
-            }
-            let is_whole = if is_begun { self.run_pass(&integrand) } else { self.pass(until, &integrand) };
-            if !is_whole {
+            if self.control.is_cancelled() || !self.pass((!is_begun).then_some(until), &integrand) {
                 return Reason::Cancelled;
             }
             is_begun = false;
@@ -364,7 +350,7 @@ impl<'a> Render<'a> {
             let mut until = if passes.may_break && settings.time.is_some() { done + 1 } else { end };
             loop {
                 let (from, start) = (self.done(), self.reporter.elapsed());
-                if !self.pass(until, &integrand) {
+                if !self.pass(Some(until), &integrand) {
                     return Ok(Reason::Cancelled);
                 }
                 let now = self.reporter.elapsed();

@@ -19,7 +19,7 @@ use fogbow::storage::Chunk;
 use fogbow::surface::Surface;
 use fogbow::work::finish;
 use fogbow::world::World;
-use fogbow_std::radiance_cache::{load, save};
+use fogbow_std::files::{self, FileError};
 use fogbow_tests::hosts::Ball;
 use proptest::prelude::*;
 
@@ -140,6 +140,12 @@ proptest! {
         }
         prop_assert!(read(&bytes, 0).is_err());
     }
+}
+
+/// The caches in a file.
+fn load(file: &Path, settings: Settings, tag: u64) -> Result<RadianceCaches<'static>, FileError<CachesError>> {
+    let mut caches = RadianceCaches::new(settings);
+    files::load(file, |bytes| caches.read(bytes, tag)).map(|()| caches)
 }
 
 #[test]
@@ -332,7 +338,7 @@ fn all_caches_come_back_from_a_file() {
     let folder = Folder::new("whole");
     let (file, caches) = (folder.path("caches"), caches());
     for _ in 0..2 {
-        save(&file, &caches, TAG).unwrap();
+        files::write(&file, &caches.to_bytes(TAG)).unwrap();
         let copy = load(&file, settings(), TAG).unwrap();
         for kind in Kind::ALL {
             assert!(kind == Kind::Single || !caches.records(kind).is_empty(), "{kind:?}");
@@ -348,7 +354,7 @@ fn all_caches_come_back_from_a_file() {
 fn files_damaged_anywhere_are_refused() {
     let folder = Folder::new("damaged");
     let file = folder.path("caches");
-    save(&file, &caches(), TAG).unwrap();
+    files::write(&file, &caches().to_bytes(TAG)).unwrap();
     let whole = std::fs::read(&file).unwrap();
     for at in 0..whole.len() {
         for change in [1, 0x80, 0xff] {
@@ -379,7 +385,7 @@ fn files_damaged_anywhere_are_refused() {
 fn files_for_something_else_are_refused() {
     let folder = Folder::new("other");
     let file = folder.path("caches");
-    save(&file, &caches(), TAG).unwrap();
+    files::write(&file, &caches().to_bytes(TAG)).unwrap();
     assert!(refusal(&file, settings(), TAG + 1).contains("something else"));
     let changed = |change: fn(&mut Effort)| {
         let mut other = settings();
@@ -404,8 +410,8 @@ fn what_is_no_file_is_refused() {
     let folder = Folder::new("none");
     assert!(refusal(&folder.0, settings(), TAG).contains("is not a file"));
     assert!(refusal(&folder.path("none"), settings(), TAG).contains("No such file"));
-    let error = save(&folder.0, &caches(), TAG).unwrap_err().to_string();
+    let error = files::write(&folder.0, &caches().to_bytes(TAG)).unwrap_err().to_string();
     assert!(error.starts_with(&format!("{}: ", folder.0.display())), "{error}");
-    assert!(save(folder.path("none/caches"), &caches(), TAG).is_err());
+    assert!(files::write(&folder.path("none/caches"), &caches().to_bytes(TAG)).is_err());
     assert_eq!(std::fs::read_dir(&folder.0).unwrap().count(), 0);
 }

@@ -20,8 +20,7 @@ use fogbow::sampling::Generator;
 use fogbow::spectrum::Spectrum;
 use fogbow::surface::Surface;
 use fogbow::world::World;
-use fogbow_std::covariance::{load, save};
-use fogbow_std::files::Problem;
+use fogbow_std::files::{FileError, Problem, load, write};
 use fogbow_std::progress::Control;
 use fogbow_std::threads::{self, Threads};
 use fogbow_tests::analytic::mean_and_error;
@@ -91,6 +90,11 @@ fn bits(grid: &CovarianceGrid<'_>) -> Vec<[u32; 7]> {
     grid.view().voxels().iter().map(voxel).collect()
 }
 
+/// The grid in a file.
+fn read_file(file: &std::path::Path) -> Result<CovarianceGrid<'static>, FileError<GridBytesError>> {
+    load(file, |all| bytes::read(all, TAG, fogbow::storage::List::default()))
+}
+
 #[test]
 fn one_two_and_seven_threads_fill_the_same_bits() {
     let expected = filled(1, 0);
@@ -120,14 +124,14 @@ impl Drop for File {
 #[test]
 fn a_file_gives_the_same_bits_back() {
     let (file, grid) = (File::new("same"), filled(0, 5));
-    save(&file.0, &grid, TAG).unwrap();
-    let copy = load(&file.0, TAG).unwrap();
+    write(&file.0, &grid.to_bytes(TAG)).unwrap();
+    let copy = read_file(&file.0).unwrap();
     assert!(bits(&copy) == bits(&grid) && copy.view().lattice() == grid.view().lattice());
     assert_eq!(copy.view().paths(), 3001);
     // Written again, the file is the same.
-    let before = std::fs::read(&file.0).unwrap();
-    save(&file.0, &copy, TAG).unwrap();
-    assert!(std::fs::read(&file.0).unwrap() == before);
+    let before = std::fs::read_file(&file.0).unwrap();
+    write(&file.0, &copy.to_bytes(TAG)).unwrap();
+    assert!(std::fs::read_file(&file.0).unwrap() == before);
 }
 
 /// Sums of variances that are 0 but for rounding: what a fill writes must be readable.
@@ -235,7 +239,7 @@ fn broken_bytes_are_refused_with_the_reason() {
         assert_eq!(read(&bytes).unwrap_err(), expected, "{name}");
         assert!(!expected.to_string().is_empty());
         std::fs::write(&file.0, &bytes).unwrap();
-        let error = load(&file.0, TAG).unwrap_err();
+        let error = read_file(&file.0).unwrap_err();
         assert!(matches!(error.problem, Problem::Content(found) if found == expected), "{name}: {error}");
         assert!(error.to_string().contains(&expected.to_string()));
     }
@@ -246,11 +250,11 @@ fn broken_bytes_are_refused_with_the_reason() {
 
 #[test]
 fn files_that_are_none_are_refused() {
-    let missing = load(File::new("missing").0.as_path(), TAG).unwrap_err();
+    let missing = read_file(&File::new("missing").0).unwrap_err();
     assert!(matches!(&missing.problem, Problem::Io(e) if e.kind() == std::io::ErrorKind::NotFound), "{missing}");
-    let folder = load(std::env::temp_dir(), TAG).unwrap_err();
+    let folder = read_file(&std::env::temp_dir()).unwrap_err();
     assert!(matches!(folder.problem, Problem::NoFile), "{folder}");
-    let nowhere = save(File::new("no").0.join("where"), &filled(1, 0), TAG).unwrap_err();
+    let nowhere = write(&File::new("no").0.join("where"), &filled(1, 0).to_bytes(TAG)).unwrap_err();
     assert!(matches!(nowhere.problem, Problem::Io(_)), "{nowhere}");
 }
 

@@ -112,6 +112,31 @@ pub fn byte_count(lattice: &Lattice) -> usize {
     HEADER_BYTES + lattice.cell_count() * size_of::<Voxel>()
 }
 
+#[cfg(feature = "alloc")]
+impl CovarianceGrid<'_> {
+    /// The bytes that [`write()`] writes.
+    ///
+    /// ```
+    /// use fogbow::covariance::{Fill, Settings, bytes};
+    /// use fogbow::math::{Bounds, Vec3};
+    /// use fogbow::storage::List;
+    /// let empty = Fill::new(Settings::new(Bounds { min: Vec3::ZERO, max: Vec3::ONE }))?.finish();
+    /// let all = empty.to_bytes(7);
+    /// assert_eq!(bytes::read(&all, 7, List::default())?.view().paths(), 0);
+    /// assert!(bytes::read(&all, 8, List::default()).is_err());
+    /// # Ok::<(), Box<dyn core::error::Error>>(())
+    /// ```
+    #[must_use]
+    pub fn to_bytes(&self, tag: u64) -> alloc::vec::Vec<u8> {
+        let mut all = alloc::vec::Vec::with_capacity(byte_count(self.view().lattice()));
+        let Ok(()) = write(&self.view(), tag, |part| {
+            all.extend_from_slice(part);
+            Ok::<(), core::convert::Infallible>(())
+        });
+        all
+    }
+}
+
 /// Writes a grid to `sink`, part by part.
 ///
 /// # Errors

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Arg, Args, ValueEnum};
 use fogbow::bytes::Crc;
-use fogbow::covariance::bytes::GridBytesError;
+use fogbow::covariance::bytes::{self, GridBytesError};
 use fogbow::covariance::{
     AdaptiveSteps, CovarianceGrid, EVEN_STEP, Fill, GridView, LEAST_STEP, LONGEST_STEP, Rule, STEP_COUNT, Settings,
 };
@@ -12,8 +12,8 @@ use fogbow::host::Medium;
 use fogbow::light::Lights;
 use fogbow::math::Ray;
 use fogbow::path;
-use fogbow_std::covariance::{load, save};
-use fogbow_std::files::Problem;
+use fogbow::storage::List;
+use fogbow_std::files::{Problem, load, write};
 use fogbow_std::progress::Control;
 use fogbow_std::threads::{self, Ending, Threads};
 
@@ -140,12 +140,14 @@ impl WithMedium for GridJob<'_> {
         let (arguments, statistics) = (self.arguments, self.statistics);
         let tag = arguments.tag(self.scene, &self.paths)?;
         let grid = if let Some(file) = &arguments.grid_in {
-            statistics.time("read grid", || load(file, tag)).map_err(|error| match error.problem {
-                Problem::Content(GridBytesError::Tag { .. }) => {
-                    format!("{}: was made for another scene, or with another --max-depth", file.display())
-                }
-                _ => error.to_string(),
-            })?
+            statistics.time("read grid", || load(file, |all| bytes::read(all, tag, List::default()))).map_err(
+                |error| match error.problem {
+                    Problem::Content(GridBytesError::Tag { .. }) => {
+                        format!("{}: was made for another scene, or with another --max-depth", file.display())
+                    }
+                    _ => error.to_string(),
+                },
+            )?
         } else {
             let world = fogbow::world::World { medium, scene: self.world, lights: self.lights };
             let preset = Settings::for_outline(&self.world.outline(&world));
@@ -166,7 +168,7 @@ impl WithMedium for GridJob<'_> {
             fill.finish()
         };
         if let Some(file) = &arguments.grid_out {
-            statistics.time("write grid", || save(file, &grid, tag))?;
+            statistics.time("write grid", || write(file, &grid.to_bytes(tag)))?;
         }
         statistics.bytes.push(("covariance grid".to_owned(), grid.bytes() as u64));
         Ok(grid)

@@ -18,10 +18,9 @@ use fogbow::picture::LEAST_SAMPLES;
 use fogbow::sh;
 use fogbow::work::Rounds;
 use fogbow::world::{Outline, World as LitWorld};
-use fogbow_std::files::Problem;
+use fogbow_std::files::{self, Problem};
 use fogbow_std::film::Film;
 use fogbow_std::progress::Control;
-use fogbow_std::radiance_cache as files;
 use fogbow_std::stats::{CountingMedium, CountingScene, Seconds, Stopwatch};
 use fogbow_std::threads::{self, Ending, Threads};
 use fogbow_std::tiles::{self, Outcome};
@@ -113,7 +112,8 @@ impl CacheArguments {
 
     fn load(&self, settings: cache::Settings, tag: u64) -> Result<RadianceCaches<'static>, String> {
         let Some(file) = &self.cache_in else { return Ok(RadianceCaches::new(settings)) };
-        files::load(file, settings, tag).map_err(|error| match error.problem {
+        let mut caches = RadianceCaches::new(settings);
+        files::load(file, |bytes| caches.read(bytes, tag)).map(|()| caches).map_err(|error| match error.problem {
             Problem::Content(CachesError::Tag { .. }) => {
                 format!("{}: was made for another scene, or with another --max-depth", file.display())
             }
@@ -321,7 +321,7 @@ pub(crate) struct Audited {
 
 impl CacheJob<'_> {
     fn save(&self, caches: &RadianceCaches<'static>) -> Result<(), Failure> {
-        Ok(self.arguments.cache_out.as_ref().map_or(Ok(()), |file| files::save(file, caches, self.tag))?)
+        Ok(self.arguments.cache_out.as_ref().map_or(Ok(()), |file| files::write(file, &caches.to_bytes(self.tag)))?)
     }
 
     /// What suits the world, with what the user says otherwise.

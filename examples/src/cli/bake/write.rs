@@ -1,6 +1,5 @@
 //! The files of a bake.
 
-use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
 use fogbow::bake::{ProbeGrid, bytes};
@@ -149,15 +148,6 @@ pub(super) fn keep(file: &Path, grid: &ProbeGrid<'_>, tag: u64) -> Result<(), St
     save(file, &all)
 }
 
-/// Writes a file beside the old one, which is lost only when the new one is complete.
 fn save(file: &Path, bytes: &[u8]) -> Result<(), String> {
-    let mut beside = OsString::from(file.file_name().unwrap_or_default());
-    beside.push(format!(".{}.new", std::process::id()));
-    let beside = file.with_file_name(beside);
-    let written = std::fs::write(&beside, bytes).and_then(|()| std::fs::rename(&beside, file));
-    written.map_err(|error| {
-        // It may not even be there.
-        drop(std::fs::remove_file(&beside));
-        format!("{}: cannot be written: {error}", file.display())
-    })
+    fogbow_std::files::write(file, bytes).map_err(|error| error.to_string())
 }
