@@ -129,9 +129,9 @@ fn a_file_gives_the_same_bits_back() {
     assert!(bits(&copy) == bits(&grid) && copy.view().lattice() == grid.view().lattice());
     assert_eq!(copy.view().paths(), 3001);
     // Written again, the file is the same.
-    let before = std::fs::read_file(&file.0).unwrap();
+    let before = std::fs::read(&file.0).unwrap();
     write(&file.0, &copy.to_bytes(TAG)).unwrap();
-    assert!(std::fs::read_file(&file.0).unwrap() == before);
+    assert!(std::fs::read(&file.0).unwrap() == before);
 }
 
 /// Sums of variances that are 0 but for rounding: what a fill writes must be readable.
