@@ -138,10 +138,9 @@ const SCALES = [0.12, Math.min(devicePixelRatio, 1.5)];
 let scale = Math.max(SCALES[0], Math.min(SCALES[1], 160 / Math.max(canvas.clientWidth, 160)));
 /** Set while the device is drawing; no frame begins before it is done, or they would queue up. */
 let fence = null;
-const frames = { script: [], drawn: [] };
+/** For who wants to know how the page is doing. */
+const frames = { count: 0, firstLight: undefined };
 globalThis.fogbowFrames = frames;
-
-const note = (list, value) => list.push(value) > 600 && list.shift();
 
 const mode = () => Number(document.querySelector("input[name=mode]:checked").value);
 
@@ -167,7 +166,6 @@ function frame(now) {
   if (fence && !renderer.isDrawn(fence.sync)) return void keepGoing();
   if (fence) adapt(now - fence.began, fence.isMoving);
   fence = null;
-  const began = performance.now();
   const wasWalking = now - last < 400;
   if (walk(wasWalking ? Math.min(0.25, (now - last) / 1000) : 1 / 60)) moved();
   last = now;
@@ -184,7 +182,7 @@ function frame(now) {
   if (mode() === 2 && truth.samples > 0) truth.compare(renderer.read());
   renderer.shown(truth.samples === 0 ? 0 : mode(), truth.level);
   fence = { sync: renderer.fence(), began: now, isMoving: isMoving(now) };
-  note(frames.script, performance.now() - began);
+  frames.count++;
   keepGoing();
 }
 
@@ -196,7 +194,6 @@ function keepGoing() {
 
 /** Fewer pixels where frames take long, more where they do not. */
 function adapt(milliseconds, isMoving) {
-  note(frames.drawn, milliseconds);
   if (mode() !== 0) return;
   const before = scale;
   if (milliseconds > (isMoving ? 45 : 250)) scale = Math.max(SCALES[0], scale * Math.max(0.5, Math.sqrt((isMoving ? 33 : 180) / milliseconds)));
