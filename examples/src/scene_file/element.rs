@@ -97,6 +97,19 @@ impl<'a> Element<'a> {
         self.context.sink.instead(error, name, nearest)
     }
 
+    /// The same for a whole element: any error at all, where the user allows it, is a note.
+    pub(super) fn or_instead<T>(
+        &self,
+        result: Result<T, SceneError>,
+        name: &str,
+        nearest: impl FnOnce() -> T,
+    ) -> Result<T, SceneError> {
+        match result {
+            Err(error) if self.context.sink.is_lenient => self.instead(error, name, nearest),
+            result => result,
+        }
+    }
+
     /// The value; or nothing, and the error is kept, so that reading may go on and find further ones.
     pub(super) fn keep<T>(&self, result: Result<T, SceneError>) -> Option<T> {
         self.context.sink.keep(result)

@@ -180,7 +180,12 @@ fn read_scene(scene: &Element<'_>, options: &ReadOptions) -> Result<SceneFile, S
             "integrator" => integrators.push(child),
             "sensor" => sensors.push(child),
             "medium" => media.push(child),
-            "shape" => shapes.extend(child.keep(shapes::read(&child, &mut groups)).into_iter().flatten()),
+            "shape" => shapes.extend(
+                child
+                    .keep(child.or_instead(shapes::read(&child, &mut groups), "left out", Vec::new))
+                    .into_iter()
+                    .flatten(),
+            ),
             // Those that are used are read where they are used.
             "bsdf" if !is_referred_to.contains(&child.node.id()) => {
                 if let Err(error) = materials::read(&child) {

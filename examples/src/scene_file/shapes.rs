@@ -59,7 +59,10 @@ fn read_one<'a>(plugin: &Plugin<'a>) -> Result<ShapeElement<'a>, SceneError> {
     let exterior = side(plugin, "exterior")?;
     let material = match plugin.nested("bsdf") {
         // A shape whose material is not known still tells what else is wrong with it.
-        Some(bsdf) => bsdf.keep(materials::read(&bsdf)),
+        Some(bsdf) => {
+            let grey = || materials::default_material(radiance.is_some());
+            bsdf.keep(bsdf.or_instead(materials::read(&bsdf), "a grey surface instead", grey))
+        }
         None => None,
     };
     let material = material.unwrap_or_else(|| materials::default_material(radiance.is_some()));
@@ -77,9 +80,12 @@ fn read_one<'a>(plugin: &Plugin<'a>) -> Result<ShapeElement<'a>, SceneError> {
     for (_, texture) in material.leaves().into_iter().flat_map(|leaf| &leaf.textures) {
         textures::check_attributes(texture, mesh).map_err(|reason| element.error(reason))?;
     }
-    if radiance.is_some() && material.transmits() {
-        return Err(element.error("an area light needs a bsdf that light cannot pass through"));
-    }
+    let material = if radiance.is_some() && material.transmits() {
+        let error = element.error("an area light needs a bsdf that light cannot pass through");
+        element.instead(error, "a black surface that shines instead", || materials::default_material(true))?
+    } else {
+        material
+    };
     let is_visible = material.surface != Surface::Null || material.mix.is_some();
     let shape = is_visible.then(|| Shape { geometry, is_flipped, material, radiance, line: element.line() });
     Ok(ShapeElement { element: *element, shape, container, is_inside_out, interior, exterior })

@@ -120,6 +120,13 @@ fn what_is_missing_is_replaced_by_leave_alone() {
     let replaced = lenient.notes.iter().filter(|n| n.kind == NoteKind::Replaced).count();
     assert_eq!((replaced, reasons(&lenient).as_str()), (3, ""));
     assert!(matches!(lenient.into_scene().unwrap().emitters[..], [Emitter::Constant { .. }]));
+    let text = format!(
+        r#"{HEAD}<emitter type="constant"/><shape type="blob"/><shape type="sphere"><bsdf type="velvet"/></shape></scene>"#
+    );
+    assert_eq!(read(&folder, &text, &ReadOptions::default()).errors.len(), 2);
+    let lenient = read(&folder, &text, &ReadOptions { is_lenient: true, ..ReadOptions::default() });
+    assert_eq!(lenient.notes.len(), 2, "{:?}", lenient.notes);
+    assert_eq!(lenient.into_scene().unwrap().shapes.len(), 1);
 }
 
 #[test]
