@@ -120,8 +120,8 @@ pub struct RoughPlastic {
 }
 
 impl RoughPlastic {
-    /// Of a base with a coat, whose facets are spread as `distribution` says. Takes some milliseconds: what a rough coat
-    /// lets pass is integrated here once (decision 62). Host whose colours vary change them by [`RoughPlastic::with_colours`].
+    /// Of a base with a coat, whose facets are spread as `distribution` says. Takes a tenth of a second: what a rough coat
+    /// lets pass is integrated here once (decision 62). Hosts whose colours vary change them by [`RoughPlastic::with_colours`].
     ///
     /// ```
     /// # use fogbow::{math::Vec3, spectrum::Spectrum, surface::{Distribution, Plastic, RoughPlastic, Surface}};

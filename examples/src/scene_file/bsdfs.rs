@@ -1,5 +1,8 @@
 //! Kinds of `<bsdf>` with facets, coats and metals, and what of their names is known but not read.
 
+use std::collections::HashMap;
+use std::sync::{LazyLock, Mutex, PoisonError};
+
 use fogbow::spectrum::Spectrum;
 use fogbow::surface::{
     Conductor, Distribution, Plastic, Principled, PrincipledThin, RoughConductor, RoughDielectric, RoughPlastic,
@@ -62,6 +65,9 @@ pub(super) fn read(plugin: &Plugin<'_>, share: &mut Share<'_>) -> Result<Option<
             if kind == "plastic" {
                 return Ok(Some(Surface::Plastic(plastic)));
             }
+            if kind == "pplastic" {
+                plugin.element.ignored("light is not polarised here: taken for a roughplastic");
+            }
             if plugin.get("alpha").is_some_and(|alpha| alpha.tag() == "texture") {
                 return Err(plugin
                     .element
@@ -73,7 +79,7 @@ pub(super) fn read(plugin: &Plugin<'_>, share: &mut Share<'_>) -> Result<Option<
                     .element
                     .error("rough plastic is as rough along as across: alpha_u and alpha_v differ"));
             }
-            Surface::RoughPlastic(RoughPlastic::new(plastic, distribution, u))
+            Surface::RoughPlastic(coated(plastic, distribution, u))
         }
         "principled" => Surface::Principled(principled(plugin, share)?),
         "principledthin" => Surface::PrincipledThin(principled_thin(plugin, share)?),
@@ -156,6 +162,18 @@ fn principled_thin(plugin: &Plugin<'_>, share: &mut Share<'_>) -> Result<Princip
         diff_trans,
         ..default
     })
+}
+
+/// Coats that have been integrated, by the bits of index and roughness: shapes that share a bsdf each read it.
+type Coats = HashMap<(u32, u32, bool, bool), RoughPlastic>;
+
+fn coated(plastic: Plastic, distribution: Distribution, alpha: f32) -> RoughPlastic {
+    static COATS: LazyLock<Mutex<Coats>> = LazyLock::new(Mutex::default);
+    let key = (plastic.eta.to_bits(), alpha.to_bits(), distribution == Distribution::Ggx, plastic.nonlinear);
+    let make = || RoughPlastic::new(plastic, distribution, alpha);
+    // A thread that has panicked has left nothing half done here.
+    let mut coats = COATS.lock().unwrap_or_else(PoisonError::into_inner);
+    coats.entry(key).or_insert_with(make).with_colours(plastic.diffuse, plastic.specular)
 }
 
 /// The index inside over that outside.
