@@ -357,8 +357,9 @@ const truth = {
   },
 
   add(light, [width, height]) {
-    if (this.samples === 0) this.sums = new Float32Array(light.length);
+    if (this.samples === 0) [this.sums, this.means] = [new Float32Array(light.length), []];
     light.forEach((c, i) => { this.sums[i] += c; });
+    this.means.push(light.reduce((a, b) => a + b, 0) / light.length);
     this.samples++;
     const picture = new Float32Array((light.length / 3) * 4);
     let sum = 0;
@@ -376,9 +377,12 @@ const truth = {
     let sum = 0;
     for (let i = 0; i < baked.length; i += 4) sum += baked[i] + baked[i + 1] + baked[i + 2];
     const off = sum / ((baked.length / 4) * 3) / this.level - 1;
-    const more = off >= 0 ? "brighter" : "darker";
-    this.say(`Baked light is ${Math.abs(100 * off).toFixed(1)} % ${more} on the whole (${this.samples} samples). Orange: too bright; blue: too dark, means over some pixels; full colour at half of the mean light.`);
     this.off = off;
+    const n = this.samples;
+    if (n < 4) return this.say(`The truth has ${n} sample${n > 1 ? "s" : ""} per pixel: too few to compare with.`);
+    const error = Math.sqrt(this.means.reduce((sum, mean) => sum + (mean - this.level) ** 2, 0) / (n * (n - 1))) / this.level;
+    const more = off >= 0 ? "brighter" : "darker";
+    this.say(`Baked light is ${Math.abs(100 * off).toFixed(1)} % ± ${(100 * error).toFixed(1)} % ${more} on the whole (${n} samples). Orange: too bright; blue: too dark, means over some pixels; full colour at half of the mean light.`);
   },
 
   say(text) {
