@@ -65,6 +65,17 @@ impl Picture {
         Self::decode(file, extension, bytes, true)
     }
 
+    /// How opaque the pixels of a PNG image are, in all three channels; 1 where it does not say.
+    ///
+    /// # Errors
+    /// As [`Picture::read`].
+    pub fn opacity_from_png(file: &Path, bytes: &[u8]) -> Result<Self, DataError> {
+        let image = decoded(bytes, image::ImageFormat::Png).map_err(|reason| DataError::new(file, "", reason))?;
+        let rgba = image.into_rgba32f();
+        let (width, height) = (rgba.width() as usize, rgba.height() as usize);
+        Ok(Self { width, height, pixels: rgba.pixels().map(|p| [p.0[3]; 3]).collect() })
+    }
+
     fn decode(file: &Path, extension: &str, bytes: &[u8], is_raw: bool) -> Result<Self, DataError> {
         let picture = match extension {
             "exr" => read_with_adapter(fogbow_std::image::exr::decode, bytes),
@@ -103,6 +114,13 @@ fn read_with_adapter(decode: fn(&[u8]) -> Result<Image, ErrorKind>, bytes: &[u8]
 }
 
 fn read_with_image(bytes: &[u8], format: image::ImageFormat, is_linear: bool) -> Result<Picture, String> {
+    let rgb = decoded(bytes, format)?.into_rgb32f();
+    let (width, height) = (rgb.width() as usize, rgb.height() as usize);
+    let curve = |c: f32| if is_linear { c } else { linear(c) };
+    Ok(Picture { width, height, pixels: rgb.pixels().map(|p| p.0.map(curve)).collect() })
+}
+
+fn decoded(bytes: &[u8], format: image::ImageFormat) -> Result<image::DynamicImage, String> {
     let mut reader = image::ImageReader::with_format(Cursor::new(bytes), format);
     let mut limits = image::Limits::default();
     limits.max_image_width = Some(1 << 16);
@@ -110,10 +128,7 @@ fn read_with_image(bytes: &[u8], format: image::ImageFormat, is_linear: bool) ->
     reader.limits(limits);
     let decoded = reader.decode().map_err(|e| format!("is not a usable image: {e}"))?;
     check_size(u64::from(decoded.width()), u64::from(decoded.height()))?;
-    let rgb = decoded.into_rgb32f();
-    let (width, height) = (rgb.width() as usize, rgb.height() as usize);
-    let curve = |c: f32| if is_linear { c } else { linear(c) };
-    Ok(Picture { width, height, pixels: rgb.pixels().map(|p| p.0.map(curve)).collect() })
+    Ok(decoded)
 }
 
 /// Undoes the sRGB curve.

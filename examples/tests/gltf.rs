@@ -7,7 +7,7 @@ use fogbow::math::Vec3;
 use fogbow::spectrum::Spectrum;
 use fogbow::surface::{Conductor, Distribution, Plastic, RoughConductor, RoughPlastic, Roughness, Surface};
 use fogbow_examples::scene_file::{
-    Emitter, Findings, Geometry, Matter, ReadOptions, SceneFile, fingerprint, fingerprint_with,
+    Emitter, Findings, Geometry, Matter, Mix, ReadOptions, SceneFile, fingerprint, fingerprint_with,
 };
 
 /// A folder of its own, gone when dropped.
@@ -263,6 +263,28 @@ fn metal_and_gloss_become_facets() {
     assert_eq!(surface("\"metallicFactor\":0,\"roughnessFactor\":0"), Surface::Plastic(plastic));
     // What scatters evenly has no coat.
     assert_eq!(surface("\"metallicFactor\":0"), Surface::Lambert { reflectance: colour });
+}
+
+#[test]
+fn alpha_lets_light_pass() {
+    let weight = |mode: &str, alpha: f32| {
+        let rest = format!(
+            ",\"nodes\":[{{\"mesh\":0}}],\"materials\":[{{{mode}\"pbrMetallicRoughness\":{{\"metallicFactor\":0,\"baseColorFactor\":[1,1,1,{alpha}]}}}}]"
+        );
+        let findings = read(&triangle(",\"material\":0", &rest));
+        let scene = findings.scene.unwrap_or_else(|| panic!("{:?}", findings.errors));
+        let Some(mix) = &scene.shapes[0].material.mix else { return 1.0 };
+        let Mix::Blend { weight, parts } = &**mix else { panic!("{mix:?}") };
+        assert_eq!(
+            (parts[0].surface, parts[1].surface),
+            (Surface::Null, Surface::Lambert { reflectance: Spectrum::ONE })
+        );
+        weight.mean()[0]
+    };
+    assert_eq!(weight("", 0.25), 1.0);
+    assert_eq!(weight("\"alphaMode\":\"BLEND\",", 0.25), 0.25);
+    assert_eq!(weight("\"alphaMode\":\"MASK\",", 0.25), 0.0);
+    assert_eq!(weight("\"alphaMode\":\"MASK\",\"alphaCutoff\":0.2,", 0.25), 1.0);
 }
 
 #[test]

@@ -12,6 +12,16 @@ use super::{Source, label};
 use crate::error::{SceneError, read_file};
 use crate::picture::Picture;
 
+/// What of a picture is meant.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub(super) enum Channel {
+    Colour,
+    /// Colours as they are.
+    Numbers,
+    /// How opaque it is.
+    Opacity,
+}
+
 /// All bytes of a document.
 pub(super) struct Data {
     buffers: Vec<Vec<u8>>,
@@ -107,12 +117,12 @@ impl Data {
         bytes.get(view.offset()..)?.get(..view.length())
     }
 
-    /// The picture of a texture: a colour, or raw numbers.
+    /// The picture of a texture.
     pub(super) fn picture(
         &self,
         source: &Source<'_>,
         image: &::gltf::Image<'_>,
-        is_raw: bool,
+        channel: Channel,
     ) -> Result<Picture, SceneError> {
         let element = label("image", image.index(), image.name());
         let (bytes, kind) = match image.source() {
@@ -130,8 +140,13 @@ impl Data {
             Some([0xff, 0xd8, ..]) => "jpg",
             _ => return Err(source.error(&element, format!("is neither PNG nor JPEG ({})", kind.unwrap_or_default()))),
         };
-        let decode = if is_raw { Picture::from_raw_bytes } else { Picture::from_bytes };
-        decode(source.file, extension, &bytes).map_err(|e| source.error(&element, e.reason))
+        let picture = match channel {
+            Channel::Colour => Picture::from_bytes(source.file, extension, &bytes),
+            Channel::Numbers => Picture::from_raw_bytes(source.file, extension, &bytes),
+            Channel::Opacity if extension == "png" => Picture::opacity_from_png(source.file, &bytes),
+            Channel::Opacity => Ok(Picture { width: 1, height: 1, pixels: vec![[1.0; 3]] }),
+        };
+        picture.map_err(|e| source.error(&element, e.reason))
     }
 
     /// The elements of an accessor, as `N` numbers each; whole numbers as shares of the largest where they are normalised.

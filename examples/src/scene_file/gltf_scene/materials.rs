@@ -11,10 +11,10 @@ use fogbow::surface::{
     Conductor, Distribution, Plastic, RoughConductor, RoughDielectric, RoughPlastic, Roughness, Surface,
 };
 
-use super::data::Data;
+use super::data::{Channel, Data};
 use super::{Source, label};
 use crate::picture::Picture;
-use crate::scene_file::material::{Material, Slot};
+use crate::scene_file::material::{Material, Mix, Slot};
 use crate::scene_file::notes::NoteKind;
 use crate::texture::{Texture, ToUv, Wrap};
 
@@ -58,8 +58,8 @@ impl Materials {
 struct Reader<'a> {
     source: &'a Source<'a>,
     data: &'a Data,
-    /// Pictures by their index, and whether they are raw.
-    pictures: HashMap<(usize, bool), Option<Arc<Picture>>>,
+    /// Pictures by their index and by what of them is meant.
+    pictures: HashMap<(usize, Channel), Option<Arc<Picture>>>,
 }
 
 /// Share of transmitted light, and of metal, from which a surface counts as glass or as metal.
@@ -80,13 +80,10 @@ impl Reader<'_> {
         let [r, g, b, _] = pbr.base_color_factor();
         let base = Spectrum([r, g, b]).max(Spectrum::ZERO).min(Spectrum::ONE);
         let (mut metallic, mut roughness) = (pbr.metallic_factor(), pbr.roughness_factor());
-        if let Some(texture) = pbr.metallic_roughness_texture().and_then(|info| self.texture(&info, true)) {
+        if let Some(texture) = pbr.metallic_roughness_texture().and_then(|info| self.texture(&info, Channel::Numbers)) {
             let [_, green, blue] = texture.mean().0;
             (metallic, roughness) = (metallic * blue, roughness * green);
             note(NoteKind::Replaced, "metallicRoughnessTexture: its means, everywhere");
-        }
-        if material.alpha_mode() != AlphaMode::Opaque {
-            note(NoteKind::Replaced, "alpha has no effect: it is opaque");
         }
         for (name, is_there) in [
             ("normalTexture", material.normal_texture().is_some()),
@@ -99,7 +96,7 @@ impl Reader<'_> {
         let mut texcoords = None;
         let texture = pbr.base_color_texture().and_then(|info| {
             texcoords = Some(info.tex_coord());
-            self.texture(&info, false)
+            self.texture(&info, Channel::Colour)
         });
         let mean = texture.as_ref().map_or(Spectrum::ONE, |texture| texture.mean());
         let colour = base * mean.max(Spectrum::ZERO).min(Spectrum::ONE);
@@ -144,7 +141,7 @@ impl Reader<'_> {
             note(NoteKind::Replaced, "half a metal: what it is mostly");
         }
         let emitted = Spectrum(material.emissive_factor()) * material.emissive_strength().unwrap_or(1.0);
-        let emitted = match material.emissive_texture().and_then(|info| self.texture(&info, false)) {
+        let emitted = match material.emissive_texture().and_then(|info| self.texture(&info, Channel::Colour)) {
             Some(texture) => {
                 note(NoteKind::Replaced, "emissiveTexture: its mean, everywhere");
                 emitted * texture.mean().max(Spectrum::ZERO)
@@ -155,22 +152,65 @@ impl Reader<'_> {
         // What shines and lets light pass is something no light here is.
         let is_glass = transmission > MOSTLY;
         let surface = if radiance.is_some() && is_glass { Surface::BLACK } else { surface };
+        let whole = Material { is_two_sided, textures: textures.into_iter().collect(), ..Material::plain(surface) };
+        let opacity = self.opacity(material, &mut texcoords);
+        let surface = match opacity {
+            Some(_) if radiance.is_some() => {
+                note(NoteKind::Replaced, "alpha of what shines: it is opaque");
+                whole
+            }
+            Some(weight) => {
+                let parts = [Material::plain(Surface::Null), whole];
+                Material { mix: Some(Arc::new(Mix::Blend { weight, parts })), ..Material::plain(surface) }
+            }
+            None => whole,
+        };
         Ready {
-            surface: Material { is_two_sided, textures: textures.into_iter().collect(), ..Material::plain(surface) },
+            surface,
             radiance,
             attenuation: material.volume().filter(|_| is_glass).and_then(|volume| attenuation(&volume)),
             texcoords,
         }
     }
 
+    /// How opaque it is, where it is not everywhere.
+    fn opacity(&mut self, material: &::gltf::Material<'_>, texcoords: &mut Option<u32>) -> Option<Arc<Texture>> {
+        let pbr = material.pbr_metallic_roughness();
+        let cutoff = match material.alpha_mode() {
+            AlphaMode::Opaque => return None,
+            AlphaMode::Mask => Some(material.alpha_cutoff().unwrap_or(0.5)),
+            AlphaMode::Blend => None,
+        };
+        let factor = pbr.base_color_factor()[3].clamp(0.0, 1.0);
+        let weight = |alpha: f32| match cutoff {
+            Some(cutoff) => f32::from(u8::from(alpha * factor >= cutoff)),
+            None => alpha * factor,
+        };
+        let texture = pbr.base_color_texture().and_then(|info| {
+            *texcoords = Some(info.tex_coord());
+            self.texture(&info, Channel::Opacity)
+        });
+        let texture = match texture.as_deref() {
+            Some(Texture::Bitmap { picture, wrap, is_smooth, to_uv }) => {
+                let pixels = picture.pixels.iter().map(|p| p.map(weight)).collect();
+                let picture = Arc::new(Picture { width: picture.width, height: picture.height, pixels });
+                // What is there or not has no values between.
+                let is_smooth = *is_smooth && cutoff.is_none();
+                Texture::Bitmap { picture, wrap: *wrap, is_smooth, to_uv: *to_uv }
+            }
+            _ => Texture::Constant(Spectrum::splat(weight(1.0))),
+        };
+        (texture.mean() != Spectrum::ONE).then(|| Arc::new(texture))
+    }
+
     /// A texture; `None`, and a kept error, where its picture cannot be read.
-    fn texture(&mut self, info: &::gltf::texture::Info<'_>, is_raw: bool) -> Option<Arc<Texture>> {
+    fn texture(&mut self, info: &::gltf::texture::Info<'_>, channel: Channel) -> Option<Arc<Texture>> {
         let texture = info.texture();
         let image = texture.source();
         let (source, data) = (self.source, self.data);
-        let picture = self.pictures.entry((image.index(), is_raw));
+        let picture = self.pictures.entry((image.index(), channel));
         let picture =
-            picture.or_insert_with(|| source.sink.keep(data.picture(source, &image, is_raw)).map(Arc::new)).clone()?;
+            picture.or_insert_with(|| source.sink.keep(data.picture(source, &image, channel)).map(Arc::new)).clone()?;
         let sampler = texture.sampler();
         let wrap = match sampler.wrap_s() {
             WrappingMode::Repeat => Wrap::Repeat,
