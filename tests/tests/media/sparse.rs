@@ -210,3 +210,42 @@ fn tables_that_do_not_fit_are_refused() {
     assert_eq!(refused(&|s| s.size = [140, 9, 5]), Some(MediumError::Border));
     assert_eq!(refused(&|s| s.cells[(4 * 8 + 4) * 8 + 7] = f32::MAX), Some(MediumError::Coefficients));
 }
+
+#[test]
+#[ignore = "prints times"]
+fn speed_of_sparse_and_dense_grids() {
+    let mut rng = Generator::new(9);
+    let n = 64_u32;
+    let size = [n; 3];
+    let values: Vec<f32> = (0..n * n * n)
+        .map(|i| {
+            let at = [i % n, i / n % n, i / n / n].map(|c| (c as f32 + 0.5) / (0.5 * n as f32) - 1.0);
+            let r = (at[0] * at[0] + at[1] * at[1] + at[2] * at[2]).sqrt();
+            if r > 0.97 { 0.0 } else { (1.3 * (1.0 - r)).clamp(0.0, 1.0) * 20.0 }
+        })
+        .collect();
+    let mut sparse = Sparse::new(size, &values);
+    let mut voxels = Voxels::new(size, Affine3::IDENTITY, |i| values[i]);
+    let (sparse, dense) = (sparse.grid(Affine3::IDENTITY).unwrap(), voxels.grid());
+    let points: Vec<Vec3> = (0..100_000).map(|_| Vec3::splat(0.5) + point(&mut rng, 0.5)).collect();
+    let rays: Vec<Ray> = points.iter().map(|p| Ray::new(*p, direction(&mut rng))).collect();
+    fn time(name: &str, medium: &impl Medium, points: &[Vec3], rays: &[Ray]) {
+        let mut best = [f64::INFINITY; 2];
+        let mut sum = 0.0;
+        for _ in 0..12 {
+            let start = std::time::Instant::now();
+            for p in points {
+                sum += medium.extinction(*p)[0];
+            }
+            best[0] = best[0].min(start.elapsed().as_secs_f64());
+            let start = std::time::Instant::now();
+            for r in rays {
+                sum += medium.majorant_segment(r, 0.0).majorant[0];
+            }
+            best[1] = best[1].min(start.elapsed().as_secs_f64());
+        }
+        println!("{name}: look-up {:.1} ns, segment {:.1} ns ({sum})", best[0] * 1e4, best[1] * 1e4);
+    }
+    time("dense", &dense, &points, &rays);
+    time("sparse", &sparse, &points, &rays);
+}
