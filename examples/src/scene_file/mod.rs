@@ -21,7 +21,7 @@
 //! [`Note`]; anything else is a [`SceneError`]: nothing is skipped in silence.
 //!
 //! Of glTF are read: nodes with their transforms, triangles with normals and one set of texture coordinates, perspective cameras, base
-//! colour and emission (`KHR_materials_emissive_strength`), textures of base colour (PNG, JPEG; `KHR_texture_transform`), metal and glass
+//! colour, alpha and emission (`KHR_materials_emissive_strength`), their textures (PNG, JPEG; `KHR_texture_transform`), metal, gloss and glass
 //! (`KHR_materials_transmission`, `volume`, `ior`), and points, spots and suns of `KHR_lights_punctual`. Fog stands in a TOML file
 //! beside the scene, `SCENE.fog.toml`: boxes, balls, height fog, grids, and a sky.
 
