@@ -147,7 +147,7 @@ fn principled_thin(plugin: &Plugin<'_>, share: &mut Share<'_>) -> Result<Princip
     let diff_trans = if is_number {
         plugin.number_in("diff_trans", 0.0, 0.0..=2.0)? as f32
     } else {
-        2.0 * part(share, "diff_trans", 0.0, Slot::DiffTrans)?
+        part(share, "diff_trans", 0.0, Slot::DiffTrans)?
     };
     Ok(PrincipledThin {
         base_color: share("base_color", default.base_color, Slot::Diffuse)?,

@@ -85,7 +85,7 @@ pub enum Slot {
     Clearcoat,
     /// [`Principled::clearcoat_gloss`].
     ClearcoatGloss,
-    /// Half of [`PrincipledThin::diff_trans`].
+    /// [`PrincipledThin::diff_trans`], in [0, 2].
     DiffTrans,
 }
 
@@ -95,6 +95,7 @@ impl Slot {
         let share = value.max(Spectrum::ZERO).min(Spectrum::ONE);
         let number = luminance(share);
         match (self, surface) {
+            (Self::DiffTrans, Surface::PrincipledThin(sheet)) => sheet.diff_trans = luminance(value).clamp(0.0, 2.0),
             (slot, Surface::Principled(body)) => slot.put_in_body(body, share, number),
             (slot, Surface::PrincipledThin(sheet)) => slot.put_in_sheet(sheet, share, number),
             (slot @ (Self::Alpha | Self::AlphaU | Self::AlphaV), surface) => {
@@ -172,9 +173,8 @@ impl Slot {
             Self::Sheen => sheet.sheen = number,
             Self::SheenTint => sheet.sheen_tint = number,
             Self::Flatness => sheet.flatness = number,
-            Self::DiffTrans => sheet.diff_trans = 2.0 * number,
             Self::Specular | Self::Transmitted | Self::Alpha | Self::AlphaU | Self::AlphaV => {}
-            Self::Metallic | Self::Clearcoat | Self::ClearcoatGloss => {}
+            Self::Metallic | Self::Clearcoat | Self::ClearcoatGloss | Self::DiffTrans => {}
         }
     }
 }
