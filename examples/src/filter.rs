@@ -1,8 +1,9 @@
 //! Reconstruction filters: how much of what is seen near a pixel counts for it.
 //!
-//! Filters are sampled (Ernst et al. 2006, *Filter importance sampling*): a sample of a pixel looks through a point drawn in proportion to the absolute
-//! value of the filter around the pixel's centre, and counts with its sign times a constant. So a film keeps nothing but sums of the samples of
-//! each pixel; films of one scene can be added, and no pixel depends on the samples of another. Decision 59.
+//! Filters are sampled (Ernst et al. 2006, *Filter importance sampling*): a sample of a pixel looks through a point drawn in
+//! proportion to the absolute value of the filter around the pixel's centre, and counts with its sign times a constant. So a film
+//! keeps nothing but sums of the samples of each pixel; films of one scene can be added, and no pixel depends on the samples of
+//! another. Decision 59.
 
 use core::f64::consts::PI;
 
@@ -242,8 +243,8 @@ mod tests {
         }
     }
 
-    /// Black left of 8.3 on a film 16 pixels wide, white right of it: pixels 5 to 10 as Mitsuba 3.9.1 renders them (`llvm_ad_rgb`, 2 million
-    /// samples a pixel; standard error 0.0002).
+    /// Black left of 8.3 on a film 16 pixels wide, white right of it: pixels 5 to 10 as Mitsuba 3.9.1 renders them
+    /// (`llvm_ad_rgb`, 2 million samples a column; standard error 0.0002).
     #[test]
     fn an_edge_looks_as_in_mitsuba() {
         let due: [(Filter, [f64; 6]); 6] = [

@@ -1,9 +1,9 @@
 //! `<spectrum>`: light by wavelength, as the red, green and blue that everything here computes with.
 //!
-//! What Mitsuba 3 does in its RGB mode: the spectrum, times that of D65 where it says how much of light comes back or is scattered, is weighed with the
-//! CIE 1931 colour-matching functions and turned into linear sRGB. A number by itself is grey where light is reflected; as light it is an
-//! even spectrum, which is redder than white: (1.205, 0.948, 0.909). Spectra that Mitsuba evaluates in its spectral mode only
-//! (`blackbody`, `regular`, `irregular`) are weighed in the same way.
+//! What Mitsuba 3 does in its RGB mode: the spectrum, times that of D65 where it says how much of light comes back or is
+//! scattered, is weighed with the CIE 1931 colour-matching functions and turned into linear sRGB. A number by itself is grey
+//! where light is reflected; as light it is an even spectrum, which is redder than white: (1.205, 0.948, 0.909). Spectra that
+//! Mitsuba evaluates in its spectral mode only (`blackbody`, `regular`, `irregular`) are weighed in the same way.
 
 use fogbow::spectrum::Spectrum;
 

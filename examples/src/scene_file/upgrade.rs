@@ -1,7 +1,7 @@
 //! Files of Mitsuba 0.5 and 0.6, written as Mitsuba 3 would have them.
 //!
-//! Names in camelCase become snake_case and some properties new ones, as Mitsuba 3 does itself. Beyond that, plugins that were renamed or whose
-//! successor means the same get its name, and three numbers in a `<spectrum>` are a colour.
+//! Names in camelCase become snake_case and some properties new ones, as Mitsuba 3 does itself. Beyond that, plugins that were
+//! renamed or whose successor means the same get its name, and three numbers in a `<spectrum>` are a colour.
 
 use super::tree::{Attribute, Node, NodeId, Tree};
 
@@ -11,7 +11,7 @@ pub(super) fn element(node: &mut Node) {
         node.set("name", name);
     }
     match node.tag.as_str() {
-        "lookAt" | "lookAt_" => node.tag = "lookat".to_owned(),
+        "lookAt" => node.tag = "lookat".to_owned(),
         "srgb" => {
             // Written as #rrggbb or as three numbers, both with the sRGB curve.
             if let Some(value) = node.attribute("value").and_then(linear) {
@@ -47,7 +47,6 @@ fn successor(tag: &str, kind: &str) -> Option<&'static str> {
         ("film", "ldrfilm" | "tiledhdrfilm" | "mfilm") => "hdrfilm",
         ("sampler", "halton" | "hammersley" | "sobol") => "independent",
         ("texture", "gridtexture") => "checkerboard",
-        ("rfilter", "catmullrom") => "catmullrom",
         _ => return None,
     })
 }
