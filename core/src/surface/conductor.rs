@@ -39,7 +39,7 @@ impl Conductor {
     /// # use fogbow::{spectrum::Spectrum, surface::Conductor};
     /// let gold = Conductor { eta: Spectrum::new(0.14, 0.37, 1.44), k: Spectrum::new(3.98, 2.38, 1.60), reflectance: Spectrum::ONE };
     /// let [r, g, b] = gold.fresnel(1.0).0;   // ((n − 1)² + k²) / ((n + 1)² + k²)
-    /// assert!((r - 0.966).abs() < 1e-3 && (g - 0.805).abs() < 1e-3 && (b - 0.324).abs() < 1e-3);
+    /// assert!((r - 0.9673).abs() < 1e-3 && (g - 0.8037).abs() < 1e-3 && (b - 0.3234).abs() < 1e-3);
     /// assert!((gold.fresnel(0.0)[1] - 1.0).abs() < 1e-6);   // along the surface everything is
     /// ```
     #[inline]
