@@ -135,7 +135,7 @@ fn caches_of_anything_else_are_refused() {
         (vec!["render", SCENE, "--method", "path", "--cache-out", "b.caches"], &["--method radiance-cache"]),
         (
             vec!["render", SCENE, "--max-depth", "5", "--cache-out", "b.caches"],
-            &["--cache-out need radiance caching", "any depth", "--method radiance-cache"],
+            &["--cache-out has no effect with --method path", "any depth", "--method radiance-cache"],
         ),
         (vec!["records", SCENE, "--cache-in", "a.caches", "-o", "a.gif"], &["a.gif: the extension"]),
         (vec!["records", SCENE, "--cache-in", "a.png", "-o", "b.png"], &["a.png: is not a file of radiance caches"]),

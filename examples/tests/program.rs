@@ -85,7 +85,7 @@ fn every_scene_here_renders_with_layers_and_statistics() {
         }
         count += 1;
     }
-    assert_eq!(count, 17);
+    assert_eq!(count, 18);
 }
 
 #[test]

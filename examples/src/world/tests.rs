@@ -32,10 +32,11 @@ fn zoo(count: usize, rng: &mut Generator) -> String {
         } else {
             format!("<scale x=\"{}\" y=\"{}\" z=\"{}\"/>", number(0.05, 0.5), number(0.05, 0.5), number(0.05, 0.5))
         };
+        // An axis that is no unit vector would scale, too.
+        let (y, x) = number(0.0, core::f32::consts::PI).sin_cos();
         text.push_str(&format!(
-            "<shape type=\"{kind}\"><transform name=\"to_world\">{size}<rotate x=\"{}\" y=\"1\" angle=\"{}\"/>\
+            "<shape type=\"{kind}\"><transform name=\"to_world\">{size}<rotate x=\"{x}\" y=\"{y}\" angle=\"{}\"/>\
              <translate x=\"{}\" y=\"{}\" z=\"{}\"/></transform></shape>",
-            number(-1.0, 1.0),
             number(0.0, 360.0),
             number(-2.0, 2.0),
             number(-2.0, 2.0),

@@ -131,10 +131,19 @@ pub(super) fn fingerprint(file: &Path, options: &ReadOptions) -> Result<u64, Sce
     Ok(crc.value())
 }
 
+/// Length of the header of a binary file.
+const GLB_HEADER_BYTES: u32 = 12;
+
 /// The document, checked, and the bytes that a binary file holds beside it.
 fn document(source: &Source<'_>, bytes: &[u8]) -> Result<(Document, Option<Vec<u8>>), SceneError> {
     let broken = |e: ::gltf::Error| source.error("", format!("is not usable glTF: {e}"));
     let (text, blob) = if bytes.starts_with(b"glTF") {
+        // The crate subtracts the header from the length that it names.
+        let length =
+            bytes.get(8..12).map_or(0, |length| u32::from_le_bytes([length[0], length[1], length[2], length[3]]));
+        if length < GLB_HEADER_BYTES {
+            return Err(source.error("", "is not usable glTF: the file ends within its header".to_owned()));
+        }
         let parts = ::gltf::Glb::from_slice(bytes).map_err(broken)?;
         (parts.json, parts.bin.map(std::borrow::Cow::into_owned))
     } else {
