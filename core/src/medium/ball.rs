@@ -22,7 +22,7 @@ pub(super) fn mean(centre: Vec3, radius: f32, per_axis: u32, f: impl Fn(Vec3) ->
     let half = per_axis.clamp(4, MAX_PER_AXIS) / 2;
     let limit = 4 * half * half;
     let squared = |i: u32, j: u32, k: u32| [i, j, k].map(|n| (2 * n + 1) * (2 * n + 1)).iter().sum::<u32>();
-    let octant = || (0..half).flat_map(move |i| (0..half).flat_map(move |j| (0..half).map(move |k| (i, j, k))));
+    let octant = || (0..half * half * half).map(move |n| (n / (half * half), n / half % half, n % half));
     let (mut count, mut second) = (0_u32, 0_u32);
     for (i, j, k) in octant() {
         let r = squared(i, j, k);
