@@ -10,10 +10,10 @@ use super::{Folder, SCENE, said};
 
 /// Options of each method, for a picture that takes a second or so.
 const METHODS: [&[&str]; 6] = [
-    &["--method", "path", "--spp", "512"],
+    &["--method", "path", "--spp", "256"],
     &["--method", "path", "--noise", "0.06"],
-    &["--method", "radiance-cache", "--error", "0.1", "--spp", "256"],
-    &["--method", "photon-beams", "--spp", "256"],
+    &["--method", "radiance-cache", "--error", "0.1", "--spp", "128"],
+    &["--method", "photon-beams", "--spp", "128"],
     &["--method", "vpl", "--spp", "128", "--lights", "64"],
     &["--method", "march", "--spp", "128"],
 ];
@@ -154,8 +154,10 @@ fn an_old_picture_survives_whatever_stops_the_next() {
         &["--method", "vpl", "--spp", "100000000"],
         &["--method", "march", "--step", "covariance", "--spp", "100000000"],
     ];
-    for options in long {
-        for (signal, after) in [("-TERM", 60), ("-HUP", 900), ("-INT", 400), ("-KILL", 500)] {
+    let signals = [("-TERM", 60), ("-HUP", 700), ("-INT", 400), ("-KILL", 500)];
+    for (number, options) in long.into_iter().enumerate() {
+        // Two each, so that every method and every signal has its turns.
+        for (signal, after) in [signals[number % 4], signals[(number + 2) % 4]] {
             let mut child = old
                 .fogbow()
                 .args(["render", SCENE, "--size", "32x32", "-q", "-o", "a.pfm"])
