@@ -208,26 +208,33 @@ impl SphereChunk {
     }
 }
 
+/// Local coordinates of up to four boxes or cylinders: gradients and offsets.
+type LanesOfRows = [([Vec4; 3], Vec4); 3];
+
+fn lanes_of_rows(primitives: &[Primitive]) -> LanesOfRows {
+    // Unused lanes: every point has the coordinates (2, 2, 2).
+    let mut lanes = [([Vec4::ZERO; 3], Vec4::splat(2.0)); 3];
+    for (lane, primitive) in primitives.iter().take(LANES).enumerate() {
+        let (Primitive::Box { rows } | Primitive::Cylinder { rows }) = primitive else { continue };
+        for ((slot, offset), (gradient, start)) in lanes.iter_mut().zip(rows) {
+            for axis in 0..3 {
+                slot[axis][lane] = gradient[axis];
+            }
+            offset[lane] = *start;
+        }
+    }
+    lanes
+}
+
 /// Up to four boxes.
 #[derive(Debug, Clone, Copy)]
 struct BoxChunk {
-    rows: [([Vec4; 3], Vec4); 3],
+    rows: LanesOfRows,
 }
 
 impl BoxChunk {
     fn of(primitives: &[Primitive]) -> Self {
-        // Unused lanes: every point has the coordinates (2, 2, 2).
-        let mut chunk = Self { rows: [([Vec4::ZERO; 3], Vec4::splat(2.0)); 3] };
-        for (lane, primitive) in primitives.iter().take(LANES).enumerate() {
-            let Primitive::Box { rows } = primitive else { continue };
-            for ((slot, offset), (gradient, start)) in chunk.rows.iter_mut().zip(rows) {
-                for axis in 0..3 {
-                    slot[axis][lane] = gradient[axis];
-                }
-                offset[lane] = *start;
-            }
-        }
-        chunk
+        Self { rows: lanes_of_rows(primitives) }
     }
 
     #[inline(always)]
@@ -248,23 +255,12 @@ impl BoxChunk {
 /// Up to four cylinders.
 #[derive(Debug, Clone, Copy)]
 struct CylinderChunk {
-    rows: [([Vec4; 3], Vec4); 3],
+    rows: LanesOfRows,
 }
 
 impl CylinderChunk {
     fn of(primitives: &[Primitive]) -> Self {
-        // Unused lanes: every point has the coordinates (2, 2, 2).
-        let mut chunk = Self { rows: [([Vec4::ZERO; 3], Vec4::splat(2.0)); 3] };
-        for (lane, primitive) in primitives.iter().take(LANES).enumerate() {
-            let Primitive::Cylinder { rows } = primitive else { continue };
-            for ((slot, offset), (gradient, start)) in chunk.rows.iter_mut().zip(rows) {
-                for axis in 0..3 {
-                    slot[axis][lane] = gradient[axis];
-                }
-                offset[lane] = *start;
-            }
-        }
-        chunk
+        Self { rows: lanes_of_rows(primitives) }
     }
 
     #[inline(always)]
