@@ -259,3 +259,53 @@ fn mixed_materials_look_like_their_mixture() {
     let [both, alone] = [both.as_str(), alone].map(|material| seen(material, 100).0[0]);
     assert!((both - alone).abs() < 1e-5, "{both} and {alone}");
 }
+
+/// What is seen along −z of a scene, its mean.
+fn looked_through(shapes: &str, max_scatterings: u32, count: u32) -> f32 {
+    let scene =
+        SceneFile::parse(Path::new("panes.xml"), &format!("<scene version=\"3.0.0\">{REST}{shapes}</scene>")).unwrap();
+    let mut storage = Storage::new(&scene);
+    let world = World::new(&scene, &mut storage).unwrap();
+    let lights = world.lights();
+    let lit = LitWorld { medium: &fogbow::host::Empty, scene: &world, lights: lights.as_slice().into() };
+    let (settings, mut rng) = (Settings { max_scatterings, ..Settings::default() }, Generator::new(3));
+    let mut sum = 0.0;
+    for i in 0..count {
+        // A little apart, so that rays differ.
+        let origin = Vec3::new(1e-4 * i as f32 / count as f32, 0.0, 4.0);
+        sum += path::radiance(&Ray::new(origin, Vec3::NEG_Z), &lit, &settings, &mut rng).total()[0] / count as f32;
+    }
+    sum
+}
+
+/// Light goes straight through thin panes, and is not scattered by that: neither what is seen through them nor light from
+/// a lamp behind them counts for the longest path, as in Mitsuba's `volpath`.
+#[test]
+fn thin_panes_are_passed_uncounted() {
+    let pane = |z: f32, more: &str| {
+        format!(
+            "<shape type=\"rectangle\"><transform name=\"to_world\"><scale value=\"50\"/><translate z=\"{z}\"/></transform>\
+             <bsdf type=\"thindielectric\"><float name=\"int_ior\" value=\"1.5\"/><float name=\"ext_ior\" value=\"1\"/>{more}\
+             </bsdf></shape>"
+        )
+    };
+    // Of 4 % once, back and forth: 2R/(1 + R).
+    let through = 1.0_f32 - 2.0 * 0.04 / 1.04;
+    let panes = pane(2.0, "") + &pane(3.0, "");
+    let lamp = "<shape type=\"rectangle\"><emitter type=\"area\"/></shape>";
+    let seen = looked_through(&format!("{panes}{lamp}"), 0, 20_000);
+    assert!((seen - through * through).abs() < 0.01, "{seen} for {}", through * through);
+    // A wall, lit by a lamp above all panes: twice through both.
+    let wall = "<shape type=\"rectangle\"><bsdf type=\"diffuse\"><float name=\"reflectance\" value=\"1\"/></bsdf></shape>\
+                <emitter type=\"point\"><point name=\"position\" x=\"0\" y=\"0\" z=\"5\"/></emitter>";
+    let (seen, bare) = (looked_through(&format!("{panes}{wall}"), 1, 20_000), looked_through(wall, 1, 1));
+    assert!((seen / bare - through.powi(4)).abs() < 0.015, "{seen} of {bare} for {}", through.powi(4));
+    // What tints is passed by the path alone, which counts it.
+    let green = pane(2.0, "<rgb name=\"specular_transmittance\" value=\"0.5, 1, 0.5\"/>");
+    let [none, one] = [0, 1].map(|most| looked_through(&format!("{green}{lamp}"), most, 20_000));
+    assert!(none == 0.0 && (one - 0.5 * through).abs() < 0.01, "{none} {one}");
+    // An even tint takes away a part.
+    let grey = pane(2.0, "<rgb name=\"specular_transmittance\" value=\"0.5\"/>");
+    let seen = looked_through(&format!("{grey}{lamp}"), 0, 20_000);
+    assert!((seen - 0.5 * through).abs() < 0.015, "{seen}");
+}

@@ -2,7 +2,9 @@
 
 use std::sync::Arc;
 
+use fogbow::math::Vec3;
 use fogbow::spectrum::Spectrum;
+use fogbow::surface::specular::refract;
 use fogbow::surface::{Conductor, Principled, PrincipledThin, RoughConductor, RoughDielectric, Surface};
 
 use crate::texture::{self, Texture};
@@ -188,6 +190,30 @@ pub struct Chosen<'m> {
     pub surface: Surface,
     /// Whether it, or what it is mixed in, does the same on both sides.
     pub is_two_sided: bool,
+    /// A number in [0, 1), as good as random, that nothing has been decided by.
+    pub share: f32,
+}
+
+impl Chosen<'_> {
+    /// A thin pane that tints nothing as what it is to this light, which comes from `to_eye` (unit): a mirror, nothing at all, or black. What
+    /// goes straight through is not turned, so rays to lights pass as well, and it does not count as scattered (decision 77).
+    #[must_use]
+    pub fn pane(&self, normal: Vec3, to_eye: Vec3) -> Option<Surface> {
+        let Surface::ThinDielectric { eta, reflectance, transmittance } = self.surface else { return None };
+        if transmittance != Spectrum::splat(transmittance[0]) {
+            return None;
+        }
+        let facing = if normal.dot(to_eye) < 0.0 { -normal } else { normal };
+        let once = refract(to_eye, facing, eta).reflectance;
+        let reflected = 2.0 * once / (1.0 + once);
+        Some(if self.share < reflected {
+            Surface::Mirror { reflectance }
+        } else if self.share < reflected + (1.0 - reflected) * transmittance[0] {
+            Surface::Null
+        } else {
+            Surface::BLACK
+        })
+    }
 }
 
 impl Material {
@@ -225,7 +251,17 @@ impl Material {
     /// Whether a hit has to be told apart from others.
     #[must_use]
     pub fn varies(&self) -> bool {
-        !self.textures.is_empty() || self.relief.is_some() || self.mix.is_some() || self.has_tangent()
+        !self.textures.is_empty()
+            || self.relief.is_some()
+            || self.mix.is_some()
+            || self.has_tangent()
+            || self.has_panes()
+    }
+
+    /// Whether it may be a thin pane.
+    #[must_use]
+    pub fn has_panes(&self) -> bool {
+        self.leaves().iter().any(|leaf| matches!(leaf.surface, Surface::ThinDielectric { .. }))
     }
 
     /// Whether it wants to know how texture coordinates lie.
@@ -264,7 +300,7 @@ impl Material {
                     let weight = luminance(weight.at(place)).clamp(0.0, 1.0);
                     if let Some(surface) = blended(first, second, weight, place) {
                         is_two_sided |= first.is_two_sided;
-                        return Chosen { material: first, surface, is_two_sided };
+                        return Chosen { material: first, surface, is_two_sided, share };
                     }
                     if share < weight {
                         share /= weight;
@@ -277,7 +313,7 @@ impl Material {
             };
             is_two_sided |= material.is_two_sided;
         }
-        Chosen { material, surface: material.surface_at(place), is_two_sided }
+        Chosen { material, surface: material.surface_at(place), is_two_sided, share }
     }
 }
 

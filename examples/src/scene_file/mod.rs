@@ -224,6 +224,11 @@ fn read_scene(scene: &Element<'_>, options: &ReadOptions) -> Result<SceneFile, S
         }
     };
     let media = places::read(&media, &shapes, &sensor, &sensor_element, sensor_medium)?;
+    if let Some(element) = integrators.first().filter(|element| !media.is_empty() && sensor::ignores_media(element)) {
+        element.suspicious(
+            "in Mitsuba it leaves out media, which are rendered here: \"volpath\" is the one that means them",
+        );
+    }
     let file = scene.context.tree.file(scene.node).to_owned();
     let integrator = integrator.unwrap_or_default();
     let mut scene_file = SceneFile { file, integrator, sensor, media, shapes: Vec::new(), emitters };

@@ -31,6 +31,15 @@ const ALIKE: [&str; 15] = [
 const KNOWN_INTEGRATORS: &str =
     "path, volpath, volpathmis, direct, ptracer, prb, prbvolpath; moment, aov and stokes around these";
 
+/// Whether Mitsuba's integrator of that name knows no media: a picture by it shows none.
+pub(super) fn ignores_media(element: &Element<'_>) -> bool {
+    let Ok(plugin) = Plugin::new(*element) else { return false };
+    match plugin.nested("integrator") {
+        Some(inner) => ignores_media(&inner),
+        None => matches!(plugin.kind.as_str(), "path" | "direct" | "ptracer" | "prb"),
+    }
+}
+
 pub(super) fn read_integrator(element: &Element<'_>) -> Result<Integrator, SceneError> {
     let plugin = Plugin::new(*element)?;
     let kind = plugin.kind.as_str();

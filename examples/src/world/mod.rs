@@ -111,7 +111,8 @@ impl<'a> World<'a> {
         let many = (!is_few).then(|| Many::new(&pieces.primitives));
         let triangles = (!pieces.corners.is_empty()).then(|| Triangles::new(&pieces.corners));
         let bounds = build::scene_bounds(scene);
-        let has_masks = pieces.materials.iter().flat_map(Material::leaves).any(|leaf| leaf.surface == Surface::Null);
+        let is_passed = |leaf: &Material| matches!(leaf.surface, Surface::Null | Surface::ThinDielectric { .. });
+        let has_masks = pieces.materials.iter().flat_map(Material::leaves).any(is_passed);
         Ok(Self {
             scene,
             materials: pieces.materials,
@@ -241,14 +242,17 @@ impl<'a> World<'a> {
         }
         let has_tangent = material.has_tangent();
         let spot = place(&self.scene.shapes.get(part.material as usize)?.geometry, has_tangent)?;
-        let share = if material.mix.is_some() { share_of(ray, distance) } else { 0.0 };
-        let chosen = material.chosen(&spot.place, is_front, share);
+        let chosen = material.chosen(&spot.place, is_front, share_of(ray, distance));
         let normal = if chosen.is_two_sided && !is_front { -normal } else { normal };
         let mut shading = spot.normal;
         if let Some(relief) = &chosen.material.relief {
             shading = spot.bent(relief, outward, part.side, ray.direction);
         }
         let shading = if normal.dot(outward) < 0.0 { -shading } else { shading };
+        if let Some(surface) = chosen.pane(shading, -ray.direction) {
+            let side = if normal.dot(ray.direction) > 0.0 { -1.0 } else { 1.0 };
+            return Some(Hit { distance, normal: normal * side, shading: shading * side, surface, light });
+        }
         let surface = if has_tangent { spot.aligned(chosen.surface) } else { chosen.surface };
         Some(Hit { distance, normal, shading, surface, light })
     }
