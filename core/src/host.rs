@@ -3,6 +3,7 @@
 //! [`Medium`] and [`Scene`] are open sets and therefore traits: few methods, plain data in and
 //! out, usable as `&dyn`. All but the indispensable have honest defaults.
 
+mod delegate;
 pub(crate) mod passing;
 
 use glam::{Vec2, Vec3};
@@ -297,42 +298,7 @@ fn difference_step(point: Vec3, usual: f32, most: f32) -> f32 {
 }
 
 impl<M: Medium + ?Sized> Medium for &M {
-    fn properties(&self, point: Vec3) -> Properties {
-        (**self).properties(point)
-    }
-    fn majorant_segment(&self, ray: &Ray, from: f32) -> MajorantSegment {
-        (**self).majorant_segment(ray, from)
-    }
-    fn marching_segment(&self, ray: &Ray, from: f32) -> MajorantSegment {
-        (**self).marching_segment(ray, from)
-    }
-    fn extinction(&self, point: Vec3) -> Spectrum {
-        (**self).extinction(point)
-    }
-    fn extinction_with_gradient(&self, point: Vec3) -> (Spectrum, Gradient) {
-        (**self).extinction_with_gradient(point)
-    }
-    fn resolution(&self) -> f32 {
-        (**self).resolution()
-    }
-    fn gradients(&self, point: Vec3) -> Gradients {
-        (**self).gradients(point)
-    }
-    fn extinction_hessian(&self, point: Vec3) -> Hessian {
-        (**self).extinction_hessian(point)
-    }
-    fn mean_extinction(&self, centre: Vec3, radius: f32) -> Spectrum {
-        (**self).mean_extinction(centre, radius)
-    }
-    fn faces(&self, ray: &Ray, visit: &mut dyn FnMut(Face)) {
-        (**self).faces(ray, visit);
-    }
-    fn is_grey(&self) -> bool {
-        (**self).is_grey()
-    }
-    fn is_emissive(&self) -> bool {
-        (**self).is_emissive()
-    }
+    crate::delegate_medium!(self, (**self));
 }
 
 /// Where a ray meets a surface.

@@ -1,12 +1,8 @@
 //! The closed set of this module's media, for scenes that hold several kinds.
 
-use glam::Vec3;
-
 use super::{DensityGrid, Homogeneous, Noise, SparseGrid};
-use crate::host::{Face, Gradients, MajorantSegment, Medium, Properties};
-use crate::math::Ray;
+use crate::host::Medium;
 use crate::phase::Phase;
-use crate::spectrum::{Gradient, Hessian, Spectrum};
 
 /// A medium of any of the kinds made here.
 ///
@@ -29,68 +25,22 @@ pub enum AnyMedium<'a> {
     Noise(Noise),
 }
 
-macro_rules! each {
-    ($self:ident, $medium:ident => $answer:expr) => {
-        match $self {
-            Self::Homogeneous($medium) => $answer,
-            Self::Grid($medium) => $answer,
-            Self::Sparse($medium) => $answer,
-            Self::Noise($medium) => $answer,
-        }
-    };
-}
-
 impl AnyMedium<'_> {
     /// Angular law of scattering; the same everywhere in each of these media.
     #[inline]
     #[must_use]
     pub fn phase(&self) -> Phase {
-        each!(self, medium => medium.phase())
+        match self {
+            Self::Homogeneous(medium) => medium.phase(),
+            Self::Grid(medium) => medium.phase(),
+            Self::Sparse(medium) => medium.phase(),
+            Self::Noise(medium) => medium.phase(),
+        }
     }
 }
 
 impl Medium for AnyMedium<'_> {
-    #[inline]
-    fn properties(&self, point: Vec3) -> Properties {
-        each!(self, medium => medium.properties(point))
-    }
-    #[inline]
-    fn majorant_segment(&self, ray: &Ray, from: f32) -> MajorantSegment {
-        each!(self, medium => medium.majorant_segment(ray, from))
-    }
-    #[inline]
-    fn marching_segment(&self, ray: &Ray, from: f32) -> MajorantSegment {
-        each!(self, medium => medium.marching_segment(ray, from))
-    }
-    #[inline]
-    fn extinction(&self, point: Vec3) -> Spectrum {
-        each!(self, medium => medium.extinction(point))
-    }
-    #[inline]
-    fn extinction_with_gradient(&self, point: Vec3) -> (Spectrum, Gradient) {
-        each!(self, medium => medium.extinction_with_gradient(point))
-    }
-    fn resolution(&self) -> f32 {
-        each!(self, medium => medium.resolution())
-    }
-    fn gradients(&self, point: Vec3) -> Gradients {
-        each!(self, medium => medium.gradients(point))
-    }
-    fn extinction_hessian(&self, point: Vec3) -> Hessian {
-        each!(self, medium => medium.extinction_hessian(point))
-    }
-    fn mean_extinction(&self, centre: Vec3, radius: f32) -> Spectrum {
-        each!(self, medium => medium.mean_extinction(centre, radius))
-    }
-    fn faces(&self, ray: &Ray, visit: &mut dyn FnMut(Face)) {
-        each!(self, medium => medium.faces(ray, visit));
-    }
-    fn is_grey(&self) -> bool {
-        each!(self, medium => medium.is_grey())
-    }
-    fn is_emissive(&self) -> bool {
-        each!(self, medium => medium.is_emissive())
-    }
+    crate::delegate_medium!(self, [Homogeneous Grid Sparse Noise]);
 }
 
 impl From<Homogeneous> for AnyMedium<'_> {

@@ -3,6 +3,8 @@
 use glam::Vec3;
 
 use super::MediumError;
+use super::density::Corners;
+use super::joining::Range;
 use super::majorant::MinMax;
 
 /// Cells along the edge of a brick.
@@ -154,7 +156,7 @@ impl Bricks<'_> {
                     Some(place) => {
                         self.check_border(brick)?;
                         let found = self.around(brick).padded();
-                        whole = whole.union(found);
+                        whole = whole.union(&found);
                         if let Some(bound) = bounds.get_mut(place) {
                             *bound = found;
                         }
@@ -193,7 +195,7 @@ impl Bricks<'_> {
         for neighbour in positions([3; 3]) {
             let place = [0, 1, 2].map(|axis| (brick[axis] + neighbour[axis]).wrapping_sub(1));
             let Some(cells) = self.brick(place) else {
-                bounds = bounds.union(MinMax::default());
+                bounds = bounds.union(&MinMax::default());
                 continue;
             };
             // Of the one before, the last layer; of the one behind, the first.
@@ -206,7 +208,7 @@ impl Bricks<'_> {
                 for y in range(1) {
                     for x in range(0) {
                         let value = cells[within([x, y, z])];
-                        bounds = bounds.union(MinMax { min: value, max: value });
+                        bounds = bounds.union(&MinMax { min: value, max: value });
                     }
                 }
             }
@@ -259,46 +261,74 @@ fn positions(size: [u32; 3]) -> impl Iterator<Item = [u32; 3]> {
     (0..nz).flat_map(move |z| (0..ny).flat_map(move |y| (0..nx).map(move |x| [x, y, z])))
 }
 
-/// Densities of the eight cells around a point, x fastest, and where between their centres it lies.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Corners {
-    values: [f32; 8],
-    fraction: Vec3,
-}
-
-impl Corners {
-    /// From `p·n + 1/2`.
+impl Bricks<'_> {
+    /// The densities around a point, from `p·n + 1/2`.
     #[inline]
-    pub(super) fn at(bricks: &Bricks<'_>, shifted: Vec3) -> Self {
+    pub(super) fn corners(&self, shifted: Vec3) -> Corners {
         // Shifted by one, a truncation is the floor; the cell below is one less.
         let upper = shifted.to_array().map(|s| s as i32);
         let fraction =
             (shifted - Vec3::new(upper[0] as f32, upper[1] as f32, upper[2] as f32)).clamp(Vec3::ZERO, Vec3::ONE);
-        let lower = upper.map(|c| c.wrapping_sub(1));
-        let [x, y, z] = lower.map(|c| c as u32);
-        const LAST: u32 = BRICK - 1;
-        let is_within = x % BRICK < LAST && y % BRICK < LAST && z % BRICK < LAST;
-        let is_inside = x < bricks.size[0] && y < bricks.size[1] && z < bricks.size[2];
-        const ROW: usize = BRICK as usize;
-        const LAYER: usize = ROW * ROW;
-        let values = if is_within && is_inside {
-            // All in one brick, as two thirds of all points are.
-            bricks.brick([x, y, z].map(|c| c / BRICK)).map_or([0.0; 8], |cells| {
-                let at = within([x, y, z]);
-                [0, 1, ROW, ROW + 1, LAYER, LAYER + 1, LAYER + ROW, LAYER + ROW + 1]
-                    .map(|offset| cells.get(at + offset).copied().unwrap_or(0.0))
-            })
-        } else {
-            Self::apart(bricks, lower)
-        };
-        Self { values, fraction }
+        let high = upper.map(|c| c as u32);
+        let low = high.map(|c| c.wrapping_sub(1));
+        const NODE_CELLS: u32 = NODE * BRICK;
+        // What is below zero wraps, and lies in no node with its neighbour.
+        let is_one_node =
+            (0..3).all(|axis| low[axis] / NODE_CELLS == high[axis] / NODE_CELLS && high[axis] < self.size[axis]);
+        let values = if is_one_node { self.in_node(low, high) } else { self.apart(low, high) };
+        Corners { values, fraction }
     }
 
-    /// The values of cells in several bricks: each brick is looked up once.
-    fn apart(bricks: &Bricks<'_>, lower: [i32; 3]) -> [f32; 8] {
+    /// The values of cells of one node, as nearly all are.
+    #[inline]
+    fn in_node(&self, low: [u32; 3], high: [u32; 3]) -> [f32; 8] {
+        const ROW: usize = BRICK as usize;
+        const LAYER: usize = ROW * ROW;
+        let Some(first) = self.slot([low[0] / BRICK, low[1] / BRICK, low[2] / BRICK]) else { return [0.0; 8] };
+        let start = |slot: usize| {
+            self.slots.get(slot).filter(|entry| **entry != Bricks::NOTHING).map(|entry| *entry as usize * CELLS)
+        };
+        let at = |brick: Option<usize>, place: usize| {
+            brick.and_then(|start| self.cells.get(start + place)).copied().unwrap_or(0.0)
+        };
+        let is_split = |axis: usize| high[axis].is_multiple_of(BRICK);
+        let (x, y, z) = (is_split(0), is_split(1), is_split(2));
+        if !(x || y || z) {
+            // All in one brick, as two thirds of all points are.
+            let Some(cells) = start(first).and_then(|start| self.cells.get(start..)?.first_chunk::<CELLS>()) else {
+                return [0.0; 8];
+            };
+            let place = within(low);
+            let row = |from: usize| {
+                cells.get(place + from..).and_then(|row| row.first_chunk::<2>()).copied().unwrap_or_default()
+            };
+            let ([a, b], [c, d], [e, f], [g, h]) = (row(0), row(ROW), row(LAYER), row(LAYER + ROW));
+            return [a, b, c, d, e, f, g, h];
+        }
+        let mut values = [0.0; 8];
+        const SLOT: [usize; 3] = [1, NODE as usize, (NODE * NODE) as usize];
+        const CELL: [usize; 3] = [1, ROW, LAYER];
+        let beyond = [x, y, z];
+        let slot = |axis: usize, is_upper: bool| if is_upper && beyond[axis] { SLOT[axis] } else { 0 };
+        let cell =
+            |axis: usize, is_upper: bool| (if is_upper { high[axis] } else { low[axis] } % BRICK) as usize * CELL[axis];
+        for (pair, values) in values.as_chunks_mut::<2>().0.iter_mut().enumerate() {
+            let (upper_y, upper_z) = (pair & 1 == 1, pair > 1);
+            let from = first + slot(1, upper_y) + slot(2, upper_z);
+            let place = cell(1, upper_y) + cell(2, upper_z);
+            let brick = start(from);
+            let next = if x { start(from + 1) } else { brick };
+            *values = [at(brick, place + cell(0, false)), at(next, place + cell(0, true))];
+        }
+        values
+    }
+
+    /// The values of cells of several nodes, or outside: each brick is looked up once.
+    #[cold]
+    fn apart(&self, low: [u32; 3], high: [u32; 3]) -> [f32; 8] {
         let mut values = [0.0; 8];
         // Of each axis, the upper cell may be the first of the next brick; what wraps lies outside.
-        let cells = lower.map(|c| [c as u32, c.wrapping_add(1) as u32]);
+        let cells = [0, 1, 2].map(|axis| [low[axis], high[axis]]);
         let is_split = cells.map(|[low, high]| high % BRICK == 0 || low >= high);
         for parts in 0..8_usize {
             let part = [parts & 1, parts >> 1 & 1, parts >> 2];
@@ -306,12 +336,12 @@ impl Corners {
                 continue;
             }
             let place = core::array::from_fn(|axis| cells[axis][part[axis]] / BRICK);
-            let Some(brick) = bricks.brick(place) else { continue };
+            let Some(brick) = self.brick(place) else { continue };
             for (corner, value) in values.iter_mut().enumerate() {
                 let upper = [corner & 1, corner >> 1 & 1, corner >> 2];
                 let cell: [u32; 3] = core::array::from_fn(|axis| cells[axis][upper[axis]]);
                 let is_here =
-                    (0..3).all(|axis| (!is_split[axis] || upper[axis] == part[axis]) && cell[axis] < bricks.size[axis]);
+                    (0..3).all(|axis| (!is_split[axis] || upper[axis] == part[axis]) && cell[axis] < self.size[axis]);
                 if is_here {
                     *value = brick[within(cell)];
                 }
@@ -319,29 +349,4 @@ impl Corners {
         }
         values
     }
-
-    #[inline]
-    pub(super) fn value(&self) -> f32 {
-        let (v, f) = (&self.values, self.fraction);
-        // `a + (b − a) f` returns a constant unchanged, which weights that sum to 1 would not.
-        let (y0, y1) = (lerp(v[0], v[1], f.x), lerp(v[2], v[3], f.x));
-        let (y2, y3) = (lerp(v[4], v[5], f.x), lerp(v[6], v[7], f.x));
-        lerp(lerp(y0, y1, f.y), lerp(y2, y3, f.y), f.z)
-    }
-
-    /// Gradient per cell, in cell coordinates.
-    #[inline]
-    pub(super) fn gradient(&self) -> Vec3 {
-        let (v, f) = (&self.values, self.fraction);
-        let bilinear = |a: f32, b: f32, c: f32, d: f32, s: f32, t: f32| lerp(lerp(a, b, s), lerp(c, d, s), t);
-        let x = bilinear(v[1] - v[0], v[3] - v[2], v[5] - v[4], v[7] - v[6], f.y, f.z);
-        let y = bilinear(v[2] - v[0], v[3] - v[1], v[6] - v[4], v[7] - v[5], f.x, f.z);
-        let z = bilinear(v[4] - v[0], v[5] - v[1], v[6] - v[2], v[7] - v[3], f.x, f.y);
-        Vec3::new(x, y, z)
-    }
-}
-
-#[inline]
-fn lerp(a: f32, b: f32, t: f32) -> f32 {
-    a + (b - a) * t
 }

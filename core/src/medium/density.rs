@@ -102,47 +102,59 @@ impl Cell {
         }
     }
 
+    /// The densities around, in units of the second.
     #[inline]
-    fn corner_values(&self, density: &Density<'_>) -> ([f32; 8], f32) {
-        match density {
+    fn corners(&self, density: &Density<'_>) -> (Corners, f32) {
+        let (values, unit) = match density {
             Density::F32(values) => (self.corners.map(|i| values.get(i).copied().unwrap_or(0.0)), 1.0),
             Density::U8(values) => (self.corners.map(|i| f32::from(values.get(i).copied().unwrap_or(0))), 1.0 / 255.0),
-        }
+        };
+        (Corners { values, fraction: self.fraction }, unit)
     }
 
     /// Density.
     #[inline]
     pub(super) fn value(&self, density: &Density<'_>) -> f32 {
-        let (v, unit) = self.corner_values(density);
-        self.value_of(&v) * unit
+        let (corners, unit) = self.corners(density);
+        corners.value() * unit
     }
 
     /// Gradient of density, per cell, in cell coordinates.
     #[inline]
     pub(super) fn gradient(&self, density: &Density<'_>) -> Vec3 {
-        let (v, unit) = self.corner_values(density);
-        self.gradient_of(&v) * unit
+        let (corners, unit) = self.corners(density);
+        corners.gradient() * unit
     }
 
     /// Both, from the same corners.
     #[inline]
     pub(super) fn value_and_gradient(&self, density: &Density<'_>) -> (f32, Vec3) {
-        let (v, unit) = self.corner_values(density);
-        (self.value_of(&v) * unit, self.gradient_of(&v) * unit)
+        let (corners, unit) = self.corners(density);
+        (corners.value() * unit, corners.gradient() * unit)
     }
+}
 
+/// Densities of the eight cells around a point, x fastest, and where between their centres it lies.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Corners {
+    pub(super) values: [f32; 8],
+    pub(super) fraction: Vec3,
+}
+
+impl Corners {
     #[inline]
-    fn value_of(&self, v: &[f32; 8]) -> f32 {
-        let f = self.fraction;
+    pub(super) fn value(&self) -> f32 {
+        let (v, f) = (&self.values, self.fraction);
         // `a + (b − a) f` returns a constant unchanged, which weights that sum to 1 would not.
         let (y0, y1) = (lerp(v[0], v[1], f.x), lerp(v[2], v[3], f.x));
         let (y2, y3) = (lerp(v[4], v[5], f.x), lerp(v[6], v[7], f.x));
         lerp(lerp(y0, y1, f.y), lerp(y2, y3, f.y), f.z)
     }
 
+    /// Gradient per cell, in cell coordinates.
     #[inline]
-    fn gradient_of(&self, v: &[f32; 8]) -> Vec3 {
-        let f = self.fraction;
+    pub(super) fn gradient(&self) -> Vec3 {
+        let (v, f) = (&self.values, self.fraction);
         let bilinear = |a: f32, b: f32, c: f32, d: f32, s: f32, t: f32| lerp(lerp(a, b, s), lerp(c, d, s), t);
         let x = bilinear(v[1] - v[0], v[3] - v[2], v[5] - v[4], v[7] - v[6], f.y, f.z);
         let y = bilinear(v[2] - v[0], v[3] - v[1], v[6] - v[4], v[7] - v[5], f.x, f.z);

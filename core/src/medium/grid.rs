@@ -3,7 +3,7 @@
 use glam::{Affine3, Mat3, Vec3};
 
 use super::density::{Cell, Density, cell_count, central_hessian};
-use super::grid_bounds::Joining;
+use super::joining::Joining;
 use super::majorant::{Field, MinMax, Reach, blocks_along};
 use super::region::BoxRegion;
 use super::{MediumError, ball};

@@ -1,39 +1,17 @@
 //! Bounds of a voxel grid along a ray.
 
 use super::DensityGrid;
-use super::majorant::{Entry, Field, MinMax, Walk};
+use super::joining::{Found, Joining, Range, Span};
+use super::majorant::{BlockSpan, Entry, Field, MinMax, Walk};
 use super::region::LocalLine;
 use crate::host::MajorantSegment;
 use crate::math::Ray;
 use crate::spectrum::Spectrum;
 
-/// Expected null collisions a joined segment may add over its blocks by themselves: asking for a
-/// segment costs some three collisions. With 0 a ray through thin smoke takes twice the time; with
-/// more, the bounds of thick clouds get loose.
-pub(super) const WASTE: f32 = 1.0;
-
-/// Majorant thickness of a segment at which no more is joined: a walk has most likely ended by then.
-pub(super) const ENOUGH: f32 = 2.0;
-
-/// Constant blocks that a ray crosses on fewer cells than this are marched with those around them.
-pub(super) const SHORT: f32 = 4.0;
-
-/// What bounds are for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Joining {
-    /// Tracking: no looser than asking again is dear.
-    Tight,
-    /// Marching: only where it ends counts.
-    Loose,
-}
-
 /// Bounds of all densities of a grid, or of its one density: most grids have no other, and asking for segments is a quarter of
 /// the time of rays through smoke.
-trait DensityBounds: Copy + PartialEq {
+trait DensityBounds: Range {
     fn of(grid: &DensityGrid<'_>, block: Option<usize>) -> Self;
-    fn union(&self, other: &Self) -> Self;
-    fn is_constant(&self) -> bool;
-    fn is_empty(&self) -> bool;
     fn all(&self) -> FieldBounds;
 }
 
@@ -41,21 +19,6 @@ impl DensityBounds for MinMax {
     #[inline(always)]
     fn of(grid: &DensityGrid<'_>, block: Option<usize>) -> Self {
         grid.density.bounds(block)
-    }
-
-    #[inline(always)]
-    fn union(&self, other: &Self) -> Self {
-        MinMax::union(*self, *other)
-    }
-
-    #[inline(always)]
-    fn is_constant(&self) -> bool {
-        self.min == self.max
-    }
-
-    #[inline(always)]
-    fn is_empty(&self) -> bool {
-        self.max == 0.0
     }
 
     #[inline(always)]
@@ -81,27 +44,29 @@ impl DensityBounds for FieldBounds {
     }
 
     #[inline]
+    fn all(&self) -> FieldBounds {
+        *self
+    }
+}
+
+impl Range for FieldBounds {
+    #[inline]
     fn union(&self, other: &Self) -> Self {
         Self {
-            density: self.density.union(other.density),
-            absorption: self.absorption.union(other.absorption),
-            emission: self.emission.union(other.emission),
+            density: self.density.union(&other.density),
+            absorption: self.absorption.union(&other.absorption),
+            emission: self.emission.union(&other.emission),
         }
     }
 
     #[inline]
     fn is_constant(&self) -> bool {
-        [self.density, self.absorption, self.emission].iter().all(|b| b.min == b.max)
+        [self.density, self.absorption, self.emission].iter().all(Range::is_constant)
     }
 
     #[inline]
     fn is_empty(&self) -> bool {
         self.density.max == 0.0 && self.absorption.max == 0.0 && self.emission.max == 0.0
-    }
-
-    #[inline]
-    fn all(&self) -> FieldBounds {
-        *self
     }
 }
 
@@ -127,46 +92,15 @@ impl DensityGrid<'_> {
             Entry::Coarse(_, far) => return self.segment_of(&B::of(self, None).all(), far),
             Entry::Blocks(walk) => walk,
         };
-        let (mut found, mut until) = loop {
-            let Some(span) = walk.next() else { return MajorantSegment::vacuum(f32::INFINITY) };
-            let bounds = B::of(self, Some(span.block));
-            if !bounds.is_empty() {
-                if span.begin > from {
-                    return MajorantSegment::vacuum(span.begin);
-                }
-                break (bounds, span.end);
-            }
-            if span.end > ray.length {
-                return MajorantSegment::vacuum(span.end);
-            }
+        let next = || {
+            let BlockSpan { block, begin, end } = walk.next()?;
+            Some(Span { bounds: B::of(self, Some(block)), begin, end })
         };
-        let is_constant = found.is_constant();
-        let mut thickness = self.thickest(&found.all()) * (until - from);
-        while until < ray.length && (is_constant || joining == Joining::Loose || thickness < ENOUGH) {
-            let Some(span) = walk.next() else { break };
-            let bounds = B::of(self, Some(span.block));
-            let joined = found.union(&bounds);
-            if is_constant {
-                if joined != found {
-                    break;
-                }
-            } else if joining == Joining::Loose {
-                if bounds.is_constant() && span.end - span.begin > SHORT * self.resolution {
-                    break;
-                }
-                found = joined;
-            } else {
-                let higher = self.thickest(&joined.all());
-                thickness += self.thickest(&bounds.all()) * (span.end - until);
-                let is_wasteful = higher * (span.end - from) - thickness > WASTE;
-                if is_wasteful || bounds.is_constant() && !bounds.is_empty() {
-                    break;
-                }
-                found = joined;
-            }
-            until = span.end;
+        let found = joining.join(ray, from, self.resolution, next, |bounds| self.thickest(&bounds.all()));
+        match found {
+            Found::Vacuum(until) => MajorantSegment::vacuum(until),
+            Found::Matter(bounds, until) => self.segment_of(&bounds.all(), until),
         }
-        self.segment_of(&found.all(), until)
     }
 
     /// Bounds of every density in a block, or in the whole grid.

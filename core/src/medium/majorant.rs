@@ -3,6 +3,7 @@
 use bytemuck::{Pod, Zeroable};
 use glam::{Affine3, Vec3};
 
+use super::joining::Range;
 use super::region::{LocalLine, lesser};
 use super::{Density, DensityGrid, MediumError};
 
@@ -26,12 +27,6 @@ pub struct MinMax {
 impl MinMax {
     /// The bounds of nothing.
     pub(super) const NONE: Self = Self { min: f32::INFINITY, max: 0.0 };
-
-    /// Bounds of both.
-    #[inline]
-    pub(super) fn union(self, other: Self) -> Self {
-        Self { min: self.min.min(other.min), max: self.max.max(other.max) }
-    }
 
     /// Bounds with room for the rounding of an interpolation between different values.
     pub(super) fn padded(self) -> Self {
@@ -68,12 +63,12 @@ pub(super) fn fill(blocks: &mut [MinMax], density: &Density<'_>, size: [u32; 3])
                 let row = (z * size[1] as usize + y) * size[0] as usize;
                 for x in range(0) {
                     let value = density.value(row + x);
-                    bounds = bounds.union(MinMax { min: value, max: value });
+                    bounds = bounds.union(&MinMax { min: value, max: value });
                 }
             }
         }
         *block = bounds.padded();
-        whole = whole.union(*block);
+        whole = whole.union(block);
     }
     whole
 }

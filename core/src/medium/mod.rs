@@ -16,7 +16,7 @@
 //! | [`homogeneous`] | the same everywhere |
 //! | [`grid`] | voxels, trilinear between cell centres |
 //! | [`density`] | its storage and interpolation |
-//! | [`majorant`], `grid_bounds` | its blocks of bounds and the walk through them; how they are joined |
+//! | [`majorant`], `grid_bounds`, `joining` | its blocks of bounds and the walk through them; how bounds are joined |
 //! | [`sparse`], `sparse_bounds` | voxels where there are any |
 //! | [`bricks`] | their storage |
 //! | [`noise`], `perlin` | fractal noise |
@@ -36,6 +36,7 @@ pub mod error;
 pub mod grid;
 mod grid_bounds;
 pub mod homogeneous;
+mod joining;
 pub mod majorant;
 pub mod noise;
 pub mod overlap;

@@ -2,11 +2,11 @@
 
 use glam::{Affine3, Mat3, Vec3};
 
-use super::bricks::{Bricks, Corners};
-use super::density::central_hessian;
+use super::bricks::Bricks;
+use super::density::{Corners, central_hessian};
+use super::joining::Joining;
 use super::majorant::{MinMax, Reach};
 use super::region::BoxRegion;
-use super::sparse_bounds::Joining;
 use super::{MediumError, ball};
 use crate::host::{Gradients, MajorantSegment, Medium, Properties};
 use crate::math::Ray;
@@ -153,7 +153,7 @@ impl<'a> SparseGrid<'a> {
         let shifted = self.shifted_from_world.transform_point3(point);
         let [x, y, z] = self.bricks.size.map(|n| n as f32 + 0.5);
         let is_inside = shifted.cmpge(Vec3::splat(0.5)).all() && shifted.cmple(Vec3::new(x, y, z)).all();
-        is_inside.then(|| Corners::at(&self.bricks, shifted))
+        is_inside.then(|| self.bricks.corners(shifted))
     }
 
     #[inline]
@@ -226,7 +226,7 @@ impl Medium for SparseGrid<'_> {
         }
         let centre = self.shifted_from_world.transform_point3(point);
         // Half a cell before the first, where a truncation would no longer be the floor, nothing is left.
-        let at = |offset: Vec3| Corners::at(&self.bricks, (centre + offset).max(Vec3::ZERO)).value();
+        let at = |offset: Vec3| self.bricks.corners((centre + offset).max(Vec3::ZERO)).value();
         central_hessian(&self.cells_from_world.matrix3, |offset| self.extinction * at(offset))
     }
 

@@ -4,11 +4,10 @@ use core::fmt;
 use core::slice;
 use std::sync::Arc;
 
-use fogbow::host::{Face, Gradients, MajorantSegment, Medium, Properties};
-use fogbow::math::{Affine3, Mat3, Ray, Vec3};
+use fogbow::host::{Medium, Properties};
+use fogbow::math::{Affine3, Mat3, Vec3};
 use fogbow::medium::{Density, DensityGrid, FractalNoise, Homogeneous, MinMax, Noise, Overlap, Placed, Region};
 use fogbow::phase::Phase;
-use fogbow::spectrum::{Gradient, Hessian, Spectrum};
 
 use crate::arguments::{self, Versioned};
 use crate::handles::{self, Object};
@@ -66,49 +65,8 @@ impl Shared {
     }
 }
 
-macro_rules! asks {
-    ($self:ident => $medium:expr) => {
-        fn properties(&$self, point: Vec3) -> Properties {
-            $medium.properties(point)
-        }
-        fn majorant_segment(&$self, ray: &Ray, from: f32) -> MajorantSegment {
-            $medium.majorant_segment(ray, from)
-        }
-        fn marching_segment(&$self, ray: &Ray, from: f32) -> MajorantSegment {
-            $medium.marching_segment(ray, from)
-        }
-        fn extinction(&$self, point: Vec3) -> Spectrum {
-            $medium.extinction(point)
-        }
-        fn extinction_with_gradient(&$self, point: Vec3) -> (Spectrum, Gradient) {
-            $medium.extinction_with_gradient(point)
-        }
-        fn resolution(&$self) -> f32 {
-            $medium.resolution()
-        }
-        fn gradients(&$self, point: Vec3) -> Gradients {
-            $medium.gradients(point)
-        }
-        fn extinction_hessian(&$self, point: Vec3) -> Hessian {
-            $medium.extinction_hessian(point)
-        }
-        fn mean_extinction(&$self, centre: Vec3, radius: f32) -> Spectrum {
-            $medium.mean_extinction(centre, radius)
-        }
-        fn faces(&$self, ray: &Ray, visit: &mut dyn FnMut(Face)) {
-            $medium.faces(ray, visit);
-        }
-        fn is_grey(&$self) -> bool {
-            $medium.is_grey()
-        }
-        fn is_emissive(&$self) -> bool {
-            $medium.is_emissive()
-        }
-    };
-}
-
 impl Medium for Shared {
-    asks!(self => self.medium);
+    fogbow::delegate_medium!(self, (self.medium));
 }
 
 /// Memory that what is made of it may borrow for as long as both are kept together.
@@ -154,7 +112,7 @@ struct OwnedGrid {
 }
 
 impl Medium for OwnedGrid {
-    asks!(self => self.grid);
+    fogbow::delegate_medium!(self, (self.grid));
 }
 
 /// Media in the same space, as [`OwnedGrid`].
@@ -164,7 +122,7 @@ struct OwnedOverlap {
 }
 
 impl Medium for OwnedOverlap {
-    asks!(self => self.overlap);
+    fogbow::delegate_medium!(self, (self.overlap));
 }
 
 /// A medium that is the same everywhere. Put it into a box or a ball by `fogbow_medium_in_box` and `fogbow_medium_in_ball`.

@@ -1,10 +1,10 @@
 //! Media whose extinction or albedo varies in colour from point to point.
 
-use fogbow::host::{Face, Gradients, MajorantSegment, Medium, Properties};
+use fogbow::host::{MajorantSegment, Medium, Properties};
 use fogbow::math::{Affine3, Ray, Vec3};
 use fogbow::medium::AnyMedium;
 use fogbow::phase::Phase;
-use fogbow::spectrum::{Gradient, Hessian, Spectrum};
+use fogbow::spectrum::Spectrum;
 
 use crate::scene_file::Field;
 use crate::transform::Transform;
@@ -121,56 +121,15 @@ pub(super) enum Stuff<'a> {
     Coloured(Coloured<'a>),
 }
 
-macro_rules! each {
-    ($self:ident, $medium:ident => $answer:expr) => {
-        match $self {
-            Self::Core($medium) => $answer,
-            Self::Coloured($medium) => $answer,
-        }
-    };
-}
-
 impl Stuff<'_> {
     pub(super) fn phase(&self) -> Phase {
-        each!(self, medium => medium.phase())
+        match self {
+            Self::Core(medium) => medium.phase(),
+            Self::Coloured(medium) => medium.phase(),
+        }
     }
 }
 
 impl Medium for Stuff<'_> {
-    fn properties(&self, point: Vec3) -> Properties {
-        each!(self, medium => medium.properties(point))
-    }
-    fn majorant_segment(&self, ray: &Ray, from: f32) -> MajorantSegment {
-        each!(self, medium => medium.majorant_segment(ray, from))
-    }
-    fn marching_segment(&self, ray: &Ray, from: f32) -> MajorantSegment {
-        each!(self, medium => medium.marching_segment(ray, from))
-    }
-    fn extinction(&self, point: Vec3) -> Spectrum {
-        each!(self, medium => medium.extinction(point))
-    }
-    fn extinction_with_gradient(&self, point: Vec3) -> (Spectrum, Gradient) {
-        each!(self, medium => medium.extinction_with_gradient(point))
-    }
-    fn resolution(&self) -> f32 {
-        each!(self, medium => medium.resolution())
-    }
-    fn gradients(&self, point: Vec3) -> Gradients {
-        each!(self, medium => medium.gradients(point))
-    }
-    fn extinction_hessian(&self, point: Vec3) -> Hessian {
-        each!(self, medium => medium.extinction_hessian(point))
-    }
-    fn mean_extinction(&self, centre: Vec3, radius: f32) -> Spectrum {
-        each!(self, medium => medium.mean_extinction(centre, radius))
-    }
-    fn faces(&self, ray: &Ray, visit: &mut dyn FnMut(Face)) {
-        each!(self, medium => medium.faces(ray, visit));
-    }
-    fn is_grey(&self) -> bool {
-        each!(self, medium => medium.is_grey())
-    }
-    fn is_emissive(&self) -> bool {
-        each!(self, medium => medium.is_emissive())
-    }
+    fogbow::delegate_medium!(self, [Core Coloured]);
 }

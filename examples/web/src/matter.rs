@@ -3,13 +3,12 @@
 use alloc::vec;
 use alloc::vec::Vec;
 
-use fogbow::host::{Face, Gradients, MajorantSegment, Medium, Properties};
-use fogbow::math::{Affine3, Bounds, Ray, Vec3};
+use fogbow::host::{Medium, Properties};
+use fogbow::math::{Affine3, Bounds};
 use fogbow::medium::{
     Density, DensityGrid, FractalNoise, Homogeneous, MediumError, MinMax, Noise, Overlap, Placed, Region,
 };
 use fogbow::phase::{Lobe, Phase};
-use fogbow::spectrum::{Gradient, Hessian, Spectrum};
 use self_cell::{MutBorrow, self_cell};
 
 use super::words::{Fault, Words};
@@ -23,16 +22,6 @@ pub(crate) enum Matter<'a> {
     Noise(Placed<'a, Noise>),
 }
 
-macro_rules! each {
-    ($self:ident, $medium:ident => $answer:expr) => {
-        match $self {
-            Self::Homogeneous($medium) => $answer,
-            Self::Grid($medium) => $answer,
-            Self::Noise($medium) => $answer,
-        }
-    };
-}
-
 impl Matter<'_> {
     fn phase(&self) -> Phase {
         match self {
@@ -44,47 +33,7 @@ impl Matter<'_> {
 }
 
 impl Medium for Matter<'_> {
-    #[inline]
-    fn properties(&self, point: Vec3) -> Properties {
-        each!(self, medium => medium.properties(point))
-    }
-    #[inline]
-    fn majorant_segment(&self, ray: &Ray, from: f32) -> MajorantSegment {
-        each!(self, medium => medium.majorant_segment(ray, from))
-    }
-    #[inline]
-    fn marching_segment(&self, ray: &Ray, from: f32) -> MajorantSegment {
-        each!(self, medium => medium.marching_segment(ray, from))
-    }
-    #[inline]
-    fn extinction(&self, point: Vec3) -> Spectrum {
-        each!(self, medium => medium.extinction(point))
-    }
-    #[inline]
-    fn extinction_with_gradient(&self, point: Vec3) -> (Spectrum, Gradient) {
-        each!(self, medium => medium.extinction_with_gradient(point))
-    }
-    fn resolution(&self) -> f32 {
-        each!(self, medium => medium.resolution())
-    }
-    fn gradients(&self, point: Vec3) -> Gradients {
-        each!(self, medium => medium.gradients(point))
-    }
-    fn extinction_hessian(&self, point: Vec3) -> Hessian {
-        each!(self, medium => medium.extinction_hessian(point))
-    }
-    fn mean_extinction(&self, centre: Vec3, radius: f32) -> Spectrum {
-        each!(self, medium => medium.mean_extinction(centre, radius))
-    }
-    fn faces(&self, ray: &Ray, visit: &mut dyn FnMut(Face)) {
-        each!(self, medium => medium.faces(ray, visit));
-    }
-    fn is_grey(&self) -> bool {
-        each!(self, medium => medium.is_grey())
-    }
-    fn is_emissive(&self) -> bool {
-        each!(self, medium => medium.is_emissive())
-    }
+    fogbow::delegate_medium!(self, [Homogeneous Grid Noise]);
 }
 
 pub(crate) type Matters<'a> = Vec<Matter<'a>>;
