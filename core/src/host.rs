@@ -6,6 +6,7 @@
 mod delegate;
 pub(crate) mod passing;
 
+pub use delegate::delegate_medium;
 use glam::{Vec2, Vec3};
 pub use rand_core::Rng;
 
@@ -298,7 +299,7 @@ fn difference_step(point: Vec3, usual: f32, most: f32) -> f32 {
 }
 
 impl<M: Medium + ?Sized> Medium for &M {
-    crate::delegate_medium!(self, (**self));
+    delegate_medium!(self, (**self));
 }
 
 /// Where a ray meets a surface.

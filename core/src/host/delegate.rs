@@ -13,7 +13,7 @@
 /// }
 ///
 /// impl Medium for Matter<'_> {
-///     fogbow::delegate_medium!(self, [Everywhere Somewhere]);
+///     fogbow::host::delegate_medium!(self, [Everywhere Somewhere]);
 /// }
 ///
 /// struct Named<M> {
@@ -22,7 +22,7 @@
 /// }
 ///
 /// impl<M: Medium> Medium for Named<M> {
-///     fogbow::delegate_medium!(self, (self.medium));
+///     fogbow::host::delegate_medium!(self, (self.medium));
 /// }
 ///
 /// let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::ONE, Phase::ISOTROPIC)?;
@@ -44,47 +44,50 @@ macro_rules! delegate_medium {
     ($self:ident, $to:tt) => {
         #[inline]
         fn properties(&$self, point: $crate::math::Vec3) -> $crate::host::Properties {
-            $crate::delegate_medium!(@to $self, $to, medium => medium.properties(point))
+            $crate::host::delegate_medium!(@to $self, $to, medium => medium.properties(point))
         }
         #[inline]
         fn majorant_segment(&$self, ray: &$crate::math::Ray, from: f32) -> $crate::host::MajorantSegment {
-            $crate::delegate_medium!(@to $self, $to, medium => medium.majorant_segment(ray, from))
+            $crate::host::delegate_medium!(@to $self, $to, medium => medium.majorant_segment(ray, from))
         }
         #[inline]
         fn marching_segment(&$self, ray: &$crate::math::Ray, from: f32) -> $crate::host::MajorantSegment {
-            $crate::delegate_medium!(@to $self, $to, medium => medium.marching_segment(ray, from))
+            $crate::host::delegate_medium!(@to $self, $to, medium => medium.marching_segment(ray, from))
         }
         #[inline]
         fn extinction(&$self, point: $crate::math::Vec3) -> $crate::spectrum::Spectrum {
-            $crate::delegate_medium!(@to $self, $to, medium => medium.extinction(point))
+            $crate::host::delegate_medium!(@to $self, $to, medium => medium.extinction(point))
         }
         #[inline]
         fn extinction_with_gradient(
             &$self,
             point: $crate::math::Vec3,
         ) -> ($crate::spectrum::Spectrum, $crate::spectrum::Gradient) {
-            $crate::delegate_medium!(@to $self, $to, medium => medium.extinction_with_gradient(point))
+            $crate::host::delegate_medium!(@to $self, $to, medium => medium.extinction_with_gradient(point))
         }
         fn resolution(&$self) -> f32 {
-            $crate::delegate_medium!(@to $self, $to, medium => medium.resolution())
+            $crate::host::delegate_medium!(@to $self, $to, medium => medium.resolution())
         }
         fn gradients(&$self, point: $crate::math::Vec3) -> $crate::host::Gradients {
-            $crate::delegate_medium!(@to $self, $to, medium => medium.gradients(point))
+            $crate::host::delegate_medium!(@to $self, $to, medium => medium.gradients(point))
         }
         fn extinction_hessian(&$self, point: $crate::math::Vec3) -> $crate::spectrum::Hessian {
-            $crate::delegate_medium!(@to $self, $to, medium => medium.extinction_hessian(point))
+            $crate::host::delegate_medium!(@to $self, $to, medium => medium.extinction_hessian(point))
         }
         fn mean_extinction(&$self, centre: $crate::math::Vec3, radius: f32) -> $crate::spectrum::Spectrum {
-            $crate::delegate_medium!(@to $self, $to, medium => medium.mean_extinction(centre, radius))
+            $crate::host::delegate_medium!(@to $self, $to, medium => medium.mean_extinction(centre, radius))
         }
         fn faces(&$self, ray: &$crate::math::Ray, visit: &mut dyn FnMut($crate::host::Face)) {
-            $crate::delegate_medium!(@to $self, $to, medium => medium.faces(ray, visit))
+            $crate::host::delegate_medium!(@to $self, $to, medium => medium.faces(ray, visit))
         }
         fn is_grey(&$self) -> bool {
-            $crate::delegate_medium!(@to $self, $to, medium => medium.is_grey())
+            $crate::host::delegate_medium!(@to $self, $to, medium => medium.is_grey())
         }
         fn is_emissive(&$self) -> bool {
-            $crate::delegate_medium!(@to $self, $to, medium => medium.is_emissive())
+            $crate::host::delegate_medium!(@to $self, $to, medium => medium.is_emissive())
         }
     };
 }
+
+#[doc(inline)]
+pub use delegate_medium;

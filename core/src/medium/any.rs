@@ -40,7 +40,7 @@ impl AnyMedium<'_> {
 }
 
 impl Medium for AnyMedium<'_> {
-    crate::delegate_medium!(self, [Homogeneous Grid Sparse Noise]);
+    crate::host::delegate_medium!(self, [Homogeneous Grid Sparse Noise]);
 }
 
 impl From<Homogeneous> for AnyMedium<'_> {

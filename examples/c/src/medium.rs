@@ -66,7 +66,7 @@ impl Shared {
 }
 
 impl Medium for Shared {
-    fogbow::delegate_medium!(self, (self.medium));
+    fogbow::host::delegate_medium!(self, (self.medium));
 }
 
 /// Memory that what is made of it may borrow for as long as both are kept together.
@@ -112,7 +112,7 @@ struct OwnedGrid {
 }
 
 impl Medium for OwnedGrid {
-    fogbow::delegate_medium!(self, (self.grid));
+    fogbow::host::delegate_medium!(self, (self.grid));
 }
 
 /// Media in the same space, as [`OwnedGrid`].
@@ -122,7 +122,7 @@ struct OwnedOverlap {
 }
 
 impl Medium for OwnedOverlap {
-    fogbow::delegate_medium!(self, (self.overlap));
+    fogbow::host::delegate_medium!(self, (self.overlap));
 }
 
 /// A medium that is the same everywhere. Put it into a box or a ball by `fogbow_medium_in_box` and `fogbow_medium_in_ball`.

@@ -131,5 +131,5 @@ impl Stuff<'_> {
 }
 
 impl Medium for Stuff<'_> {
-    fogbow::delegate_medium!(self, [Core Coloured]);
+    fogbow::host::delegate_medium!(self, [Core Coloured]);
 }

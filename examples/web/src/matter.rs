@@ -33,7 +33,7 @@ impl Matter<'_> {
 }
 
 impl Medium for Matter<'_> {
-    fogbow::delegate_medium!(self, [Homogeneous Grid Noise]);
+    fogbow::host::delegate_medium!(self, [Homogeneous Grid Noise]);
 }
 
 pub(crate) type Matters<'a> = Vec<Matter<'a>>;
