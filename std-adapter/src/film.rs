@@ -2,7 +2,7 @@
 
 use core::fmt;
 
-use fogbow::picture::accumulate;
+use fogbow::picture::{PixelSum, accumulate};
 use fogbow::spectrum::Spectrum;
 
 /// Number of pixels beyond which no picture is made.
@@ -82,7 +82,7 @@ impl core::error::Error for SizeError {}
 
 /// Sums of samples, in named layers. Layer 0 is the picture, the others whatever the host splits it into.
 ///
-/// Sums are `f64`, so a pixel may take millions of samples; each pixel has its own count, so a
+/// Sums are exact ([`PixelSum`]), so a pixel may take millions of samples, in any order; each pixel has its own count, so a
 /// film stopped half-way is still a valid picture.
 ///
 /// ```
@@ -100,7 +100,7 @@ pub struct Film {
     height: u32,
     names: Vec<String>,
     /// Pixel by pixel, within each layer by layer.
-    sums: Vec<[f64; 3]>,
+    sums: Vec<PixelSum>,
     counts: Vec<u32>,
 }
 
@@ -122,7 +122,7 @@ impl Film {
         let (mut sums, mut counts) = (Vec::new(), Vec::new());
         sums.try_reserve_exact(total).map_err(|_| SizeError::Memory)?;
         counts.try_reserve_exact(count).map_err(|_| SizeError::Memory)?;
-        sums.resize(total, [0.0; 3]);
+        sums.resize(total, PixelSum::ZERO);
         counts.resize(count, 0);
         Ok(Self { width, height, names, sums, counts })
     }
@@ -170,7 +170,7 @@ impl Film {
     }
 
     /// Adds one sample to the pixel at column `x` of row `y`: a colour per layer (missing ones are
-    /// black). Outside the film nothing happens.
+    /// black). One that is no finite number counts as black, see [`accumulate`]. Outside the film nothing happens.
     pub fn add(&mut self, x: u32, y: u32, colours: &[Spectrum]) {
         if let Some(i) = self.index(x, y) {
             let layers = self.names.len();
@@ -181,7 +181,7 @@ impl Film {
 
     /// Forgets all samples.
     pub fn clear(&mut self) {
-        self.sums.fill([0.0; 3]);
+        self.sums.fill(PixelSum::ZERO);
         self.counts.fill(0);
     }
 
@@ -192,11 +192,8 @@ impl Film {
         if layer >= layers {
             return None;
         }
-        let mean = |(sums, &count): (&[[f64; 3]], &u32)| {
-            let weight = if count == 0 { 0.0 } else { 1.0 / f64::from(count) };
-            Spectrum(sums[layer].map(|sum| (sum * weight) as f32))
-        };
-        let pixels = self.sums.chunks_exact(layers).zip(&self.counts).map(mean).collect();
+        let all = self.sums.chunks_exact(layers).zip(&self.counts);
+        let pixels = all.map(|(sums, count)| sums[layer].mean(*count)).collect();
         Some(Image { width: self.width, height: self.height, pixels })
     }
 
@@ -215,13 +212,18 @@ impl Film {
         Ok(film)
     }
 
-    /// Takes sums and counts out, to be added to elsewhere; [`Film::restore`] puts them back.
-    pub(crate) fn take(&mut self) -> (Vec<[f64; 3]>, Vec<u32>) {
+    /// Takes sums and counts out, to be added to elsewhere; [`Film::replace`] puts them back.
+    pub(crate) fn take(&mut self) -> (Vec<PixelSum>, Vec<u32>) {
         (core::mem::take(&mut self.sums), core::mem::take(&mut self.counts))
     }
 
-    /// Puts back what [`Film::take`] has taken out.
-    pub(crate) fn restore(&mut self, (sums, counts): (Vec<[f64; 3]>, Vec<u32>)) {
+    /// Takes sums and numbers of samples of a picture of the same size and layers, as [`fogbow::picture::Tiles::into_sums`] gives them.
+    ///
+    /// # Panics
+    /// If there are not as many as the size says.
+    pub fn replace(&mut self, (sums, counts): (Vec<PixelSum>, Vec<u32>)) {
+        let count = self.width as usize * self.height as usize;
+        assert!((sums.len(), counts.len()) == (count * self.names.len(), count), "sums of another picture");
         (self.sums, self.counts) = (sums, counts);
     }
 

@@ -112,7 +112,7 @@ where
 {
     let samples = whole_passes(settings.samples, passes.length);
     let settings = &Settings { samples, goal: None, ..*settings };
-    let mut render = Render::new(film, settings, control)?;
+    let mut render = Render::new(film, settings, control, passes.length.get())?;
     let prepare = |pass: u32, threads: &Threads| make(pass, &Runner { threads, control });
     let reason = render.prepared_passes(passes, prepare, &integrand).map_err(ProgressiveError::Method)?;
     Ok(render.outcome(reason))

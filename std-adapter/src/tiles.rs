@@ -8,8 +8,8 @@ use core::fmt;
 use core::num::NonZero;
 use core::time::Duration;
 
-pub use fogbow::picture::Goal;
 use fogbow::picture::{self, Integrand, PictureBytesError, Tiles, affordable};
+pub use fogbow::picture::{Goal, Share};
 use fogbow::spectrum::Spectrum;
 
 use crate::film::Film;
@@ -39,11 +39,22 @@ pub struct Settings {
     /// Side of a tile in pixels. Larger: threads wait for each other at the end of a pass.
     /// Smaller: more jobs, each with its overhead. Changes no result but with a [`Settings::goal`], which each tile reaches by itself.
     pub tile: u32,
+    /// What of the picture is rendered; without a goal, parts add up to the whole.
+    pub share: Share,
 }
 
 impl Default for Settings {
     fn default() -> Self {
-        Self { samples: 16, goal: None, time: None, threads: 0, seed: 0, sequence: Sequence::default(), tile: 8 }
+        Self {
+            samples: 16,
+            goal: None,
+            time: None,
+            threads: 0,
+            seed: 0,
+            sequence: Sequence::default(),
+            tile: 8,
+            share: Share::Whole,
+        }
     }
 }
 
@@ -140,7 +151,7 @@ pub fn render<F>(
 where
     F: Fn(&Sample<'_>, &mut SampleRng, &mut [Spectrum]) + Sync,
 {
-    let mut render = Render::new(film, settings, control)?;
+    let mut render = Render::new(film, settings, control, 1)?;
     let reason = render.passes(&integrand);
     Ok(render.outcome(reason))
 }
@@ -200,6 +211,7 @@ pub(crate) struct Render<'a> {
     settings: &'a Settings,
     control: &'a Control<'a>,
     threads: Threads,
+    samples: u32,
     tiles: Option<Tiles<'static, Sequence, Counters>>,
     clock: Stopwatch,
     reporter: Reporter<'a>,
@@ -208,7 +220,7 @@ pub(crate) struct Render<'a> {
 impl Drop for Render<'_> {
     fn drop(&mut self) {
         if let Some(tiles) = self.tiles.take() {
-            self.film.restore(tiles.into_sums());
+            self.film.replace(tiles.into_sums());
         }
     }
 }
@@ -218,6 +230,7 @@ impl<'a> Render<'a> {
         film: &'a mut Film,
         settings: &'a Settings,
         control: &'a Control<'a>,
+        pass: u32,
     ) -> Result<Self, RenderError> {
         if settings.samples == 0 {
             return Err(RenderError::NoSamples);
@@ -243,11 +256,14 @@ impl<'a> Render<'a> {
                 Tiles::of(of, settings.sequence, sums, counts)
             }
         };
-        let total = u64::from(film.width()) * u64::from(film.height()) * u64::from(settings.samples);
+        let tiles = tiles.of_share(settings.share, pass);
+        let [first, end] = settings.share.samples(settings.samples, pass);
+        let samples = end - first;
+        let total = u64::from(tiles.pixel_count()) * u64::from(samples);
         let before = if control.resume.is_some() { tiles.counts().samples } else { before };
         let reporter = Reporter::new(control, before, total, settings.time);
         let tiles = Some(tiles.by_pass());
-        Ok(Self { film, settings, control, threads, tiles, clock, reporter })
+        Ok(Self { film, settings, control, threads, samples, tiles, clock, reporter })
     }
 
     pub(crate) fn outcome(self, reason: Reason) -> Outcome {
@@ -294,10 +310,10 @@ impl<'a> Render<'a> {
     {
         let integrand = Counted(integrand);
         let mut done = self.done();
-        if done >= self.settings.samples || self.tiles.as_ref().is_none_or(Tiles::is_done) {
+        if done >= self.samples || self.tiles.as_ref().is_none_or(Tiles::is_done) {
             return Reason::Done;
         }
-        let mut until = done.saturating_add(1).min(self.settings.samples);
+        let mut until = done.saturating_add(1).min(self.samples);
         let mut is_begun = false;
         if let (Some(_), Some(tiles)) = (self.control.resume, &self.tiles) {
             // A goal is judged where passes end: so that which was left is taken to its end.
@@ -315,7 +331,7 @@ impl<'a> Render<'a> {
                 return Reason::TimeUp;
             };
             done = until;
-            until = tiles.next_until(most).min(self.settings.samples);
+            until = tiles.next_until(most).min(self.samples);
         }
     }
 
@@ -331,7 +347,8 @@ impl<'a> Render<'a> {
         T: Sync,
         F: Fn(&T, &Sample<'_>, &mut SampleRng, &mut [Spectrum]) + Sync,
     {
-        let settings = self.settings;
+        let settings = &Settings { samples: self.samples, ..*self.settings };
+        let first = self.tiles.as_ref().map_or(0, Tiles::first);
         loop {
             let done = self.done();
             if done >= settings.samples {
@@ -341,12 +358,13 @@ impl<'a> Render<'a> {
                 return Ok(Reason::Cancelled);
             }
             let before = self.reporter.elapsed();
-            let pass = done / passes.length;
+            let pass = (first + done) / passes.length;
             let prepared = prepare(pass, &self.threads)?;
             let integrand = Counted(|sample: &Sample<'_>, rng: &mut SampleRng, layers: &mut [Spectrum]| {
                 integrand(&prepared, sample, rng, layers);
             });
-            let end = (pass * passes.length.get()).saturating_add(passes.length.get()).min(settings.samples);
+            let end = (pass * passes.length.get()).saturating_add(passes.length.get()) - first;
+            let end = end.min(settings.samples);
             let mut until = if passes.may_break && settings.time.is_some() { done + 1 } else { end };
             loop {
                 let (from, start) = (self.done(), self.reporter.elapsed());

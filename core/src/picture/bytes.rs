@@ -16,17 +16,25 @@
 //! | 56 | 8 | seed |
 //! | 64 | 16 | samples taken, and those that were not finite |
 //! | 80 | 8 | tag: what the picture was made for, a number of the host's choice |
-//! | 88 | 8 | [`Crc`] of bytes 0 to 88 and of all from 96 on |
-//! | 96 | 24 n l | sums of `l` layers of `n` pixels, as `f64` |
+//! | 88 | 16 | the part that is taken: 0 for all, 1 of tiles, 2 of samples; which, of how many; index of the first sample |
+//! | 104 | 8 | bytes behind the header |
+//! | 112 | 8 | [`Crc`] of bytes 0 to 112 and of all from 120 on |
+//! | 120 | 3 n l to 51 n l | sums of `l` layers of `n` pixels, each as below |
 //! | | 4 n | samples of pixels |
 //! | | 20 t | of `t` tiles, with a goal: bit 0 enough, bits 1 and 2 which of two `f64` are known: noise squared when samples were last doubled, and one doubling earlier |
 //! | | 24 n | of pixels, with a goal: sum as `f64` and samples before a pass, and after it |
+//!
+//! A sum is an integer of 16 bytes, of which most are zeros or the sign again: a byte tells how many follow, times 16, and how many zeros come before
+//! them; 0 is zero, and 1 all 16. Pixels of which other parts have the samples take little room that way.
 
 use alloc::vec::Vec;
 use core::fmt;
 
+use super::integrand::Counts;
 use super::noise::{Goal, Noise};
-use super::tiles::{Counts, Settings, Tiles};
+use super::share::Share;
+use super::sum::PixelSum;
+use super::tiles::{Settings, Tiles};
 use crate::bytes::Crc;
 use crate::storage::{Full, List};
 
@@ -34,10 +42,10 @@ use crate::storage::{Full, List};
 pub const MAGIC: [u8; 8] = *b"\x89FOGPIC\n";
 
 /// Of the layout above.
-pub const VERSION: u32 = 1;
+pub const VERSION: u32 = 2;
 
 /// Length of the header (bytes).
-pub const HEADER_BYTES: usize = 96;
+pub const HEADER_BYTES: usize = 120;
 
 /// Why bytes are not the picture asked for, in the order of the checks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -115,13 +123,52 @@ impl Reader<'_> {
     pub(super) fn double(&mut self) -> f64 {
         f64::from_le_bytes(self.take())
     }
+
+    /// What [`put`] has written.
+    fn integer(&mut self) -> i128 {
+        let [code] = self.take();
+        let (count, zeros) = match code {
+            0 => return 0,
+            1 => (16, 0),
+            code => (usize::from(code >> 4), usize::from(code & 15)),
+        };
+        let mut bytes = [0; 16];
+        let (digits, rest) = self.0.split_at_checked(count).unwrap_or((self.0, &[]));
+        self.0 = rest;
+        let Some(own) = bytes.get_mut(zeros..zeros + digits.len()) else { return 0 };
+        own.copy_from_slice(digits);
+        if digits.last().is_some_and(|last| *last > 127) {
+            bytes[zeros + digits.len()..].fill(255);
+        }
+        i128::from_le_bytes(bytes)
+    }
 }
 
-/// Bytes behind the header.
-fn body_bytes(settings: &Settings) -> Option<usize> {
+/// Writes a sum: see above.
+fn put(sum: i128, bytes: &mut Vec<u8>) {
+    let all = sum.to_le_bytes();
+    let zeros = (sum.trailing_zeros() / 8) as usize;
+    // A sign bit belongs to the digits.
+    let signs = (if sum < 0 { !sum } else { sum }).leading_zeros();
+    let end = 16 - (signs.saturating_sub(1) / 8) as usize;
+    match sum {
+        0 => bytes.push(0),
+        _ if end - zeros == 16 => {
+            bytes.push(1);
+            bytes.extend(all);
+        }
+        _ => {
+            bytes.push(((end - zeros) << 4 | zeros) as u8);
+            bytes.extend(&all[zeros..end]);
+        }
+    }
+}
+
+/// The fewest bytes behind the header.
+fn least_bytes(settings: &Settings) -> Option<usize> {
     let pixels = settings.size[0].checked_mul(settings.size[1])? as usize;
     let room = settings.room();
-    let sums = pixels.checked_mul(settings.layers as usize)?.checked_mul(24)?;
+    let sums = pixels.checked_mul(settings.layers as usize)?.checked_mul(3)?;
     sums.checked_add(pixels.checked_mul(4)?)?.checked_add(room.tiles * 20)?.checked_add(room.pixels.checked_mul(24)?)
 }
 
@@ -153,23 +200,35 @@ impl<Q, C> Tiles<'_, Q, C> {
     /// ```
     #[must_use]
     pub fn to_bytes(&self, tag: u64) -> Vec<u8> {
-        let Self { settings, until, taken, pixels_per_job, taken_samples, .. } = self;
-        let mut bytes = Vec::with_capacity(HEADER_BYTES + body_bytes(settings).unwrap_or(0));
+        let Self { settings, until, taken_samples, .. } = self;
+        // A finished one is the same bytes however it came about.
+        let [taken, pixels_per_job] = if self.is_enough { [0, 1] } else { [self.taken, self.pixels_per_job] };
+        let until = if self.is_enough { until.max(&settings.samples) } else { until };
+        let mut bytes = Vec::with_capacity(HEADER_BYTES + 4 * least_bytes(settings).unwrap_or(0));
         bytes.extend(MAGIC);
         let goal = settings.goal.unwrap_or(Goal { noise: 0.0, least: 0 });
         let flags = u32::from(self.is_enough) | u32::from(settings.goal.is_some()) << 1;
         let [columns, rows] = settings.size;
-        let pass = [*until, *taken, *pixels_per_job];
+        let pass = [*until, taken, pixels_per_job];
         let asked = [settings.tile, goal.noise.to_bits(), goal.least, settings.samples, flags];
         let words = [VERSION, columns, rows, settings.layers].into_iter().chain(pass).chain(asked);
         words.for_each(|word| bytes.extend(word.to_le_bytes()));
-        let longs = [settings.seed, taken_samples.samples, taken_samples.non_finite, tag, 0];
+        let longs = [settings.seed, taken_samples.samples, taken_samples.non_finite, tag];
         longs.iter().for_each(|long| bytes.extend(long.to_le_bytes()));
-        self.sums.as_slice().as_flattened().iter().for_each(|sum| bytes.extend(sum.to_le_bytes()));
+        let share = match self.share {
+            Share::Whole => [0; 3],
+            Share::Tiles { part, of } => [1, part, of],
+            Share::Samples { part, of } => [2, part, of],
+        };
+        share.iter().chain([&self.first]).for_each(|word| bytes.extend(word.to_le_bytes()));
+        bytes.extend([0; 16]);
+        self.sums.as_slice().iter().flat_map(|sum| sum.0).for_each(|sum| put(sum, &mut bytes));
         self.counts.as_slice().iter().for_each(|count| bytes.extend(count.to_le_bytes()));
         if let Some(noise) = &self.noise {
             noise.write(&mut bytes);
         }
+        let body = (bytes.len() - HEADER_BYTES) as u64;
+        bytes[HEADER_BYTES - 16..HEADER_BYTES - 8].copy_from_slice(&body.to_le_bytes());
         let crc = checksum(&bytes);
         bytes[HEADER_BYTES - 8..HEADER_BYTES].copy_from_slice(&crc.to_le_bytes());
         bytes
@@ -214,10 +273,13 @@ impl<Q, C: Default> Tiles<'static, Q, C> {
         }
         let [columns, rows, layers, until, taken, pixels_per_job] = [(); 6].map(|()| header.word());
         let [tile, noise, least, samples, flags] = [(); 5].map(|()| header.word());
-        let [seed, all, non_finite, found, crc] = [(); 5].map(|()| header.long());
+        let [seed, all, non_finite, found] = [(); 4].map(|()| header.long());
+        let [kind, part, parts, first] = [(); 4].map(|()| header.word());
+        let [body_bytes, crc] = [(); 2].map(|()| header.long());
         let goal = (flags & 2 != 0).then(|| Goal { noise: f32::from_bits(noise), least });
         let of = Settings { size: [columns, rows], layers, samples, goal, seed, tile };
-        let due = body_bytes(&of).and_then(|body| body.checked_add(HEADER_BYTES)).ok_or(PictureBytesError::Content)?;
+        let due = usize::try_from(body_bytes).ok().and_then(|body| body.checked_add(HEADER_BYTES));
+        let due = due.ok_or(PictureBytesError::Content)?;
         if bytes.len() != due {
             return Err(PictureBytesError::Length { found: bytes.len(), due });
         }
@@ -238,13 +300,20 @@ impl<Q, C: Default> Tiles<'static, Q, C> {
         if let Some((_, what)) = differs.into_iter().find(|(differs, _)| *differs) {
             return Err(PictureBytesError::Settings(what));
         }
-        let room = settings.room();
-        let mut body = Reader(&bytes[HEADER_BYTES..]);
-        let sums: Vec<[f64; 3]> = (0..room.sums).map(|_| [(); 3].map(|()| body.double())).collect();
-        let counts: Vec<u32> = (0..room.counts).map(|_| body.word()).collect();
-        if !sums.as_flattened().iter().all(|sum| sum.is_finite()) {
+        let share = match kind {
+            0 => Share::Whole,
+            1 => Share::Tiles { part, of: parts },
+            2 => Share::Samples { part, of: parts },
+            _ => return Err(PictureBytesError::Content),
+        };
+        // Before memory is asked for.
+        if least_bytes(&of).is_none_or(|least| least > bytes.len() - HEADER_BYTES) {
             return Err(PictureBytesError::Content);
         }
+        let room = settings.room();
+        let mut body = Reader(&bytes[HEADER_BYTES..]);
+        let sums: Vec<PixelSum> = (0..room.sums).map(|_| PixelSum([(); 3].map(|()| body.integer()))).collect();
+        let counts: Vec<u32> = (0..room.counts).map(|_| body.word()).collect();
         let noise = settings.goal.map(|goal| Noise::new(goal, List::default(), List::default()));
         let mut tiles = Self::start(settings, source, (sums.into(), counts.into()), noise)
             .map_err(|Full| PictureBytesError::Content)?;
@@ -252,6 +321,10 @@ impl<Q, C: Default> Tiles<'static, Q, C> {
         if let Some(noise) = &mut tiles.noise {
             noise.read(&mut body).ok_or(PictureBytesError::Content)?;
         }
+        if !body.0.is_empty() {
+            return Err(PictureBytesError::Content);
+        }
+        (tiles.share, tiles.first) = (share, first);
         // A goal is judged where passes end, so they have to end where they would have. More samples than there were to be begin anew.
         let is_enough = flags & 1 != 0;
         if !is_enough || settings.samples <= samples {
@@ -279,7 +352,7 @@ mod tests {
     }
 
     /// Left and taken up again every so many jobs.
-    fn left_every(settings: Settings, jobs: u32) -> (Vec<[f64; 3]>, Vec<u32>) {
+    fn left_every(settings: Settings, jobs: u32) -> (Vec<PixelSum>, Vec<u32>) {
         let mut tiles: Tiles<'_, _, ()> = Tiles::new(settings, Independent);
         let mut output = TileOutput::default();
         while !tiles.is_done() {
@@ -304,6 +377,40 @@ mod tests {
             for jobs in [1, 7, 50] {
                 assert_eq!(left_every(settings, jobs), whole, "{goal:?} {jobs}");
             }
+        }
+    }
+
+    #[test]
+    fn integers_of_any_length_are_read_as_they_were_written() {
+        let near = |power: u32| [(1_i128 << power) - 1, 1 << power, (1 << power) + 1];
+        let all = (0..127).flat_map(near).flat_map(|sum| [sum, -sum]).chain([0, i128::MAX, i128::MIN]);
+        for sum in all {
+            let mut bytes = Vec::new();
+            put(sum, &mut bytes);
+            let mut reader = Reader(&bytes);
+            assert_eq!((reader.integer(), reader.0.len()), (sum, 0), "{bytes:?}");
+        }
+    }
+
+    /// Two machines, each left in the middle and gone on with; of tiles, and of samples that begin in the middle.
+    #[test]
+    fn parts_left_anywhere_merge_to_the_bits_of_the_whole() {
+        let mut whole: Tiles<'_, _, ()> = Tiles::new(SETTINGS, Independent);
+        work::finish(&mut whole, &ramp, &mut TileOutput::default());
+        for share in [|part| Share::Tiles { part, of: 2 }, |part| Share::Samples { part, of: 2 }] {
+            let mut merged: Tiles<'_, _, ()> = Tiles::new(SETTINGS, Independent);
+            for part in [1, 0] {
+                let mut tiles: Tiles<'_, _, ()> = Tiles::new(SETTINGS, Independent).of_share(share(part), 1);
+                while !tiles.is_done() {
+                    for _ in 0..5 {
+                        work::step(&mut tiles, &ramp, &mut TileOutput::default());
+                    }
+                    tiles = Tiles::read(SETTINGS, Independent, 1, &tiles.to_bytes(1)).unwrap().of_share(share(part), 1);
+                }
+                merged.merge(&tiles);
+            }
+            assert!(merged.is_done() && merged.counts() == whole.counts());
+            assert_eq!(merged.to_bytes(1), whole.to_bytes(1), "{:?}", share(0));
         }
     }
 

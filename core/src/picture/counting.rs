@@ -3,7 +3,7 @@
 use core::cell::Cell;
 use core::ops::{Add, AddAssign};
 
-use super::tiles::Tally;
+use super::integrand::Tally;
 use crate::host::{Face, Gradients, Hit, MajorantSegment, Medium, Properties, Scene};
 use crate::math::{Ray, Symmetric3, Vec3};
 use crate::spectrum::{Gradient, Hessian, Spectrum};

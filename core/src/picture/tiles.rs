@@ -2,7 +2,10 @@
 
 use core::ops::Range;
 
+use super::integrand::{Counts, Integrand, Sample, Tally};
 use super::noise::{Goal, Noise, Part, PixelNoise, TileNoise};
+use super::share::Share;
+use super::sum::PixelSum;
 use crate::sampling::{GeneratorSource, pixel_key};
 use crate::spectrum::Spectrum;
 use crate::storage::{Full, List};
@@ -26,109 +29,11 @@ pub struct Settings {
     pub tile: u32,
 }
 
-/// One sample of one pixel.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Sample<'t, T> {
-    /// Column, from the left.
-    pub x: u32,
-    /// Row, from the top.
-    pub y: u32,
-    /// Index of the sample in its pixel.
-    pub index: u32,
-    /// What the integrand counts, job by job.
-    pub tally: &'t T,
-}
-
-/// What a sample of a picture is: writes a colour per layer into the slice it is given (black at first), from the random
-/// numbers it is given and nothing else that changes.
-///
-/// ```
-/// use fogbow::picture::{Integrand, Sample};
-/// use fogbow::{sampling::Generator, spectrum::Spectrum};
-/// // A function that counts nothing is one.
-/// let columns = |sample: &Sample<'_, ()>, _: &mut Generator, layers: &mut [Spectrum]| layers[0] = Spectrum::splat(sample.x as f32);
-/// let mut layers = [Spectrum::ZERO];
-/// columns.sample(&Sample { x: 3, y: 0, index: 0, tally: &() }, &mut Generator::new(1), &mut layers);
-/// assert_eq!(layers[0], Spectrum::splat(3.0));
-/// ```
-pub trait Integrand<R> {
-    /// What it counts on its way; `()` for nothing.
-    type Tally: Tally;
-
-    /// Takes one sample.
-    fn sample(&self, sample: &Sample<'_, Self::Tally>, rng: &mut R, layers: &mut [Spectrum]);
-}
-
-/// What an [`Integrand`] counts, job by job: each starts with the default.
-///
-/// ```
-/// # #[cfg(feature = "alloc")] {
-/// use core::cell::Cell;
-/// use fogbow::picture::{Integrand, Sample, Settings, Tally, TileOutput, Tiles};
-/// use fogbow::{sampling::{Generator, Independent}, spectrum::Spectrum, work};
-///
-/// #[derive(Default)]
-/// struct Rays(Cell<u64>);
-///
-/// impl Tally for Rays {
-///     type Total = u64;
-///     fn add_to(&self, total: &mut u64) {
-///         *total += self.0.get();
-///     }
-/// }
-///
-/// /// Sends one ray more in each row than in the row above.
-/// struct Rows;
-///
-/// impl Integrand<Generator> for Rows {
-///     type Tally = Rays;
-///     fn sample(&self, sample: &Sample<'_, Rays>, _: &mut Generator, _: &mut [Spectrum]) {
-///         sample.tally.0.set(sample.tally.0.get() + u64::from(sample.y));
-///     }
-/// }
-///
-/// let settings = Settings { size: [5, 3], layers: 1, samples: 10, goal: None, seed: 0, tile: 8 };
-/// let mut tiles = Tiles::new(settings, Independent);
-/// work::finish(&mut tiles, &Rows, &mut TileOutput::default());
-/// assert_eq!(*tiles.total(), 10 * 5 * (0 + 1 + 2));
-/// # }
-/// ```
-pub trait Tally: Default {
-    /// The sum over all jobs.
-    type Total: Default;
-
-    /// Adds what a job has counted.
-    fn add_to(&self, total: &mut Self::Total);
-}
-
-impl Tally for () {
-    type Total = ();
-
-    fn add_to(&self, (): &mut ()) {}
-}
-
-impl<R, F: Fn(&Sample<'_, ()>, &mut R, &mut [Spectrum])> Integrand<R> for F {
-    type Tally = ();
-
-    fn sample(&self, sample: &Sample<'_, ()>, rng: &mut R, layers: &mut [Spectrum]) {
-        self(sample, rng, layers);
-    }
-}
-
-/// Samples that were taken.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Counts {
-    /// All of them.
-    pub samples: u64,
-    /// Of these, those that were no finite numbers and count as black: 0 unless something is wrong.
-    pub non_finite: u64,
-}
-
 /// What a job leaves: the new sums of some pixels.
 #[derive(Debug)]
 #[cfg_attr(feature = "alloc", derive(Default))]
 pub struct TileOutput<'o, T> {
-    sums: List<'o, [f64; 3]>,
+    sums: List<'o, PixelSum>,
     colours: List<'o, Spectrum>,
     counts: Counts,
     tally: T,
@@ -140,21 +45,21 @@ impl<'o, T: Default> TileOutput<'o, T> {
     /// too small, [`Tiles::is_cut`] says so.
     ///
     /// ```
-    /// use fogbow::picture::{Sample, Settings, TileOutput, TileSlots, Tiles};
+    /// use fogbow::picture::{PixelSum, Sample, Settings, TileOutput, TileSlots, Tiles};
     /// use fogbow::{sampling::{Generator, Independent}, spectrum::Spectrum, storage::Full, work};
     /// let settings = Settings { size: [4, 1], layers: 1, samples: 8, goal: None, seed: 0, tile: 8 };
     /// let white = |_: &Sample<'_, ()>, _: &mut Generator, layers: &mut [Spectrum]| layers[0] = Spectrum::ONE;
-    /// let (mut sums, mut counts) = ([[0.0; 3]; 4], [0; 4]);
+    /// let (mut sums, mut counts) = ([PixelSum::ZERO; 4], [0; 4]);
     /// let slots = TileSlots { sums: &mut sums, counts: &mut counts, ..TileSlots::default() };
     /// let mut tiles = Tiles::lent(settings, Independent, slots)?;
-    /// let (mut of_job, mut colours) = ([[0.0; 3]; 8], [Spectrum::ZERO; 1]);
+    /// let (mut of_job, mut colours) = ([PixelSum::ZERO; 8], [Spectrum::ZERO; 1]);
     /// assert!(of_job.len() >= settings.room().of_job_sums && colours.len() == settings.room().of_job_colours);
     /// work::finish(&mut tiles, &white, &mut TileOutput::lent(&mut of_job, &mut colours));
     /// assert!(!tiles.is_cut() && tiles.counts().samples == 4 * 8);
     /// # Ok::<(), Full>(())
     /// ```
     #[must_use]
-    pub fn lent(sums: &'o mut [[f64; 3]], colours: &'o mut [Spectrum]) -> Self {
+    pub fn lent(sums: &'o mut [PixelSum], colours: &'o mut [Spectrum]) -> Self {
         Self {
             sums: sums.into(),
             colours: colours.into(),
@@ -186,7 +91,7 @@ pub struct TileRoom {
 #[derive(Debug, Default)]
 pub struct TileSlots<'s> {
     /// Sums of samples: pixel by pixel from the top left, within each layer by layer.
-    pub sums: &'s mut [[f64; 3]],
+    pub sums: &'s mut [PixelSum],
     /// Numbers of samples of the pixels.
     pub counts: &'s mut [u32],
     /// What is known of the noise of tiles: only for a [`Settings::goal`].
@@ -248,7 +153,7 @@ pub struct Tiles<'s, Q, C = ()> {
     pub(super) settings: Settings,
     source: Q,
     /// Pixel by pixel, within each layer by layer; and samples of each pixel.
-    pub(super) sums: List<'s, [f64; 3]>,
+    pub(super) sums: List<'s, PixelSum>,
     pub(super) counts: List<'s, u32>,
     pub(super) noise: Option<Noise<'s>>,
     /// The pass at hand takes every pixel to so many samples, so many pixels a job.
@@ -257,6 +162,9 @@ pub struct Tiles<'s, Q, C = ()> {
     /// Jobs whose results were taken.
     pub(super) taken: u32,
     pub(super) taken_samples: Counts,
+    pub(super) share: Share,
+    /// Index of a pixel's first sample.
+    pub(super) first: u32,
     total: C,
     is_by_pass: bool,
     pub(super) is_enough: bool,
@@ -271,7 +179,7 @@ impl<'s, Q, C: Default> Tiles<'s, Q, C> {
     /// [`Full`] if there is less memory than [`Settings::room`] says.
     ///
     /// ```
-    /// use fogbow::picture::{Goal, PixelNoise, Sample, Settings, TileNoise, TileOutput, TileRoom, TileSlots, Tiles};
+    /// use fogbow::picture::{Goal, PixelNoise, PixelSum, Sample, Settings, TileNoise, TileOutput, TileRoom, TileSlots, Tiles};
     /// use fogbow::{sampling::{Generator, Independent, uniform}, spectrum::Spectrum, storage::Full, work};
     ///
     /// // Known beforehand, so that everything may lie in arrays, or be `static`.
@@ -279,7 +187,7 @@ impl<'s, Q, C: Default> Tiles<'s, Q, C> {
     ///     size: [16, 8], layers: 1, samples: 4096, goal: Some(Goal { noise: 0.05, least: 8 }), seed: 0, tile: 8,
     /// };
     /// const ROOM: TileRoom = SETTINGS.room();
-    /// let (mut sums, mut counts) = ([[0.0; 3]; ROOM.sums], [0; ROOM.counts]);
+    /// let (mut sums, mut counts) = ([PixelSum::ZERO; ROOM.sums], [0; ROOM.counts]);
     /// let (mut noise, mut pixels) = ([TileNoise::default(); ROOM.tiles], [PixelNoise::default(); ROOM.pixels]);
     /// let slots = TileSlots { sums: &mut sums, counts: &mut counts, tiles: &mut noise, pixels: &mut pixels };
     /// let mut tiles = Tiles::lent(SETTINGS, Independent, slots)?;
@@ -288,11 +196,11 @@ impl<'s, Q, C: Default> Tiles<'s, Q, C> {
     /// let ramp = |sample: &Sample<'_, ()>, rng: &mut Generator, layers: &mut [Spectrum]| {
     ///     layers[0] = Spectrum::splat(if sample.x < 8 { 1.0 } else { 2.0 * uniform(rng) });
     /// };
-    /// let (mut of_job, mut colours) = ([[0.0; 3]; ROOM.of_job_sums], [Spectrum::ZERO; ROOM.of_job_colours]);
+    /// let (mut of_job, mut colours) = ([PixelSum::ZERO; ROOM.of_job_sums], [Spectrum::ZERO; ROOM.of_job_colours]);
     /// work::finish(&mut tiles, &ramp, &mut TileOutput::lent(&mut of_job, &mut colours));
     /// assert!(tiles.is_done() && !tiles.is_cut());
     /// assert!(counts[0] == 8 && counts[15] > 100 && counts[15] < 4096, "{counts:?}");
-    /// assert_eq!(sums[0], [8.0; 3]);
+    /// assert_eq!(sums[0].values(), [8.0; 3]);
     /// # Ok::<(), Full>(())
     /// ```
     pub fn lent(settings: Settings, source: Q, slots: TileSlots<'s>) -> Result<Self, Full> {
@@ -308,7 +216,7 @@ impl<'s, Q, C: Default> Tiles<'s, Q, C> {
     pub(super) fn start(
         settings: Settings,
         source: Q,
-        (sums, counts): (List<'s, [f64; 3]>, List<'s, u32>),
+        (sums, counts): (List<'s, PixelSum>, List<'s, u32>),
         mut noise: Option<Noise<'s>>,
     ) -> Result<Self, Full> {
         if let Some(noise) = &mut noise {
@@ -328,6 +236,8 @@ impl<'s, Q, C: Default> Tiles<'s, Q, C> {
             pixels_per_job: 1,
             taken: 0,
             taken_samples: Counts::default(),
+            share: Share::Whole,
+            first: 0,
             total: C::default(),
             is_by_pass: false,
             is_enough: settings.samples == 0,
@@ -345,7 +255,7 @@ impl<Q, C: Default> Tiles<'static, Q, C> {
     #[must_use]
     pub fn new(settings: Settings, source: Q) -> Self {
         let room = settings.room();
-        Self::of(settings, source, alloc::vec![[0.0; 3]; room.sums], alloc::vec![0; room.counts])
+        Self::of(settings, source, alloc::vec![PixelSum::ZERO; room.sums], alloc::vec![0; room.counts])
     }
 
     /// Goes on with a picture of which there are sums (pixel by pixel from the top left, within each layer by layer) and
@@ -369,7 +279,7 @@ impl<Q, C: Default> Tiles<'static, Q, C> {
     /// assert_eq!(continued, finished(Tiles::new(settings(16), Independent)));
     /// ```
     #[must_use]
-    pub fn of(settings: Settings, source: Q, sums: alloc::vec::Vec<[f64; 3]>, counts: alloc::vec::Vec<u32>) -> Self {
+    pub fn of(settings: Settings, source: Q, sums: alloc::vec::Vec<PixelSum>, counts: alloc::vec::Vec<u32>) -> Self {
         let room = settings.room();
         assert!(counts.len() == room.counts && sums.len() == room.sums, "sums of another picture");
         let noise = settings.goal.map(|goal| Noise::new(goal, List::default(), List::default()));
@@ -386,10 +296,11 @@ impl<Q, C: Default> Tiles<'static, Q, C> {
     /// let mut tiles = Tiles::new(settings, Independent);
     /// let white = |_: &Sample<'_, ()>, _: &mut Generator, layers: &mut [Spectrum]| layers[0] = Spectrum::ONE;
     /// work::finish(&mut tiles, &white, &mut TileOutput::default());
-    /// assert_eq!(tiles.into_sums(), (vec![[8.0; 3]; 2], vec![8; 2]));
+    /// let (sums, counts) = tiles.into_sums();
+    /// assert_eq!((sums[1].values(), counts), ([8.0; 3], vec![8; 2]));
     /// ```
     #[must_use]
-    pub fn into_sums(self) -> (alloc::vec::Vec<[f64; 3]>, alloc::vec::Vec<u32>) {
+    pub fn into_sums(self) -> (alloc::vec::Vec<PixelSum>, alloc::vec::Vec<u32>) {
         (self.sums.into_vec(), self.counts.into_vec())
     }
 }
@@ -449,6 +360,82 @@ impl<Q, C> Tiles<'_, Q, C> {
         self
     }
 
+    /// Takes a part of the picture only: the same that was taken before, if this one was left. [`Settings::samples`] are those of the whole
+    /// picture, in passes of `pass` samples that share something, or of 1. A [`Settings::goal`] would be judged by the tiles that are taken, so
+    /// with one, parts are not those of the whole.
+    ///
+    /// ```
+    /// # #[cfg(feature = "alloc")] {
+    /// use fogbow::picture::{Sample, Settings, Share, TileOutput, Tiles};
+    /// use fogbow::{sampling::{Generator, Independent, uniform}, spectrum::Spectrum, work};
+    /// let settings = Settings { size: [19, 9], layers: 1, samples: 50, goal: None, seed: 0, tile: 4 };
+    /// let noise = |_: &Sample<'_, ()>, rng: &mut Generator, layers: &mut [Spectrum]| layers[0] = Spectrum::splat(uniform(rng));
+    /// let taken = |share| {
+    ///     let mut tiles: Tiles<'_, _, ()> = Tiles::new(settings, Independent).of_share(share, 1);
+    ///     work::finish(&mut tiles, &noise, &mut TileOutput::default());
+    ///     tiles
+    /// };
+    /// // A machine each; put together in any order.
+    /// let mut merged: Tiles<'_, _, ()> = Tiles::new(settings, Independent);
+    /// [2, 0, 1].iter().for_each(|&part| merged.merge(&taken(Share::Samples { part, of: 3 })));
+    /// assert_eq!(merged.into_sums(), taken(Share::Whole).into_sums());
+    /// # }
+    /// ```
+    #[must_use]
+    pub fn of_share(mut self, share: Share, pass: u32) -> Self {
+        let [first, end] = share.samples(self.settings.samples, pass);
+        let is_left = (self.share, self.first) == (share, first);
+        (self.share, self.first) = (share, first);
+        self.settings.samples = end - first;
+        let done = self.least_count();
+        self.is_enough |= done >= self.settings.samples;
+        if !is_left {
+            self.begin(done.saturating_add(1));
+        }
+        self
+    }
+
+    /// Index of the first sample of a pixel that is taken: 0 but for parts of samples.
+    #[must_use]
+    pub fn first(&self) -> u32 {
+        self.first
+    }
+
+    /// Adds the samples of a part to a whole picture, which has none of them yet: see [`Tiles::of_share`]. A picture of another size or with other
+    /// layers adds nothing. Noise is not known of merged pictures: without a [`Settings::goal`].
+    ///
+    /// ```
+    /// # #[cfg(feature = "alloc")] {
+    /// # use fogbow::picture::{Sample, Settings, Share, TileOutput, Tiles};
+    /// # use fogbow::{sampling::{Generator, Independent}, spectrum::Spectrum, work};
+    /// # let settings = Settings { size: [5, 4], layers: 1, samples: 3, goal: None, seed: 0, tile: 2 };
+    /// # let white = |_: &Sample<'_, ()>, _: &mut Generator, layers: &mut [Spectrum]| layers[0] = Spectrum::ONE;
+    /// let part = |part| {
+    ///     let mut tiles: Tiles<'_, _, ()> = Tiles::new(settings, Independent).of_share(Share::Tiles { part, of: 2 }, 1);
+    ///     work::finish(&mut tiles, &white, &mut TileOutput::default());
+    ///     tiles
+    /// };
+    /// let mut merged: Tiles<'_, _, ()> = Tiles::new(settings, Independent);
+    /// merged.merge(&part(1));
+    /// assert_eq!((merged.least_count(), merged.counts().samples), (0, 3 * 10));
+    /// merged.merge(&part(0));
+    /// assert!(merged.is_done() && merged.mean(4, 3, 0) == Spectrum::ONE);
+    /// # }
+    /// ```
+    pub fn merge<P>(&mut self, other: &Tiles<'_, P, C>) {
+        let is_same = (self.settings.size, self.settings.layers) == (other.settings.size, other.settings.layers);
+        if !is_same {
+            return;
+        }
+        self.sums.as_mut_slice().iter_mut().zip(other.sums.as_slice()).for_each(|(sum, more)| sum.merge(more));
+        let counts = self.counts.as_mut_slice().iter_mut().zip(other.counts.as_slice());
+        counts.for_each(|(count, more)| *count = count.saturating_add(*more));
+        self.taken_samples.samples += other.taken_samples.samples;
+        self.taken_samples.non_finite += other.taken_samples.non_finite;
+        self.taken = 0;
+        self.is_enough |= self.least_count() >= self.settings.samples;
+    }
+
     /// Begins a pass that takes every pixel of a tile without enough samples to `until` samples, or to
     /// [`Settings::samples`] if that is less. A pass that is not done is left as it is.
     pub fn begin(&mut self, until: u32) {
@@ -481,11 +468,11 @@ impl<Q, C> Tiles<'_, Q, C> {
     /// Whether a job's lent [`TileOutput`] was too small: its pixels lack samples.
     ///
     /// ```
-    /// # use fogbow::picture::{Sample, Settings, TileOutput, TileSlots, Tiles};
+    /// # use fogbow::picture::{PixelSum, Sample, Settings, TileOutput, TileSlots, Tiles};
     /// # use fogbow::{sampling::{Generator, Independent}, spectrum::Spectrum, storage::Full, work};
     /// # let settings = Settings { size: [2, 1], layers: 1, samples: 1, goal: None, seed: 0, tile: 8 };
     /// # let white = |_: &Sample<'_, ()>, _: &mut Generator, layers: &mut [Spectrum]| layers[0] = Spectrum::ONE;
-    /// let (mut sums, mut counts) = ([[0.0; 3]; 2], [0; 2]);
+    /// let (mut sums, mut counts) = ([PixelSum::ZERO; 2], [0; 2]);
     /// let slots = TileSlots { sums: &mut sums, counts: &mut counts, ..TileSlots::default() };
     /// let mut tiles = Tiles::lent(settings, Independent, slots)?;
     /// work::finish(&mut tiles, &white, &mut TileOutput::lent(&mut [], &mut []));
@@ -497,10 +484,21 @@ impl<Q, C> Tiles<'_, Q, C> {
         self.is_cut
     }
 
-    /// The smallest number of samples of any pixel.
+    /// The smallest number of samples of any pixel that is to have some: 0 without pixels.
     #[must_use]
     pub fn least_count(&self) -> u32 {
-        self.counts.as_slice().iter().copied().min().unwrap_or(0)
+        let counts = self.counts.as_slice();
+        if !matches!(self.share, Share::Tiles { .. }) {
+            return counts.iter().copied().min().unwrap_or(0);
+        }
+        let own = (0..self.settings.pixels()).filter(|&pixel| self.has(self.place(pixel)));
+        own.map(|pixel| counts[pixel as usize]).min().unwrap_or(self.settings.samples)
+    }
+
+    /// How many pixels are to have samples.
+    #[must_use]
+    pub fn pixel_count(&self) -> u32 {
+        (0..self.settings.pixels()).filter(|&pixel| self.has(self.place(pixel))).count() as u32
     }
 
     /// Samples of a pixel; 0 outside.
@@ -516,10 +514,7 @@ impl<Q, C> Tiles<'_, Q, C> {
         let count = self.count(x, y);
         let index = (y as usize * self.settings.size[0] as usize + x as usize) * self.settings.layers as usize;
         match self.sums.as_slice().get(index + layer as usize) {
-            Some(sum) if count > 0 && layer < self.settings.layers => {
-                let weight = 1.0 / f64::from(count);
-                Spectrum(sum.map(|sum| (sum * weight) as f32))
-            }
+            Some(sum) if layer < self.settings.layers => sum.mean(count),
             _ => Spectrum::ZERO,
         }
     }
@@ -568,7 +563,21 @@ impl<Q, C> Tiles<'_, Q, C> {
         from..(from + self.pixels_per_job).min(self.settings.pixels())
     }
 
+    /// Column and row of a pixel.
+    fn place(&self, pixel: u32) -> [u32; 2] {
+        [pixel % self.settings.size[0], pixel / self.settings.size[0]]
+    }
+
+    /// Whether a pixel is to have samples at all.
+    fn has(&self, place: [u32; 2]) -> bool {
+        let side = self.settings.tile.max(1);
+        self.share.has(place.map(|at| at / side))
+    }
+
     fn is_open(&self, x: u32, y: u32) -> bool {
+        if !self.has([x, y]) {
+            return false;
+        }
         let Some(noise) = &self.noise else { return true };
         let side = self.settings.tile.max(1);
         !noise.is_enough(y / side * self.settings.grid()[0] + x / side)
@@ -606,7 +615,7 @@ impl<Q, C> Tiles<'_, Q, C> {
 /// Calls `each` with every tile and what its pixels have, row by row.
 fn each_tile(
     settings: &Settings,
-    sums: &[[f64; 3]],
+    sums: &[PixelSum],
     counts: &[u32],
     mut each: impl FnMut(u32, &mut dyn Iterator<Item = Part>),
 ) {
@@ -615,7 +624,7 @@ fn each_tile(
         let [xs, ys] = settings.span(tile);
         let mut parts = ys.flat_map(|y| xs.clone().map(move |x| (x, y))).map(|(x, y)| {
             let index = y as usize * settings.size[0] as usize + x as usize;
-            Part::of(&sums[index * settings.layers as usize], counts[index])
+            Part::of(&sums[index * settings.layers as usize].values(), counts[index])
         });
         each(tile, &mut parts);
     }
@@ -645,7 +654,7 @@ where
         }
         let TileOutput { sums: new, colours, counts, tally, .. } = output;
         for pixel in pixels {
-            let (x, y) = (pixel % self.settings.size[0], pixel / self.settings.size[0]);
+            let [x, y] = self.place(pixel);
             let from = pixel as usize * layers;
             let start = new.len();
             if new.extend_from_slice(&self.sums.as_slice()[from..from + layers]).is_err() || !self.is_open(x, y) {
@@ -654,12 +663,11 @@ where
             let sums = &mut new.as_mut_slice()[start..];
             let colours = colours.as_mut_slice();
             for index in self.counts.as_slice()[pixel as usize]..self.until {
+                let index = self.first + index;
                 let mut rng = self.source.start(self.settings.seed, pixel_key(x, y), index);
                 colours.fill(Spectrum::ZERO);
                 integrand.sample(&Sample { x, y, index, tally: &*tally }, &mut rng, colours);
-                if colours.iter().all(|colour| colour.0.iter().all(|c| c.is_finite())) {
-                    accumulate(sums, colours);
-                } else {
+                if !accumulate(sums, colours) {
                     counts.non_finite += 1;
                 }
                 counts.samples += 1;
@@ -675,7 +683,8 @@ where
         let layers = self.settings.layers as usize;
         let pixels = self.pixels_of(self.taken);
         for (pixel, sums) in pixels.zip(output.sums.as_slice().chunks_exact(layers.max(1))) {
-            if !self.is_open(pixel % self.settings.size[0], pixel / self.settings.size[0]) {
+            let [x, y] = self.place(pixel);
+            if !self.is_open(x, y) {
                 continue;
             }
             self.sums.as_mut_slice()[pixel as usize * layers..][..layers].copy_from_slice(sums);
@@ -696,19 +705,21 @@ where
     }
 }
 
-/// Adds a sample to the sums of one pixel, layer by layer.
+/// Adds a sample to the sums of one pixel, layer by layer; whether it could be. A sample with a channel that [`PixelSum`] does not hold adds nothing
+/// to any layer.
 ///
 /// ```
-/// use fogbow::{picture::accumulate, spectrum::Spectrum};
-/// let mut sums = [[1e9; 3]];
-/// accumulate(&mut sums, &[Spectrum::ONE]);
-/// assert_eq!(sums[0][0], 1_000_000_001.0);
+/// use fogbow::{picture::{PixelSum, accumulate}, spectrum::Spectrum};
+/// let mut sums = [PixelSum::ZERO; 2];
+/// assert!(accumulate(&mut sums, &[Spectrum::splat(1e9), Spectrum::ONE]));
+/// assert!(!accumulate(&mut sums, &[Spectrum::ONE, Spectrum::splat(f32::INFINITY)]));
+/// assert_eq!(sums.map(|sum| sum.values()[0]), [1e9, 1.0]);
 /// ```
 #[inline]
-pub fn accumulate(sums: &mut [[f64; 3]], colours: &[Spectrum]) {
-    for (sum, colour) in sums.iter_mut().zip(colours) {
-        for (s, c) in sum.iter_mut().zip(colour.0) {
-            *s += f64::from(c);
-        }
+pub fn accumulate(sums: &mut [PixelSum], colours: &[Spectrum]) -> bool {
+    let holds = colours.iter().all(PixelSum::holds);
+    if holds {
+        sums.iter_mut().zip(colours).for_each(|(sum, colour)| _ = sum.add(*colour));
     }
+    holds
 }

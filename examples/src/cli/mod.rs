@@ -2,6 +2,7 @@
 //!
 //! Exit codes: 0 done, 1 stopped early, 2 bad input.
 
+mod arguments;
 mod bake;
 mod bias_layers;
 mod check;
@@ -30,6 +31,7 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
+pub use arguments::{Method, RenderArguments};
 pub use bake::BakeArguments;
 pub use check::CheckArguments;
 pub use compare::CompareArguments;
@@ -43,7 +45,6 @@ pub use plume::PlumeArguments;
 pub use probe::{HessianArguments, Probe, ProbeArguments};
 pub use radiance_cache::{CacheArguments, Kind, Single};
 pub use records::RecordsArguments;
-pub use render::{Method, RenderArguments};
 pub use scene::{ReadArguments, SceneArguments};
 pub use vpl::{Clamp, Recovery, Switch, VplArguments};
 

@@ -13,7 +13,9 @@ use fogbow::math::{Bounds, Ray, Vec3};
 use fogbow::medium::{Homogeneous, Placed, Region};
 use fogbow::path;
 use fogbow::phase::{Lobe, Phase};
-use fogbow::picture::{self, Goal, Integrand, PixelNoise, Sample, TileNoise, TileOutput, TileRoom, TileSlots, Tiles};
+use fogbow::picture::{
+    self, Goal, Integrand, PixelNoise, PixelSum, Sample, TileNoise, TileOutput, TileRoom, TileSlots, Tiles,
+};
 use fogbow::sampling::{Generator, Independent, uniform};
 use fogbow::sh::{Coefficient, coefficient_count};
 use fogbow::spectrum::Spectrum;
@@ -389,18 +391,18 @@ pub fn pixel(world: &Foggy<'_>) -> impl Integrand<Generator, Tally = ()> + Sync 
 }
 
 /// Folds the sums and numbers of samples of a picture.
-pub fn see_picture(out: &mut Digest, sums: &[[f64; 3]], counts: &[u32]) {
-    sums.iter().flatten().for_each(|sum| out.int(sum.to_bits()));
+pub fn see_picture(out: &mut Digest, sums: &[PixelSum], counts: &[u32]) {
+    sums.iter().flat_map(PixelSum::values).for_each(|sum| out.int(sum.to_bits()));
     counts.iter().for_each(|count| out.int(u64::from(*count)));
 }
 
 /// Renders in lent memory.
-fn rendered(world: &Foggy<'_>, see: impl FnOnce(&[[f64; 3]], &[u32])) {
-    let (mut sums, mut counts) = ([[0.0; 3]; ROOM.sums], [0; ROOM.counts]);
+fn rendered(world: &Foggy<'_>, see: impl FnOnce(&[PixelSum], &[u32])) {
+    let (mut sums, mut counts) = ([PixelSum::ZERO; ROOM.sums], [0; ROOM.counts]);
     let (mut noise, mut pixels) = ([TileNoise::default(); ROOM.tiles], [PixelNoise::default(); ROOM.pixels]);
     let slots = TileSlots { sums: &mut sums, counts: &mut counts, tiles: &mut noise, pixels: &mut pixels };
     if let Ok(mut tiles) = Tiles::lent(PICTURE, Independent, slots) {
-        let (mut of_job, mut colours) = ([[0.0; 3]; ROOM.of_job_sums], [Spectrum::ZERO; ROOM.of_job_colours]);
+        let (mut of_job, mut colours) = ([PixelSum::ZERO; ROOM.of_job_sums], [Spectrum::ZERO; ROOM.of_job_colours]);
         work::finish(&mut tiles, &pixel(world), &mut TileOutput::lent(&mut of_job, &mut colours));
     }
     see(&sums, &counts);
@@ -427,7 +429,7 @@ mod tests {
             rendered(world, |sums, counts| {
                 let [least, most] = [counts.iter().min(), counts.iter().max()].map(|count| *count.unwrap());
                 assert!(least >= 8 && least < most && most <= 64, "{counts:?}");
-                assert!(sums.iter().flatten().all(|sum| sum.is_finite()) && sums.iter().any(|sum| sum[0] > 0.0));
+                assert!(sums.iter().any(|sum| sum.values()[0] > 0.0));
             });
         })
         .unwrap();
