@@ -242,6 +242,84 @@ fn checksum(bytes: &[u8]) -> u64 {
     crc.value()
 }
 
+/// What the bytes of a picture say of it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Described {
+    /// How it is sampled; of a part of samples, those of the part.
+    pub settings: Settings,
+    /// What it was made for.
+    pub tag: u64,
+    /// What of the picture it is.
+    pub share: Share,
+    /// Index of the first sample of a pixel.
+    pub first: u32,
+    /// Whether all samples were taken.
+    pub is_done: bool,
+    /// Samples that were taken.
+    pub counts: Counts,
+    /// The pass at hand.
+    pass: [u32; 3],
+}
+
+/// What the bytes of a picture are of, for those that do not know.
+///
+/// # Errors
+/// Bytes that are damaged, or no picture.
+///
+/// ```
+/// use fogbow::picture::bytes::{VERSION, described};
+/// use fogbow::picture::{PictureBytesError, Settings, Share, Tiles};
+/// use fogbow::sampling::Independent;
+/// let settings = Settings { size: [4, 3], layers: 1, samples: 64, goal: None, seed: 0, tile: 8 };
+/// let share = Share::Samples { part: 1, of: 4 };
+/// let bytes = Tiles::<'_, _, ()>::new(settings, Independent).of_share(share, 1).to_bytes(7);
+/// let found = described(&bytes)?;
+/// assert_eq!((found.tag, found.share, found.first, found.settings.samples), (7, share, 16, 16));
+/// assert!(!found.is_done && described(b"a picture of another program").is_err());
+/// # Ok::<(), PictureBytesError>(())
+/// ```
+pub fn described(bytes: &[u8]) -> Result<Described, PictureBytesError> {
+    if bytes.len() < HEADER_BYTES {
+        return Err(PictureBytesError::NoHeader { found: bytes.len() });
+    }
+    let mut header = Reader(bytes);
+    if header.take() != MAGIC {
+        return Err(PictureBytesError::Magic);
+    }
+    let version = header.word();
+    if version != VERSION {
+        return Err(PictureBytesError::Version(version));
+    }
+    let [columns, rows, layers] = [(); 3].map(|()| header.word());
+    let pass = [(); 3].map(|()| header.word());
+    let [tile, noise, least, samples, flags] = [(); 5].map(|()| header.word());
+    let [seed, all, non_finite, tag] = [(); 4].map(|()| header.long());
+    let [kind, part, of, first] = [(); 4].map(|()| header.word());
+    let [body, crc] = [(); 2].map(|()| header.long());
+    let due = usize::try_from(body).ok().and_then(|body| body.checked_add(HEADER_BYTES));
+    let due = due.ok_or(PictureBytesError::Content)?;
+    if bytes.len() != due {
+        return Err(PictureBytesError::Length { found: bytes.len(), due });
+    }
+    if checksum(bytes) != crc {
+        return Err(PictureBytesError::Checksum);
+    }
+    let goal = (flags & 2 != 0).then(|| Goal { noise: f32::from_bits(noise), least });
+    let settings = Settings { size: [columns, rows], layers, samples, goal, seed, tile };
+    let share = match kind {
+        0 => Share::Whole,
+        1 => Share::Tiles { part, of },
+        2 => Share::Samples { part, of },
+        _ => return Err(PictureBytesError::Content),
+    };
+    // Before anybody asks for the memory.
+    if least_bytes(&settings).is_none_or(|least| least > bytes.len() - HEADER_BYTES) {
+        return Err(PictureBytesError::Content);
+    }
+    let counts = Counts { samples: all, non_finite };
+    Ok(Described { settings, tag, share, first, is_done: flags & 1 != 0, counts, pass })
+}
+
 impl<Q, C: Default> Tiles<'static, Q, C> {
     /// Goes on with what [`Tiles::to_bytes`] has left, to the bits of a picture that was never left. Without a goal, more samples may be asked
     /// for than before.
@@ -260,55 +338,22 @@ impl<Q, C: Default> Tiles<'static, Q, C> {
     /// assert_eq!(read(Settings { seed: 1, ..settings }, 7), Some(PictureBytesError::Settings("seed")));
     /// ```
     pub fn read(settings: Settings, source: Q, tag: u64, bytes: &[u8]) -> Result<Self, PictureBytesError> {
-        if bytes.len() < HEADER_BYTES {
-            return Err(PictureBytesError::NoHeader { found: bytes.len() });
-        }
-        let mut header = Reader(bytes);
-        if header.take() != MAGIC {
-            return Err(PictureBytesError::Magic);
-        }
-        let version = header.word();
-        if version != VERSION {
-            return Err(PictureBytesError::Version(version));
-        }
-        let [columns, rows, layers, until, taken, pixels_per_job] = [(); 6].map(|()| header.word());
-        let [tile, noise, least, samples, flags] = [(); 5].map(|()| header.word());
-        let [seed, all, non_finite, found] = [(); 4].map(|()| header.long());
-        let [kind, part, parts, first] = [(); 4].map(|()| header.word());
-        let [body_bytes, crc] = [(); 2].map(|()| header.long());
-        let goal = (flags & 2 != 0).then(|| Goal { noise: f32::from_bits(noise), least });
-        let of = Settings { size: [columns, rows], layers, samples, goal, seed, tile };
-        let due = usize::try_from(body_bytes).ok().and_then(|body| body.checked_add(HEADER_BYTES));
-        let due = due.ok_or(PictureBytesError::Content)?;
-        if bytes.len() != due {
-            return Err(PictureBytesError::Length { found: bytes.len(), due });
-        }
-        if checksum(bytes) != crc {
-            return Err(PictureBytesError::Checksum);
-        }
+        let Described { settings: of, tag: found, share, first, is_done, counts: taken_samples, pass } =
+            described(bytes)?;
         if found != tag {
             return Err(PictureBytesError::Tag { found, due: tag });
         }
+        let has_tiles = settings.goal.is_some() || matches!(share, Share::Tiles { .. });
         let differs = [
             (of.size != settings.size, "size"),
             (of.layers != settings.layers, "number of layers"),
             (of.seed != settings.seed, "seed"),
             (of.goal != settings.goal, "noise asked for"),
-            (goal.is_some() && of.tile != settings.tile, "size of tiles"),
-            (goal.is_some() && of.samples != settings.samples, "number of samples asked for"),
+            (has_tiles && of.tile != settings.tile, "size of tiles"),
+            (settings.goal.is_some() && of.samples != settings.samples, "number of samples asked for"),
         ];
         if let Some((_, what)) = differs.into_iter().find(|(differs, _)| *differs) {
             return Err(PictureBytesError::Settings(what));
-        }
-        let share = match kind {
-            0 => Share::Whole,
-            1 => Share::Tiles { part, of: parts },
-            2 => Share::Samples { part, of: parts },
-            _ => return Err(PictureBytesError::Content),
-        };
-        // Before memory is asked for.
-        if least_bytes(&of).is_none_or(|least| least > bytes.len() - HEADER_BYTES) {
-            return Err(PictureBytesError::Content);
         }
         let room = settings.room();
         let mut body = Reader(&bytes[HEADER_BYTES..]);
@@ -317,18 +362,17 @@ impl<Q, C: Default> Tiles<'static, Q, C> {
         let noise = settings.goal.map(|goal| Noise::new(goal, List::default(), List::default()));
         let mut tiles = Self::start(settings, source, (sums.into(), counts.into()), noise)
             .map_err(|Full| PictureBytesError::Content)?;
-        tiles.taken_samples = Counts { samples: all, non_finite };
         if let Some(noise) = &mut tiles.noise {
             noise.read(&mut body).ok_or(PictureBytesError::Content)?;
         }
         if !body.0.is_empty() {
             return Err(PictureBytesError::Content);
         }
-        (tiles.share, tiles.first) = (share, first);
+        (tiles.taken_samples, tiles.share, tiles.first) = (taken_samples, share, first);
         // A goal is judged where passes end, so they have to end where they would have. More samples than there were to be begin anew.
-        let is_enough = flags & 1 != 0;
-        if !is_enough || settings.samples <= samples {
-            (tiles.until, tiles.taken, tiles.is_enough) = (until.min(settings.samples), taken, is_enough);
+        if !is_done || settings.samples <= of.samples {
+            let [until, taken, pixels_per_job] = pass;
+            (tiles.until, tiles.taken, tiles.is_enough) = (until.min(settings.samples), taken, is_done);
             tiles.pixels_per_job = pixels_per_job.max(1);
         }
         Ok(tiles)

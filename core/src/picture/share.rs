@@ -1,5 +1,7 @@
 //! What of a picture is taken, where several machines share it out.
 
+use super::tiles::Tiles;
+
 /// The part of a picture that [`Tiles`](super::Tiles) take.
 ///
 /// Parts of tiles have all samples of some of the pixels, parts of samples some of the samples of all pixels; either way every sample of the
@@ -65,5 +67,89 @@ impl Share {
         let of = u64::from(of.max(1));
         let later = (of * 618 / 1000).max(1);
         (u64::from(column) + later * u64::from(row)) % of == u64::from(part)
+    }
+}
+
+impl<Q, C> Tiles<'_, Q, C> {
+    /// Takes a part of the picture only: the same that was taken before, if this one was left. [`Settings::samples`] are those of the whole
+    /// picture, in passes of `pass` samples that share something, or of 1. A [`Settings::goal`] would be judged by the tiles that are taken, so
+    /// with one, parts are not those of the whole.
+    ///
+    /// ```
+    /// # #[cfg(feature = "alloc")] {
+    /// use fogbow::picture::{Sample, Settings, Share, TileOutput, Tiles};
+    /// use fogbow::{sampling::{Generator, Independent, uniform}, spectrum::Spectrum, work};
+    /// let settings = Settings { size: [19, 9], layers: 1, samples: 50, goal: None, seed: 0, tile: 4 };
+    /// let noise = |_: &Sample<'_, ()>, rng: &mut Generator, layers: &mut [Spectrum]| layers[0] = Spectrum::splat(uniform(rng));
+    /// let taken = |share| {
+    ///     let mut tiles: Tiles<'_, _, ()> = Tiles::new(settings, Independent).of_share(share, 1);
+    ///     work::finish(&mut tiles, &noise, &mut TileOutput::default());
+    ///     tiles
+    /// };
+    /// // A machine each; put together in any order.
+    /// let mut merged: Tiles<'_, _, ()> = Tiles::new(settings, Independent);
+    /// [2, 0, 1].iter().for_each(|&part| merged.merge(&taken(Share::Samples { part, of: 3 })));
+    /// assert_eq!(merged.into_sums(), taken(Share::Whole).into_sums());
+    /// # }
+    /// ```
+    #[must_use]
+    pub fn of_share(mut self, share: Share, pass: u32) -> Self {
+        let [first, end] = share.samples(self.settings.samples, pass);
+        let is_left = (self.share, self.first) == (share, first);
+        (self.share, self.first) = (share, first);
+        self.settings.samples = end - first;
+        let done = self.least_count();
+        self.is_enough |= done >= self.settings.samples;
+        if !is_left {
+            self.begin(done.saturating_add(1));
+        }
+        self
+    }
+
+    /// Index of the first sample of a pixel that is taken: 0 but for parts of samples.
+    #[must_use]
+    pub fn first(&self) -> u32 {
+        self.first
+    }
+
+    /// Adds the samples of a part to a whole picture, which has none of them yet: see [`Tiles::of_share`]. A picture of another size or with other
+    /// layers adds nothing. Noise is not known of merged pictures: without a [`Settings::goal`].
+    ///
+    /// ```
+    /// # #[cfg(feature = "alloc")] {
+    /// # use fogbow::picture::{Sample, Settings, Share, TileOutput, Tiles};
+    /// # use fogbow::{sampling::{Generator, Independent}, spectrum::Spectrum, work};
+    /// # let settings = Settings { size: [5, 4], layers: 1, samples: 3, goal: None, seed: 0, tile: 2 };
+    /// # let white = |_: &Sample<'_, ()>, _: &mut Generator, layers: &mut [Spectrum]| layers[0] = Spectrum::ONE;
+    /// let part = |part| {
+    ///     let mut tiles: Tiles<'_, _, ()> = Tiles::new(settings, Independent).of_share(Share::Tiles { part, of: 2 }, 1);
+    ///     work::finish(&mut tiles, &white, &mut TileOutput::default());
+    ///     tiles
+    /// };
+    /// let mut merged: Tiles<'_, _, ()> = Tiles::new(settings, Independent);
+    /// merged.merge(&part(1));
+    /// assert_eq!((merged.least_count(), merged.counts().samples), (0, 3 * 10));
+    /// merged.merge(&part(0));
+    /// assert!(merged.is_done() && merged.mean(4, 3, 0) == Spectrum::ONE);
+    /// # }
+    /// ```
+    pub fn merge<P>(&mut self, other: &Tiles<'_, P, C>) {
+        let is_same = (self.settings.size, self.settings.layers) == (other.settings.size, other.settings.layers);
+        if !is_same {
+            return;
+        }
+        self.sums.as_mut_slice().iter_mut().zip(other.sums.as_slice()).for_each(|(sum, more)| sum.merge(more));
+        let counts = self.counts.as_mut_slice().iter_mut().zip(other.counts.as_slice());
+        counts.for_each(|(count, more)| *count = count.saturating_add(*more));
+        self.taken_samples.samples += other.taken_samples.samples;
+        self.taken_samples.non_finite += other.taken_samples.non_finite;
+        self.taken = 0;
+        self.is_enough |= self.least_count() >= self.settings.samples;
+    }
+
+    /// How many pixels are to have samples.
+    #[must_use]
+    pub fn pixel_count(&self) -> u32 {
+        (0..self.settings.pixels()).filter(|&pixel| self.has(self.place(pixel))).count() as u32
     }
 }

@@ -9,8 +9,10 @@ use fogbow::picture;
 
 use super::covariance::{CovarianceArguments, MarchArguments, Step};
 use super::defaults::{with_default, with_remark};
+use super::film_file::{About, is_film};
 use super::image_sampling::SamplingArguments;
 use super::keep::KeepArguments;
+use super::parts::PartArguments;
 use super::photon_beams::{BeamArguments, Kernel};
 use super::radiance_cache::CacheArguments;
 use super::report::Voice;
@@ -55,7 +57,7 @@ pub struct RenderArguments {
     /// Where the camera stands and what it looks at, +y up: "x,y,z x,y,z" [default: what the scene says].
     #[arg(long, value_name = "ORIGIN TARGET", value_parser = output::camera, allow_hyphen_values = true)]
     pub camera: Option<[[f64; 3]; 2]>,
-    /// Image to write: .png, .exr or .pfm; may be repeated [default: SCENE.png and SCENE.exr in this folder].
+    /// Image to write: .png, .exr or .pfm, or .fogbow for the sums of its samples; may be repeated [default: SCENE.png and SCENE.exr in this folder].
     #[arg(short, long, value_name = "FILE")]
     pub output: Vec<PathBuf>,
     /// Stops by which PNG images are brightened.
@@ -77,9 +79,15 @@ pub struct RenderArguments {
     /// Names of the options that the user has given, if [`super::parse`] has read them.
     #[arg(skip)]
     pub given: Vec<String>,
+    /// Whether nothing but what parts share is computed, for `fogbow fill`.
+    #[arg(skip)]
+    pub is_fill: bool,
     /// Of renders that may be interrupted.
     #[command(flatten)]
     pub keep: KeepArguments,
+    /// Of renders that several machines share out.
+    #[command(flatten)]
+    pub parts: PartArguments,
     /// Of radiance caching.
     #[command(flatten)]
     pub cache: CacheArguments,
@@ -136,27 +144,78 @@ pub enum Method {
 }
 
 impl RenderArguments {
-    /// What a checkpoint is for: all that changes the picture but the number of samples, of which more may be asked for.
-    pub(super) fn keep_tag(&self, method: Method, scene: &SceneFile) -> Result<u64, Failure> {
-        let Some(_) = &self.keep.checkpoint else { return Ok(0) };
-        let mut crc = Crc::new();
-        crc.add(&self.scene.fingerprint()?.to_le_bytes());
+    /// Whether a file other than a picture is written or read, that has to be of this render.
+    fn keeps_something(&self) -> bool {
+        self.is_fill || self.keep.checkpoint.is_some() || self.parts.fill.is_some() || self.wants_film()
+    }
+
+    /// Whether sums are to be written.
+    pub(super) fn wants_film(&self) -> bool {
+        self.output.iter().any(|file| is_film(file))
+    }
+
+    /// What films are of, and a number for that: all that changes the picture but the number of samples, of which more may be asked for.
+    pub(super) fn about(
+        &self,
+        method: Method,
+        scene: &SceneFile,
+        samples: u32,
+        layers: &[&str],
+    ) -> Result<(u64, About), Failure> {
+        let keeps = self.keeps_something();
+        let fingerprint = if keeps { self.scene.fingerprint()? } else { 0 };
         let Self { noise, max_depth, seed, size, camera, aov, cache, beams, vpl, march, sampling, covariance, .. } =
             self;
         let cache = CacheArguments { cache_in: None, cache_out: None, ..cache.clone() };
         let covariance = CovarianceArguments { grid_out: None, ..covariance.clone() };
-        let what = (method, &scene.integrator);
-        crc.add(format!("{what:?} {noise:?} {max_depth:?} {seed} {size:?} {camera:?} {aov}").as_bytes());
-        crc.add(format!("{:?}", scene.sensor).as_bytes());
-        crc.add(format!("{cache:?} {beams:?} {vpl:?} {march:?} {sampling:?} {covariance:?}").as_bytes());
-        // Layers depend on it.
-        crc.add(&[u8::from(self.is_audited())]);
-        Ok(crc.value())
+        // Only what is written or read is worth the words.
+        let options = if keeps {
+            let [width, height] = [scene.sensor.width, scene.sensor.height];
+            let (width, height) = size.unwrap_or((width, height));
+            vec![
+                ("method".to_owned(), method.name().to_owned()),
+                ("size".to_owned(), format!("{width}x{height}")),
+                ("seed".to_owned(), seed.to_string()),
+                ("noise".to_owned(), noise.map_or_else(|| "none".to_owned(), |noise| noise.to_string())),
+                (
+                    "longest path".to_owned(),
+                    max_depth.map_or_else(|| "as in the scene".to_owned(), |depth| depth.to_string()),
+                ),
+                ("camera".to_owned(), format!("{camera:?}")),
+                ("sensor of the scene".to_owned(), format!("{:?}", scene.sensor)),
+                ("integrator of the scene".to_owned(), format!("{:?}", scene.integrator)),
+                ("option of radiance caching".to_owned(), format!("{cache:?}")),
+                ("option of photon beams".to_owned(), format!("{beams:?}")),
+                ("option of virtual lights".to_owned(), format!("{vpl:?}")),
+                ("option of ray marching".to_owned(), format!("{march:?}")),
+                ("option of adaptive sampling".to_owned(), format!("{sampling:?}")),
+                ("option of covariance grids".to_owned(), format!("{covariance:?}")),
+            ]
+        } else {
+            Vec::new()
+        };
+        let mut crc = Crc::new();
+        crc.add(&fingerprint.to_le_bytes());
+        options.iter().for_each(|(_, value)| crc.add(value.as_bytes()));
+        layers.iter().for_each(|layer| crc.add(layer.as_bytes()));
+        let scene = self.scene.file.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let about = About {
+            program: env!("CARGO_PKG_VERSION").to_owned(),
+            scene,
+            fingerprint: format!("{fingerprint:016x}"),
+            samples,
+            options,
+            layers: layers.iter().map(|layer| (*layer).to_owned()).collect(),
+            has_layers: *aov,
+            unfinished: None,
+            parts: self.parts.parts(samples),
+        };
+        Ok((crc.value(), about))
     }
 
-    /// Whether virtual lights' layers are kept: pixels that are filled in have none.
+    /// Whether virtual lights' layers are kept: pixels that are filled in have none, and films of the same picture have the same layers.
     pub(super) fn is_audited(&self) -> bool {
-        (self.aov || self.stats.is_some()) && self.sampling.is_uniform()
+        (self.aov || self.stats.is_some() && !self.wants_film()) && self.sampling.is_uniform()
     }
 
     /// How progress is shown.

@@ -18,6 +18,7 @@ use fogbow_std::progress::Control;
 use fogbow_std::threads::{self, Ending, Threads};
 
 use super::defaults::{unit_outline, with_default};
+use super::keep::Keeper;
 use super::scene::SceneArguments;
 use super::{Failure, output};
 use crate::statistics::Statistics;
@@ -118,6 +119,9 @@ impl core::fmt::Display for Stopped {
 
 impl core::error::Error for Stopped {}
 
+/// Tag of grids in film files, which know themselves what they are of.
+const KEPT: u64 = 0;
+
 /// Fills or reads a grid, with a medium of any type.
 pub(crate) struct GridJob<'a> {
     pub(crate) arguments: &'a CovarianceArguments,
@@ -131,6 +135,8 @@ pub(crate) struct GridJob<'a> {
     pub(crate) seed: u64,
     pub(crate) control: &'a Control<'a>,
     pub(crate) statistics: &'a mut Statistics,
+    /// What keeps the grid, and may have one.
+    pub(crate) keeper: Option<&'a Keeper<'a>>,
 }
 
 impl WithMedium for GridJob<'_> {
@@ -139,7 +145,11 @@ impl WithMedium for GridJob<'_> {
     fn with<M: Medium + Sync>(self, medium: &M) -> Self::Output {
         let (arguments, statistics) = (self.arguments, self.statistics);
         let tag = arguments.tag(self.scene, &self.paths)?;
-        let grid = if let Some(file) = &arguments.grid_in {
+        let kept = self.keeper.and_then(Keeper::grid);
+        let grid = if let Some(bytes) = kept {
+            bytes::read(bytes, KEPT, List::default())
+                .map_err(|error| format!("the covariance grid of the fill {error}"))?
+        } else if let Some(file) = &arguments.grid_in {
             statistics.time("read grid", || load(file, |all| bytes::read(all, tag, List::default()))).map_err(
                 |error| match error.problem {
                     Problem::Content(GridBytesError::Tag { .. }) => {
@@ -169,6 +179,9 @@ impl WithMedium for GridJob<'_> {
         };
         if let Some(file) = &arguments.grid_out {
             statistics.time("write grid", || write(file, &grid.to_bytes(tag)))?;
+        }
+        if let Some(keeper) = self.keeper {
+            keeper.keep_grid(grid.to_bytes(KEPT));
         }
         statistics.bytes.push(("covariance grid".to_owned(), grid.bytes() as u64));
         Ok(grid)

@@ -9,7 +9,7 @@ use clap::{Args, Command, CommandFactory, FromArgMatches};
 use super::{Arguments, Ending, Failure, Method, RenderArguments};
 
 /// Topics of `fogbow render --help TOPIC`, and the heading of their options.
-const TOPICS: [(&str, &str); 7] = [
+const TOPICS: [(&str, &str); 8] = [
     ("radiance-cache", "Radiance caching"),
     ("photon-beams", "Photon beams"),
     ("vpl", "Virtual lights"),
@@ -17,6 +17,7 @@ const TOPICS: [(&str, &str); 7] = [
     ("grids", "Covariance grid"),
     ("sampling", "Adaptive sampling"),
     ("long", "Long renders"),
+    ("parts", "Many machines"),
 ];
 
 /// What most renders need.
@@ -44,7 +45,7 @@ const EXAMPLES: &str = "Examples:
   fogbow check box.xml                           what of a scene cannot be rendered, and why
 
 --help TOPIC tells of one method or subject, --help all of everything:
-  radiance-cache, photon-beams, vpl, march, grids, sampling, long, all";
+  radiance-cache, photon-beams, vpl, march, grids, sampling, long, parts, all";
 
 /// What is said instead of doing something.
 #[derive(Debug)]
@@ -90,9 +91,18 @@ pub fn parse(words: impl IntoIterator<Item = OsString>) -> Result<Arguments, Ans
         _ => Answer::Parser(error),
     })?;
     let mut arguments = Arguments::from_arg_matches(&matches).map_err(Answer::Parser)?;
-    if let (super::Command::Render(render), Some(("render", given))) = (&mut arguments.command, matches.subcommand()) {
-        let by_user = |id: &&clap::Id| given.value_source(id.as_str()) == Some(ValueSource::CommandLine);
-        render.given = given.ids().filter(by_user).map(|id| id.as_str().to_owned()).collect();
+    let Some((name, given)) = matches.subcommand() else { return Ok(arguments) };
+    let by_user = |id: &&clap::Id| given.value_source(id.as_str()) == Some(ValueSource::CommandLine);
+    let ids = || given.ids().filter(by_user).map(|id| id.as_str().to_owned()).collect();
+    match &mut arguments.command {
+        super::Command::Render(render) | super::Command::Fill(render) => {
+            (render.given, render.is_fill) = (ids(), name == "fill");
+        }
+        super::Command::Plan(plan) => {
+            let words: Vec<String> = words.iter().skip(2).map(|word| word.to_string_lossy().into_owned()).collect();
+            (plan.render.given, plan.words) = (ids(), super::plan::words_for_render(&words));
+        }
+        _ => {}
     }
     Ok(arguments)
 }

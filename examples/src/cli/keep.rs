@@ -1,27 +1,18 @@
-//! What is kept of a render on its way: `--checkpoint` with `--resume`, and `--preview`.
-//!
-//! A checkpoint file is little endian: 8 bytes [`MAGIC`], version, tag, lengths of caches and picture, what was measured of the caches, a
-//! [`Crc`] of all else; then the caches and the picture as the core writes them. It is replaced as a whole, so whatever ends the program
-//! leaves the last one.
+//! What is kept of a render on its way and after it: `--checkpoint` with `--resume`, `--preview`, and film files to go on with, of parts and fills.
 
 use core::cell::{Cell, RefCell};
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use fogbow::bytes::Crc;
+use fogbow::picture::Share;
 use fogbow::spectrum::Spectrum;
-use fogbow_std::files::write;
 use fogbow_std::film::Image;
 use fogbow_std::image::{self, Layer};
 use fogbow_std::stats::Stopwatch;
 use fogbow_std::tiles::Watched;
 
+use super::film_file::{About, FilmFile, Measured, Parts};
 use super::{Failure, output};
-use crate::error::read_file;
-
-const MAGIC: [u8; 8] = *b"\x89FOGCKP\n";
-const VERSION: u32 = 1;
-const HEADER_BYTES: usize = 8 + 4 + 8 + 8 + 8 + 4 + 4 + 4 + 8;
 
 /// Longest side of a preview (pixels): more takes longer to write than to render.
 const PREVIEW_SIDE: u32 = 512;
@@ -61,31 +52,22 @@ impl KeepArguments {
     }
 }
 
-/// What was measured of caches while they were filled.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Measured {
-    /// Noise that a picture from them may have.
-    pub(super) noise: f32,
-    /// Eye rays of their audit.
-    pub(super) audit_rays: u32,
-}
-
-/// A checkpoint that was read.
-#[derive(Debug)]
-struct Left {
-    caches: Vec<u8>,
-    measured: Measured,
-    picture: Vec<u8>,
-}
-
 /// Keeps what is done.
 #[derive(Debug)]
-pub(super) struct Keeper<'a> {
+pub(crate) struct Keeper<'a> {
     arguments: &'a KeepArguments,
     tag: u64,
-    left: Option<Left>,
-    /// Of finished caches.
+    about: RefCell<About>,
+    /// What it goes on with.
+    left: Option<FilmFile>,
+    /// What another run has filled.
+    filled: Option<FilmFile>,
+    /// Of finished caches, and of a grid.
     caches: RefCell<(Vec<u8>, Measured)>,
+    grid: RefCell<Vec<u8>>,
+    /// The picture at the end, if it is wanted as a film.
+    last_picture: RefCell<Option<Vec<u8>>>,
+    wants_film: bool,
     /// Columns and rows of the picture.
     size: [u32; 2],
     clock: Stopwatch,
@@ -96,21 +78,49 @@ pub(super) struct Keeper<'a> {
 }
 
 impl<'a> Keeper<'a> {
-    /// For a render with this tag, which goes on where one of the same tag was left.
+    /// For a render of this, which goes on where one of the same was left, with what was filled for it in `fill`.
     ///
     /// # Errors
     /// A checkpoint that is damaged, or of another render.
-    pub(super) fn new(arguments: &'a KeepArguments, size: [u32; 2], tag: u64) -> Result<Self, Failure> {
+    pub(super) fn new(
+        arguments: &'a KeepArguments,
+        (size, tag, about): ([u32; 2], u64, About),
+        fill: Option<&Path>,
+    ) -> Result<Self, Failure> {
+        let wrong = |file: &Path, what: String| Failure::from(format!("{}: {what}", file.display()));
         let left = match &arguments.checkpoint {
-            Some(file) if arguments.resume && file.exists() => Some(read(file, tag)?),
+            Some(file) if arguments.resume && file.exists() => {
+                let left = FilmFile::read(file)?;
+                if let Some(difference) = about.difference(&left.about, about.parts.is_none()) {
+                    let what = format!("was left by a render of another scene, or with other options: it {difference}");
+                    return Err(wrong(file, what));
+                }
+                if left.about.parts != about.parts {
+                    return Err(wrong(file, format!("is {}, not {}", left.about.name(), about.name())));
+                }
+                Some(left)
+            }
             _ => None,
         };
-        let none = Measured { noise: 0.0, audit_rays: 0 };
+        let filled = fill.map(FilmFile::read).transpose()?;
+        if let (Some(file), Some(filled)) = (fill, &filled) {
+            if let Some(difference) = about.difference(&filled.about, true) {
+                return Err(wrong(file, format!("was not filled for this: it {difference}")));
+            }
+            if filled.caches.is_empty() && filled.grid.is_empty() {
+                return Err(wrong(file, "holds nothing that was filled; fogbow fill makes such files".to_owned()));
+            }
+        }
         Ok(Self {
             arguments,
             tag,
+            about: about.into(),
             left,
-            caches: RefCell::new((Vec::new(), none)),
+            filled,
+            caches: RefCell::default(),
+            grid: RefCell::default(),
+            last_picture: RefCell::default(),
+            wants_film: false,
             size,
             clock: Stopwatch::start(),
             last: Cell::new([0.0; 2]),
@@ -118,17 +128,52 @@ impl<'a> Keeper<'a> {
         })
     }
 
+    /// The picture is wanted as a film, too.
+    pub(super) fn for_film(mut self, wants_film: bool) -> Self {
+        self.wants_film = wants_film;
+        self
+    }
+
+    /// What of the picture is rendered.
+    pub(super) fn share(&self) -> Share {
+        self.about.borrow().parts.as_ref().map_or(Share::Whole, Parts::share)
+    }
+
+    /// Sums alone do not make the picture, for this reason.
+    pub(super) fn needs_finishing(&self, reason: &str) {
+        self.about.borrow_mut().unfinished = Some(reason.to_owned());
+    }
+
     /// The picture to go on with, and its tag.
     pub(super) fn picture(&self) -> Option<(&[u8], u64)> {
         self.left.as_ref().map(|left| (left.picture.as_slice(), self.tag))
     }
 
-    /// The caches of the picture to go on with.
+    /// The caches of the picture to go on with, or what was filled for it.
     pub(super) fn caches(&self) -> Option<(&[u8], Measured)> {
-        self.left.as_ref().filter(|left| !left.caches.is_empty()).map(|left| (left.caches.as_slice(), left.measured))
+        let mut all = self.left.iter().chain(&self.filled);
+        all.find(|film| !film.caches.is_empty()).map(|film| (film.caches.as_slice(), film.measured))
     }
 
-    /// Whether anything is kept.
+    /// The same of the covariance grid.
+    pub(super) fn grid(&self) -> Option<&[u8]> {
+        self.left.iter().chain(&self.filled).map(|film| film.grid.as_slice()).find(|grid| !grid.is_empty())
+    }
+
+    /// A grid is filled: it belongs to what is kept.
+    pub(super) fn keep_grid(&self, bytes: Vec<u8>) {
+        *self.grid.borrow_mut() = bytes;
+    }
+
+    /// What has been filled and rendered by now.
+    pub(super) fn film(&self, has_fill: bool) -> FilmFile {
+        let (caches, measured) = if has_fill { self.caches.borrow().clone() } else { Default::default() };
+        let grid = if has_fill { self.grid.borrow().clone() } else { Vec::new() };
+        let picture = self.last_picture.borrow().clone().unwrap_or_default();
+        FilmFile { tag: self.tag, about: self.about.borrow().clone(), measured, caches, grid, picture }
+    }
+
+    /// Whether anything is kept on the way.
     pub(super) fn is_asked(&self) -> bool {
         self.arguments.checkpoint.is_some()
     }
@@ -153,7 +198,11 @@ impl<'a> Keeper<'a> {
         if let Some(file) = &self.arguments.checkpoint
             && is_due(0, self.arguments.checkpoint_every)
         {
-            self.note(self.write(file, &tiles.to_bytes(self.tag)));
+            let picture = tiles.to_bytes(self.tag);
+            self.note(FilmFile { picture, ..self.film(true) }.write(file));
+        }
+        if self.wants_film && is_last {
+            *self.last_picture.borrow_mut() = Some(tiles.to_bytes(self.tag));
         }
         if let Some(file) = &self.arguments.preview
             && tiles.least_count() > 0
@@ -172,23 +221,6 @@ impl<'a> Keeper<'a> {
     /// The first file that could not be written.
     pub(super) fn problem(&self) -> Option<String> {
         self.problem.take()
-    }
-
-    fn write(&self, file: &Path, picture: &[u8]) -> Result<(), String> {
-        let (caches, measured) = &*self.caches.borrow();
-        let mut bytes = Vec::with_capacity(HEADER_BYTES + caches.len() + picture.len());
-        bytes.extend(MAGIC);
-        bytes.extend(VERSION.to_le_bytes());
-        bytes.extend(self.tag.to_le_bytes());
-        [caches.len(), picture.len()].iter().for_each(|length| bytes.extend((*length as u64).to_le_bytes()));
-        bytes.extend(measured.noise.to_le_bytes());
-        bytes.extend(measured.audit_rays.to_le_bytes());
-        bytes.extend([0; 12]);
-        bytes.extend(caches);
-        bytes.extend(picture);
-        let crc = checksum(&bytes);
-        bytes[HEADER_BYTES - 8..HEADER_BYTES].copy_from_slice(&crc.to_le_bytes());
-        write(file, &bytes).map_err(|error| error.to_string())
     }
 
     /// Writes the picture, small: means of square blocks of pixels.
@@ -210,37 +242,4 @@ impl<'a> Keeper<'a> {
         }
         image::write(file, &[Layer { name: "total", image: &small }], 0.0).map_err(|error| error.to_string())
     }
-}
-
-fn checksum(bytes: &[u8]) -> u64 {
-    let mut crc = Crc::new();
-    crc.add(&bytes[..HEADER_BYTES - 8]);
-    crc.add(&bytes[HEADER_BYTES..]);
-    crc.value()
-}
-
-fn read(file: &Path, tag: u64) -> Result<Left, Failure> {
-    let wrong = |what: &str| Failure::from(format!("{}: {what}", file.display()));
-    let bytes = read_file(file)?;
-    let word = |at: usize| u32::from_le_bytes([0, 1, 2, 3].map(|i| bytes[at + i]));
-    let long = |at: usize| u64::from(word(at)) | u64::from(word(at + 4)) << 32;
-    if bytes.len() < HEADER_BYTES || bytes[..8] != MAGIC {
-        return Err(wrong("is no checkpoint of a render"));
-    }
-    if word(8) != VERSION {
-        return Err(wrong(&format!("has version {} of the format; {VERSION} is known", word(8))));
-    }
-    let (caches, picture) = (long(20), long(28));
-    if (bytes.len() - HEADER_BYTES) as u64 != caches.saturating_add(picture) {
-        return Err(wrong("is cut off"));
-    }
-    if checksum(&bytes) != long(HEADER_BYTES - 8) {
-        return Err(wrong("is damaged: the checksum is another"));
-    }
-    if long(12) != tag {
-        return Err(wrong("was left by a render of another scene, or with other options"));
-    }
-    let measured = Measured { noise: f32::from_bits(word(36)), audit_rays: word(40) };
-    let (caches, picture) = bytes[HEADER_BYTES..].split_at(caches as usize);
-    Ok(Left { caches: caches.to_vec(), measured, picture: picture.to_vec() })
 }

@@ -12,12 +12,16 @@ pub(crate) mod covariance;
 mod defaults;
 mod ellipsoids;
 mod figures;
+mod film_file;
 mod help;
 mod image_sampling;
 mod keep;
 mod march;
+mod merge;
 mod output;
+mod parts;
 mod photon_beams;
+mod plan;
 mod plume;
 mod probe;
 mod radiance_cache;
@@ -37,10 +41,14 @@ pub use check::CheckArguments;
 pub use compare::CompareArguments;
 pub use covariance::{CovarianceArguments, MarchArguments, Step};
 pub use figures::{FiguresArguments, Paper};
+pub use film_file::Split;
 pub use help::{Answer, CompletionsArguments, ManArguments, parse};
 pub use image_sampling::{ImageSampling, SamplingArguments};
 pub use keep::KeepArguments;
+pub use merge::MergeArguments;
+pub use parts::PartArguments;
 pub use photon_beams::{BeamArguments, Kernel};
+pub use plan::PlanArguments;
 pub use plume::PlumeArguments;
 pub use probe::{HessianArguments, Probe, ProbeArguments};
 pub use radiance_cache::{CacheArguments, Kind, Single};
@@ -62,6 +70,12 @@ pub struct Arguments {
 pub enum Command {
     /// Renders a Mitsuba 3 scene.
     Render(Box<RenderArguments>),
+    /// Computes what parts of a picture share: caches, or a covariance grid.
+    Fill(Box<RenderArguments>),
+    /// Puts parts of a picture together.
+    Merge(MergeArguments),
+    /// Prints which commands render a scene on many machines.
+    Plan(PlanArguments),
     /// Says all at once what of a scene cannot be rendered or looks like a mistake.
     Check(CheckArguments),
     /// Bakes light in fog into 3D textures for engines.
@@ -94,7 +108,9 @@ pub enum Ending {
 /// Runs a command; what is wrong goes to standard error.
 pub fn run(arguments: Arguments) -> ExitCode {
     let result = match arguments.command {
-        Command::Render(arguments) => render::run(&arguments),
+        Command::Render(arguments) | Command::Fill(arguments) => render::run(&arguments),
+        Command::Merge(arguments) => merge::run(&arguments),
+        Command::Plan(arguments) => plan::run(&arguments),
         Command::Check(arguments) => check::run(&arguments),
         Command::Bake(arguments) => bake::run(&arguments),
         Command::Records(arguments) => records::run(&arguments),

@@ -139,6 +139,7 @@ fn hessian(arguments: &HessianArguments) -> Result<Ending, Failure> {
         seed: arguments.seed,
         control: &Control::default(),
         statistics: &mut statistics,
+        keeper: None,
     })?;
     let grid = filled.view();
     let points = points(arguments, &grid)?;

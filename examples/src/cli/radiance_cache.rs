@@ -21,14 +21,15 @@ use fogbow::world::{Outline, World as LitWorld};
 use fogbow_std::files::{self, Problem};
 use fogbow_std::film::Film;
 use fogbow_std::progress::Control;
-use fogbow_std::stats::{CountingMedium, CountingScene, Seconds, Stopwatch};
+use fogbow_std::stats::{Counters, CountingMedium, CountingScene, Seconds, Stopwatch};
 use fogbow_std::threads::{self, Ending, Threads};
 use fogbow_std::tiles::{self, Outcome};
 
 use super::covariance::Stopped;
 use super::defaults::{unit_outline, with_default};
+use super::film_file::Measured;
 use super::image_sampling::is_computed;
-use super::keep::{Keeper, Measured};
+use super::keep::Keeper;
 use super::render::weigh;
 use super::scene::SceneArguments;
 use super::{Failure, output};
@@ -225,6 +226,9 @@ pub(super) fn check_depth(paths: &path::Settings) -> Result<(), String> {
     }
 }
 
+/// Tag of caches in film files, which know themselves what they are of.
+const KEPT: u64 = 0;
+
 /// A render by radiance caching, to be done with a medium of any type.
 pub(super) struct CacheJob<'a> {
     pub(super) world: &'a World<'a>,
@@ -241,6 +245,10 @@ pub(super) struct CacheJob<'a> {
     pub(super) tell: &'a dyn Fn(&'static str, f32),
     /// What is kept of the render, if anything, and what it goes on with.
     pub(super) keeper: Option<&'a Keeper<'a>>,
+    /// Whether caches alone are wanted, for parts of the picture.
+    pub(super) is_fill: bool,
+    /// Whether it is such a part: what is to be said of the caches was said when they were filled.
+    pub(super) is_part: bool,
     pub(super) arguments: &'a CacheArguments,
     /// Which pixels are computed; `None` for all.
     pub(super) plan: Option<&'a Plan<'a>>,
@@ -442,8 +450,8 @@ impl<M: Medium + Sync> Stages<'_, '_, M> {
     fn taken_up(&self, bytes: &[u8], measured: Measured, error: f32, spent: &mut Spent) -> Result<Filled, Failure> {
         let (job, world) = (self.job, self.world());
         let mut caches = RadianceCaches::new(job.settings(&self.outline, error));
-        caches.read(bytes, job.tag).map_err(|error| format!("the checkpoint's caches: {error}"))?;
-        if measured.audit_rays == 0 || job.paths.max_scatterings == 0 {
+        caches.read(bytes, KEPT).map_err(|error| format!("the caches that were kept: {error}"))?;
+        if job.is_part || measured.audit_rays == 0 || job.paths.max_scatterings == 0 {
             return Ok(Filled::new(caches, (Ending::Done, measured), None));
         }
         let mut audit = Audit::new(&caches, self.rays(), measured.audit_rays);
@@ -575,12 +583,17 @@ impl WithMedium for CacheJob<'_> {
                     self.save(&filled.caches)?;
                     return Err(Stopped("caches").into());
                 }
-                if let Some(keeper) = self.keeper.filter(|keeper| keeper.is_asked()) {
-                    keeper.keep_caches(filled.caches.to_bytes(self.tag), filled.measured);
+                if let Some(keeper) = self.keeper.filter(|keeper| self.is_fill || keeper.is_asked()) {
+                    keeper.keep_caches(filled.caches.to_bytes(KEPT), filled.measured);
                 }
                 let goal = self.settings.goal.or_else(|| self.has_usual_goal.then(|| filled.usual_goal()));
                 let settings = tiles::Settings { goal, ..*self.settings };
-                let render = stages.picture(&mut film, &filled.caches, &settings)?;
+                let render = if self.is_fill {
+                    let (counters, seconds) = (Counters::default(), Seconds::default());
+                    Outcome { samples: 0, reason: tiles::Reason::Done, counters, seconds }
+                } else {
+                    stages.picture(&mut film, &filled.caches, &settings)?
+                };
                 Level { error: asked, film, filled, render }
             }
         };

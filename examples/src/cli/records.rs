@@ -120,6 +120,8 @@ pub(super) fn run(arguments: &RecordsArguments) -> Result<Ending, Failure> {
         control: &control,
         tell: &|stage, share| bar.tell(stage, share),
         keeper: None,
+        is_fill: false,
+        is_part: false,
         arguments: &arguments.cache,
         plan: None,
         tag: arguments.cache.tag(&arguments.scene, &paths)?,

@@ -21,13 +21,14 @@ use fogbow_std::film::Film;
 use fogbow_std::image::write_film;
 use fogbow_std::progress::{Control, Progress};
 use fogbow_std::seed::SampleRng;
-use fogbow_std::stats::{CountingMedium, CountingScene};
+use fogbow_std::stats::{Counters, CountingMedium, CountingScene, Seconds};
 use fogbow_std::threads::Threads;
 use fogbow_std::tiles::{self, Outcome, Reason, RenderError, Sample};
 
 use super::arguments::{Method, RenderArguments};
 use super::choice::Choice;
 use super::covariance::{GridJob, Stopped};
+use super::film_file::{FilmFile, is_film};
 use super::image_sampling::{self, Sight};
 use super::keep::Keeper;
 use super::march::{self, MarchJob};
@@ -93,12 +94,14 @@ pub(crate) struct Rendered {
     pub(crate) audit: Option<Audit>,
     /// How far a picture from caches is off.
     pub(crate) audited: Option<Audited>,
+    /// Sums, or what was filled, where a film was asked for.
+    film_file: Option<FilmFile>,
 }
 
 pub(super) fn run(arguments: &RenderArguments) -> Result<Ending, Failure> {
     // Reading a scene takes a while, too.
     stop_flag();
-    let outputs = outputs(arguments)?;
+    let (films, outputs): (Vec<_>, Vec<_>) = outputs(arguments)?.into_iter().partition(|file| is_film(file));
     let rendered = match render(arguments) {
         // Nothing has been rendered yet, and nothing is wrong.
         Err(error) if error.is::<Stopped>() => {
@@ -107,7 +110,7 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<Ending, Failure> {
         }
         rendered => rendered?,
     };
-    let Rendered { mut film, choice, outcome, mut statistics, audit, audited, .. } = rendered;
+    let Rendered { mut film, choice, outcome, mut statistics, audit, audited, film_file, .. } = rendered;
     if outcome.samples == 0 && outcome.reason == Reason::Cancelled {
         eprintln!("fogbow: stopped before every pixel had a sample; no picture is written");
         return Ok(Ending::Stopped);
@@ -116,7 +119,14 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<Ending, Failure> {
         film = film.first(1)?;
     }
     let outputs = output::not_over_better(outputs, outcome.reason == Reason::Cancelled);
-    let (outputs, trouble) = statistics.time("write", || write_all(outputs, &film, arguments.exposure));
+    let (mut outputs, trouble) = statistics.time("write", || write_all(outputs, &film, arguments.exposure));
+    let is_whole = outcome.reason != Reason::Cancelled;
+    if let (Some(film_file), true) = (film_file, is_whole) {
+        for file in films {
+            film_file.write(&file)?;
+            outputs.push(file);
+        }
+    }
 
     let size = (film.width(), film.height());
     let report = Report {
@@ -184,6 +194,9 @@ pub(crate) fn render(arguments: &RenderArguments) -> Result<Rendered, Failure> {
     let choice = Choice::of(arguments, &paths, &world)?;
     let method = choice.method;
     arguments.check_given(method, choice.instead.as_deref())?;
+    if arguments.is_fill && method != Method::RadianceCache && !arguments.needs_grid() {
+        return Err(format!("--method {} fills nothing: parts of it need no fill", method.name()).into());
+    }
     if arguments.method.is_none() && !arguments.quiet {
         eprintln!("{}", choice.line());
     }
@@ -203,7 +216,11 @@ pub(crate) fn render(arguments: &RenderArguments) -> Result<Rendered, Failure> {
 
     let bar = Bar::new(arguments.voice());
     let progress = |progress: &Progress| bar.show(progress, u64::from(width) * u64::from(height));
-    let keeper = Keeper::new(&arguments.keep, [width, height], arguments.keep_tag(method, &scene)?)?;
+    let (samples, noise) = arguments.samples(method, scene.sensor.samples);
+    arguments.check_part_of(method, samples, [width, height])?;
+    let (tag, about) = arguments.about(method, &scene, samples, layers)?;
+    let keeper = Keeper::new(&arguments.keep, ([width, height], tag, about), arguments.parts.fill.as_deref())?
+        .for_film(arguments.wants_film());
     if keeper.is_asked() && arguments.time.is_some() && method == Method::RadianceCache {
         return Err(
             "--checkpoint: radiance caching with --time makes several pictures, of which none can be gone on with; \
@@ -214,13 +231,13 @@ pub(crate) fn render(arguments: &RenderArguments) -> Result<Rendered, Failure> {
     let watch = |tiles: &tiles::Watched, is_last: bool| keeper.watch(tiles, is_last);
     let control =
         Control { cancel: Some(stop_flag()), progress: Some(&progress), watch: Some(&watch), resume: keeper.picture() };
-    let (samples, noise) = arguments.samples(method, scene.sensor.samples);
     let settings = tiles::Settings {
         samples,
         goal: noise.map(|noise| tiles::Goal { noise: noise as f32, least: picture::LEAST_SAMPLES }),
         time: arguments.time.map(Duration::try_from_secs_f64).transpose()?,
         threads: arguments.threads,
         seed: arguments.seed,
+        share: keeper.share(),
         ..tiles::Settings::default()
     };
     let lights = world.lights();
@@ -240,6 +257,7 @@ pub(crate) fn render(arguments: &RenderArguments) -> Result<Rendered, Failure> {
             seed: arguments.seed,
             control: &control,
             statistics: &mut statistics,
+            keeper: Some(&keeper),
         })?)
     } else {
         None
@@ -264,7 +282,10 @@ pub(crate) fn render(arguments: &RenderArguments) -> Result<Rendered, Failure> {
         plan: plan.as_ref(),
     };
     let (mut cached, mut audit) = (None, None);
+    let nothing =
+        Outcome { samples: 0, reason: Reason::Done, counters: Counters::default(), seconds: Seconds::default() };
     let outcome = match method {
+        Method::PhotonBeams | Method::March | Method::Path | Method::Vpl if arguments.is_fill => nothing,
         Method::Path => world.media().with(Job { shot, control: &control, film: &mut film })?,
         Method::PhotonBeams => {
             world.media().with(BeamJob { shot, control: &control, film: &mut film, arguments: &arguments.beams })?
@@ -301,6 +322,8 @@ pub(crate) fn render(arguments: &RenderArguments) -> Result<Rendered, Failure> {
                 control: &control,
                 tell: &|stage, share| bar.tell(stage, share),
                 keeper: Some(&keeper),
+                is_fill: arguments.is_fill,
+                is_part: arguments.parts.part.is_some(),
                 arguments: &arguments.cache,
                 plan: plan.as_ref(),
                 tag: arguments.cache.tag(&arguments.scene, &paths)?,
@@ -314,6 +337,12 @@ pub(crate) fn render(arguments: &RenderArguments) -> Result<Rendered, Failure> {
     if let Some(problem) = keeper.problem() {
         eprintln!("fogbow: {problem}");
     }
+    if plan.is_some() {
+        keeper.needs_finishing("pixels are filled in (--image-sampling)");
+    } else if arguments.aov && (grid.is_some() || method == Method::RadianceCache) {
+        keeper.needs_finishing("some of its layers are drawn (--aov)");
+    }
+    let film_file = (arguments.is_fill || arguments.wants_film()).then(|| keeper.film(arguments.is_fill));
     if let Some(plan) = &plan {
         film = statistics.time("fill in", || image_sampling::finished(&film, plan, arguments.aov, &threads))?;
     }
@@ -338,7 +367,7 @@ pub(crate) fn render(arguments: &RenderArguments) -> Result<Rendered, Failure> {
     statistics.add("render", outcome.seconds);
     statistics.counters = outcome.counters;
     let (caches, audited) = cached.map_or((None, None), |cached| (Some(cached.caches), cached.audited));
-    Ok(Rendered { film, choice, outcome, statistics, camera, caches, audit, audited })
+    Ok(Rendered { film, choice, outcome, statistics, camera, caches, audit, audited, film_file })
 }
 
 /// The files to write, all of them checked.
@@ -355,11 +384,17 @@ fn outputs(arguments: &RenderArguments) -> Result<Vec<PathBuf>, Failure> {
             })
             .into();
     }
-    outputs.iter().try_for_each(|file| output::check(file))?;
+    let check = |file: &PathBuf| if is_film(file) { output::check_place(file) } else { output::check(file) };
+    outputs.iter().try_for_each(check)?;
+    if arguments.is_fill && !outputs.iter().all(|file| is_film(file)) {
+        return Err("a fill is no picture; -o FILL.fogbow takes it, for --fill".into());
+    }
+    arguments.check_part()?;
     if let Some(method) = arguments.method {
         arguments.check_given(method, None)?;
     }
-    if arguments.aov && !outputs.iter().any(|f| f.extension().is_some_and(|e| e.eq_ignore_ascii_case("exr"))) {
+    let has_layers = |file: &PathBuf| is_film(file) || file.extension().is_some_and(|e| e.eq_ignore_ascii_case("exr"));
+    if arguments.aov && !outputs.iter().any(has_layers) {
         return Err("--aov needs an .exr file to write to (-o FILE.exr)".into());
     }
     if let Some(file) = &arguments.stats {

@@ -64,6 +64,7 @@ fn fill(plan: &Plan, edge: u32, paths: u64, seed: u64) -> Result<Filled, Failure
         seed,
         control: &Control::default(),
         statistics: &mut statistics,
+        keeper: None,
     })?;
     let cpu = statistics.phases.iter().map(|(_, s)| s.cpu.unwrap_or(s.wall)).sum();
     Ok(Filled { grid, cpu })
