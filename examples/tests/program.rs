@@ -2,6 +2,7 @@
 
 mod bake;
 mod care;
+mod parts;
 mod radiance_cache;
 mod vpl;
 

@@ -71,11 +71,12 @@ pub(super) fn words_for_render(words: &[String]) -> Vec<String> {
     let mut kept = Vec::new();
     let mut words = words.iter();
     while let Some(word) = words.next() {
+        let has_value = |own: &&str| word.starts_with(&format!("{own}="));
         if OWN.contains(&word.as_str()) || word == "-o" {
             words.next();
-        } else if !OWN.iter().any(|own| word.starts_with(&format!("{own}=")))
-            && !(word.starts_with("-o") && word.len() > 2)
-        {
+        } else if word.starts_with("-o") || OWN.iter().any(|own| has_value(&own)) {
+            // Option and value in one word.
+        } else {
             kept.push(word.clone());
         }
     }
@@ -204,7 +205,7 @@ impl Planned<'_> {
         if self.has_fill {
             let index = self.frame.map_or(0, |(index, _)| index);
             // The first frame of a group starts afresh, whether or not the frame before it has been filled: the same bits in any order.
-            let (before, after) = (index % group as usize > 0, (index + 1) % group as usize > 0);
+            let (before, after) = (!index.is_multiple_of(group as usize), !(index + 1).is_multiple_of(group as usize));
             let cache = |index: usize| self.file(&Self::named(Some(index), "caches"));
             let mut words = vec!["-q".to_owned(), "-o".to_owned(), filled.clone()];
             let (mut writes, mut needs) = (vec![filled.clone()], Vec::new());
