@@ -7,8 +7,8 @@ use crate::spectrum::Spectrum;
 /// Floating point numbers round at every addition, so their sum depends on its order, and sums of parts are not the sum of the whole. Integers
 /// do not: films of parts of a picture add up to the very bits of the whole, in any order.
 ///
-/// Samples are held to 2⁻⁸⁰ (8·10⁻²⁵), so those above 10⁻¹⁷ to all digits of `f32`, and must be smaller than 2⁴⁷ (1.4·10¹⁴), their sum, too; there it stays. The face of the
-/// sun has 2·10⁷ W·m⁻²·sr⁻¹, or 2·10⁹ cd·m⁻².
+/// Samples are held to 2⁻⁸⁰ (8·10⁻²⁵), so those above 10⁻¹⁷ to all digits of `f32`, and must be smaller than 2⁴⁷ (1.4·10¹⁴), their sum,
+/// too; there it stays. The face of the sun has 2·10⁷ W·m⁻²·sr⁻¹, or 2·10⁹ cd·m⁻².
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct PixelSum(pub(super) [i128; 3]);
 

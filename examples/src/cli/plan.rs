@@ -74,7 +74,7 @@ pub(super) fn words_for_render(words: &[String]) -> Vec<String> {
         let has_value = |own: &&str| word.starts_with(&format!("{own}="));
         if OWN.contains(&word.as_str()) || word == "-o" {
             words.next();
-        } else if word.starts_with("-o") || OWN.iter().any(|own| has_value(&own)) {
+        } else if word.starts_with("-o") || OWN.iter().any(has_value) {
             // Option and value in one word.
         } else {
             kept.push(word.clone());

@@ -130,7 +130,7 @@ fn checkpoints_of_other_renders_and_damaged_ones_are_refused() {
     for (damaged, word) in [
         (bytes[..bytes.len() - 9].to_vec(), "cut off"),
         (bytes.iter().enumerate().map(|(i, b)| if i == 999 { b ^ 1 } else { *b }).collect(), "damaged"),
-        (b"PNG".to_vec(), "no checkpoint"),
+        (b"PNG".to_vec(), "neither a checkpoint"),
     ] {
         std::fs::write(&file, &damaged).unwrap();
         let refused = render(&["--size", "32x32", "--spp", "4"]);
