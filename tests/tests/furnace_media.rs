@@ -373,7 +373,8 @@ fn brute_force<M: Medium + ?Sized>(
             ray = Ray::new(segment.at(flown.distance), sample.to_light);
         } else if let Some(hit) = hit {
             if let Some(index) = hit.light {
-                sum += throughput * world.lights[index as usize].radiance(hit.normal, -ray.direction);
+                sum += throughput
+                    * world.lights[index as usize].radiance(ray.at(hit.distance), hit.normal, -ray.direction);
             }
             let choice = uniform(rng);
             let Some(sample) = hit.surface.sample(hit.normal, -ray.direction, choice, u) else { return sum };

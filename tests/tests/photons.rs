@@ -2,10 +2,10 @@
 
 use fogbow::host::{Empty, Hit, Medium, Scene};
 use fogbow::light::{
-    Emission, EnvironmentMap, Light, MeshLight, PhongLight, PointLight, QuadLight, SphereLight, SpotLight, Sun,
-    Triangle,
+    Emission, EnvironmentMap, Light, LightImage, MeshLight, PhongLight, PictureLight, PointLight, Projector, QuadLight,
+    SphereLight, SpotLight, Sun, Throw, Triangle,
 };
-use fogbow::math::{Bounds, Mat3, Ray, Vec3, float::PI};
+use fogbow::math::{Bounds, Mat3, Ray, Vec2, Vec3, float::PI};
 use fogbow::medium::{Homogeneous, Placed, Region};
 use fogbow::path::Settings;
 use fogbow::phase::{Lobe, Phase};
@@ -37,6 +37,22 @@ fn with_lights(mut check: impl FnMut(&str, &Light<'_>)) {
     ];
     let mut areas = [0.0; 2];
     check("mesh", &Light::Mesh(MeshLight::new(&triangles, &mut areas, COLOUR).unwrap()));
+    let texels: Vec<Spectrum> = (0..8 * 6).map(|i| COLOUR * ((i * 29) % 7) as f32).collect();
+    for (throw, is_smooth) in [(Throw::Screen, false), (Throw::Spot { beam: 0.2, cutoff: 0.5 }, true)] {
+        let (mut weights, mut column) = (vec![0.0; texels.len()], vec![0.0; 6]);
+        let image = LightImage::new(8, &texels, &mut weights, &mut column, is_smooth).unwrap();
+        let frame = Mat3::from_rotation_x(1.3);
+        let lamp = Projector::new(at, frame, Vec2::new(0.7, 0.4), throw, image).unwrap();
+        check(if is_smooth { "textured spot" } else { "projector" }, &Light::Projector(&lamp));
+        let sign = PictureLight::new([at, Vec3::X, Vec3::new(0.0, 0.2, 0.7)], false, image).unwrap();
+        check(if is_smooth { "smooth picture" } else { "picture" }, &Light::Picture(&sign));
+    }
+    // Of a triangle, black beyond the diagonal.
+    let texels: Vec<Spectrum> = (0..36).map(|i| if i % 6 + i / 6 < 6 { texels[i] } else { Spectrum::ZERO }).collect();
+    let (mut weights, mut column) = (vec![0.0; 36], vec![0.0; 6]);
+    let image = LightImage::new(6, &texels, &mut weights, &mut column, false).unwrap();
+    let sign = PictureLight::new([at, Vec3::X, Vec3::new(0.3, 0.2, 0.7)], true, image).unwrap();
+    check("triangle with a picture", &Light::Picture(&sign));
     check("sun", &Light::Sun(Sun::new(-axis, COLOUR).unwrap()));
     check("constant", &Light::Constant(COLOUR));
     let texels: Vec<Spectrum> = (0..16 * 8).map(|i| COLOUR * (0.2 + ((i * 37) % 11) as f32)).collect();
@@ -55,7 +71,7 @@ fn mean_emitted_power_is_the_power_of_the_light() {
     with_lights(|name, light| {
         let truth = light.power(&BOUNDS).0.map(f64::from);
         // The mean of an image is a sum over texels, that of its interpolant a little different.
-        let floor = if name == "environment" { 0.05 } else { 1e-5 };
+        let floor = if matches!(name, "environment" | "textured spot" | "smooth picture") { 0.05 } else { 1e-5 };
         let mean = estimate(20_000, |rng| emit(light, rng).map_or(Spectrum::ZERO, |e| e.power));
         mean.assert_is(truth, floor, name);
     });

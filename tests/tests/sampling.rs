@@ -1,6 +1,6 @@
 //! χ² of every sampler against its density. Seeds are fixed.
 
-use fogbow::light::{EnvironmentMap, Light, MeshLight, QuadLight, SphereLight, Triangle};
+use fogbow::light::{EnvironmentMap, Light, LightImage, MeshLight, PictureLight, QuadLight, SphereLight, Triangle};
 use fogbow::math::{Mat3, Vec3};
 use fogbow::phase::{Lobe, Phase, deflection};
 use fogbow::sampling::{discrete, distance, uniform, warp};
@@ -368,6 +368,27 @@ fn lights_with_extent() {
     check_light("mesh", &Light::Mesh(mesh), from, Vec3::new(0.5, 0.5, 0.0) - from, 1.5, |direction| {
         triangles.iter().find_map(|t| meet(t.corners, from, direction))
     });
+}
+
+#[test]
+fn lights_that_show_a_picture() {
+    let (corner, x, y) = (Vec3::new(-0.5, -0.7, 2.0), Vec3::new(0.0, 1.4, 0.0), Vec3::new(1.0, 0.0, 0.3));
+    let from = Vec3::new(0.1, 0.2, 1.2);
+    for (name, is_triangle, is_smooth) in
+        [("picture", false, false), ("smooth picture", false, true), ("triangle with a picture", true, false)]
+    {
+        // Of a triangle black beyond the diagonal.
+        let texel = |i: usize| if is_triangle && i % 4 + i / 4 > 3 { 0.0 } else { 1.0 + 0.25 * ((i * 7) % 5) as f32 };
+        let texels: Vec<Spectrum> = (0..16).map(|i| Spectrum::splat(texel(i))).collect();
+        let (mut weights, mut column) = ([0.0; 16], [0.0; 4]);
+        let image = LightImage::new(4, &texels, &mut weights, &mut column, is_smooth).unwrap();
+        let light = PictureLight::new([corner, x, y], is_triangle, image).unwrap();
+        let near = [corner, corner + x, corner + y];
+        let far = [corner + x, corner + x + y, corner + y];
+        check_light(name, &Light::Picture(&light), from, light.centre() - from, 1.5, |d| {
+            meet(near, from, d).or_else(|| if is_triangle { None } else { meet(far, from, d) })
+        });
+    }
 }
 
 #[test]

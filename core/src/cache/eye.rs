@@ -228,7 +228,7 @@ fn look<M: Medium + ?Sized, S: Scene + ?Sized>(
             && let Some(index) = hit.light.map(|i| i as usize)
             && let Some(light) = world.lights.get(index)
         {
-            let radiance = light.radiance(hit.normal, to_eye);
+            let radiance = light.radiance(point, hit.normal, to_eye);
             let at = (last.distance(point), hit.normal);
             sight.emitted(throughput * last.share(radiance, &world.lights, index, ray.direction, at));
         }

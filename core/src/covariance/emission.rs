@@ -66,14 +66,14 @@ pub fn emitted(light: &Light<'_>, ray: &Ray, normal: Option<Vec3>, point_radius:
             };
             Symmetric4::separable(point, angular)
         }
-        Light::Quad(light) => {
-            let mut m = Symmetric2::ZERO;
-            for edge in light.edges() {
-                let (a, b) = (edge.dot(frame.u), edge.dot(frame.v));
-                m = m.plus(&Symmetric2::new(a * a, a * b, b * b).times(1.0 / 12.0));
-            }
-            Symmetric4::separable(spectrum_of(&m, 1e-4 * light.area() / 12.0), Symmetric2::ZERO)
+        Light::Projector(light) => {
+            let sent = |direction: Vec3| light.intensity(direction).mean();
+            let least = 1e-3 * light.intensity(light.axis()).mean();
+            Symmetric4::separable(point, detail(sent, light.resolution(), least, &frame))
         }
+        Light::Quad(light) => parallelogram(light.edges(), light.area(), &frame),
+        // The light as a whole, as if it were even.
+        Light::Picture(light) => parallelogram(light.edges(), light.area(), &frame),
         Light::Sphere(light) => Symmetric4::separable(disc(light.radius.max(1e-6)), Symmetric2::ZERO),
         Light::Mesh(light) => {
             // The disc of the same area, foreshortened.
@@ -93,15 +93,31 @@ pub fn emitted(light: &Light<'_>, ray: &Ray, normal: Option<Vec3>, point_radius:
     LightField { covariance: covariance.mended(), frame }
 }
 
+/// Of a light with these edges (m), seen along the frame's axis.
+fn parallelogram(edges: [Vec3; 2], area: f32, frame: &Frame) -> Symmetric4 {
+    let mut m = Symmetric2::ZERO;
+    for edge in edges {
+        let (a, b) = (edge.dot(frame.u), edge.dot(frame.v));
+        m = m.plus(&Symmetric2::new(a * a, a * b, b * b).times(1.0 / 12.0));
+    }
+    Symmetric4::separable(spectrum_of(&m, 1e-4 * area / 12.0), Symmetric2::ZERO)
+}
+
 /// Angular covariance of an image around the world: its relative Hessian over a texel.
 fn sky(map: &EnvironmentMap<'_>, frame: &Frame) -> Symmetric2 {
-    let step = map.resolution().max(1e-4);
+    let sent = |direction: Vec3| map.radiance(-direction).mean();
+    detail(sent, map.resolution().max(1e-4), 1e-6 * map.mean_radiance().mean(), frame)
+}
+
+/// Angular covariance of what is sent in directions (unit) around a frame's axis, by differences over `step` (rad): its relative Hessian, where
+/// no less than `least` counts as sent.
+fn detail(sent: impl Fn(Vec3) -> f32, step: f32, least: f32, frame: &Frame) -> Symmetric2 {
     let at = |a: f32, b: f32| {
         let direction = frame.w + frame.u * (a * step) + frame.v * (b * step);
-        map.radiance(-direction.normalize()).mean()
+        sent(direction.normalize())
     };
     let centre = at(0.0, 0.0);
-    let scale = 1.0 / (step * step * centre.max(1e-6 * map.mean_radiance().mean()).max(1e-30));
+    let scale = 1.0 / (step * step * centre.max(least).max(1e-30));
     let hessian = Symmetric2 {
         xx: (at(1.0, 0.0) + at(-1.0, 0.0) - 2.0 * centre) * scale,
         xy: 0.25 * (at(1.0, 1.0) + at(-1.0, -1.0) - at(1.0, -1.0) - at(-1.0, 1.0)) * scale,

@@ -12,7 +12,13 @@ use crate::spectrum::Spectrum;
 
 /// A sample of a surface point, given its density over area (m⁻²). `None` seen from behind.
 #[inline]
-fn surface_sample(from: Vec3, position: Vec3, normal: Vec3, radiance: Spectrum, pdf_area: f32) -> Option<LightSample> {
+pub(super) fn surface_sample(
+    from: Vec3,
+    position: Vec3,
+    normal: Vec3,
+    radiance: Spectrum,
+    pdf_area: f32,
+) -> Option<LightSample> {
     let offset = position - from;
     let distance_squared = offset.length_squared();
     let distance = float::sqrt(distance_squared);
@@ -36,7 +42,7 @@ pub(super) fn to_solid_angle(pdf_area: f32, to_light: Vec3, distance: f32, norma
     if cosine <= 0.0 { 0.0 } else { pdf_area * distance * distance / cosine }
 }
 
-fn importance(radiance: Spectrum, area: f32, centre: Vec3, from: Vec3) -> f32 {
+pub(super) fn importance(radiance: Spectrum, area: f32, centre: Vec3, from: Vec3) -> f32 {
     // Near the light the inverse square overshoots; a hemisphere full of light is the most there is.
     radiance.mean() * (area / centre.distance_squared(from).max(1e-30)).min(2.0 * PI)
 }

@@ -61,6 +61,8 @@ impl Light<'_> {
     /// | point | uniform directions |
     /// | Phong | directions as `cosˢ` |
     /// | spot | uniform within the cut-off; the border's fall-off is in the power |
+    /// | projector | directions by the picture |
+    /// | picture | points by the picture, directions as the cosine |
     /// | quad, sphere, mesh | uniform over the area, directions as the cosine |
     /// | sun | uniform over the disc across the ball around `bounds` |
     /// | constant, environment | directions as [`Light::sample`], then as the sun |
@@ -99,6 +101,14 @@ impl Light<'_> {
                 Some(Emission::from_surface(source.position, source.normal, source.weight * PI, direction))
             }
             Self::Mesh(light) => {
+                let source = light.anchor(position)?;
+                Some(Emission::from_surface(source.position, source.normal, source.weight * PI, direction))
+            }
+            Self::Projector(light) => {
+                let (towards, power) = light.emit(direction)?;
+                Some(Emission::from_point(light.position, towards, power))
+            }
+            Self::Picture(light) => {
                 let source = light.anchor(position)?;
                 Some(Emission::from_surface(source.position, source.normal, source.weight * PI, direction))
             }

@@ -6,6 +6,7 @@
 //! | [`geometry`] | [`Source`]: a point of light with its fall-off, its gradient (Jarosz et al. 2008, Eq. 9, 36–40) |
 //! | [`point`] | point, Phong and spot lights |
 //! | [`area`] | quad, sphere and triangle-mesh lights |
+//! | `picture` | [`Projector`], [`PictureLight`]: lights that show a [`LightImage`] |
 //! | [`distant`] | sun, constant and image environments |
 //! | `lights` | [`Lights`]: all of a world, and choices among them |
 //! | `tree` | [`LightTree`]: boxes around many lights |
@@ -20,6 +21,7 @@ pub mod distant;
 pub mod emission;
 pub mod geometry;
 mod lights;
+mod picture;
 pub mod point;
 mod question;
 mod tree;
@@ -32,6 +34,7 @@ pub use emission::Emission;
 pub use geometry::{Falloff, Incident, Source};
 pub use lights::Lights;
 pub(crate) use lights::{Strong, Survey};
+pub use picture::{LightImage, PictureLight, Projector, Throw};
 pub use point::{PhongLight, PointLight, SpotLight};
 pub(crate) use question::{Except, FromPoint, FromRay, Guess, Question};
 pub(crate) use tree::Kind;
@@ -56,6 +59,10 @@ pub enum Light<'a> {
     Sphere(SphereLight),
     /// One-sided triangles.
     Mesh(MeshLight<'a>),
+    /// A point that throws a picture.
+    Projector(&'a Projector<'a>),
+    /// A one-sided parallelogram or triangle that shows a picture.
+    Picture(&'a PictureLight<'a>),
     /// Parallel light from infinity.
     Sun(Sun),
     /// The same radiance (W·m⁻²·sr⁻¹) from every direction.
@@ -75,7 +82,7 @@ pub enum LightError {
     NoArea,
     /// A Phong exponent must be 0 or at least 1: between, the gradient has no bound.
     Exponent,
-    /// A spot needs `0 ≤ beam ≤ cutoff ≤ π`, and a cutoff above 0.
+    /// A spot needs `0 ≤ beam ≤ cutoff ≤ π`, and a cutoff above 0; half angles of a projector are above 0° and below 90°.
     Cone,
     /// Lent tables do not fit the image or mesh.
     Size,
@@ -88,7 +95,7 @@ impl core::fmt::Display for LightError {
             Self::Geometry => "positions must be finite and axes must have a length",
             Self::NoArea => "the light has no area",
             Self::Exponent => "a Phong exponent must be 0 or at least 1",
-            Self::Cone => "a spot needs 0 <= beam width <= cutoff angle <= pi and a cutoff above 0",
+            Self::Cone => "a spot needs 0 <= beam width <= cutoff angle <= pi and a cutoff above 0, a projector angles between 0 and 90 degrees",
             Self::Size => "the lent tables do not fit",
         })
     }
@@ -221,6 +228,8 @@ impl Light<'_> {
             Self::Quad(light) => light.sample(from, u),
             Self::Sphere(light) => light.sample(from, u),
             Self::Mesh(light) => light.sample(from, u),
+            Self::Projector(light) => light.sample(from),
+            Self::Picture(light) => light.sample(from, u),
             Self::Sun(light) => Some(distant::sample_sun(light)),
             Self::Constant(radiance) => Some(distant::sample_constant(*radiance, u)),
             Self::Environment(map) => map.sample(u),
@@ -241,31 +250,33 @@ impl Light<'_> {
     #[must_use]
     pub fn pdf(&self, from: Vec3, to_light: Vec3, distance: f32, normal: Vec3) -> f32 {
         match self {
-            Self::Point(_) | Self::Phong(_) | Self::Spot(_) | Self::Sun(_) => 0.0,
+            Self::Point(_) | Self::Phong(_) | Self::Spot(_) | Self::Projector(_) | Self::Sun(_) => 0.0,
             Self::Quad(light) => light.pdf(from, to_light, distance),
             Self::Sphere(light) => light.pdf(from),
             Self::Mesh(light) => light.pdf(to_light, distance, normal),
+            Self::Picture(light) => light.pdf(from, to_light, distance),
             Self::Constant(_) => crate::math::float::INV_FOUR_PI,
             Self::Environment(map) => map.pdf(to_light),
         }
     }
 
-    /// Radiance (W·m⁻²·sr⁻¹) that an area light's surface with `normal` sends towards `to_eye`;
+    /// Radiance (W·m⁻²·sr⁻¹) that an area light's surface with `normal` at `point` (m) sends towards `to_eye`;
     /// 0 from behind and for lights without a surface.
     ///
     /// ```
     /// # use fogbow::{light::{Light, QuadLight}, math::Vec3, spectrum::Spectrum};
     /// let lamp = Light::Quad(QuadLight::new(Vec3::ZERO, Vec3::X, Vec3::Y, Spectrum::ONE).unwrap());
-    /// assert_eq!(lamp.radiance(Vec3::Z, Vec3::new(0.6, 0.0, 0.8)), Spectrum::ONE);   // the same in all directions
-    /// assert_eq!(lamp.radiance(Vec3::Z, Vec3::NEG_Z), Spectrum::ZERO);   // from behind
+    /// assert_eq!(lamp.radiance(Vec3::ZERO, Vec3::Z, Vec3::new(0.6, 0.0, 0.8)), Spectrum::ONE);   // the same in all directions
+    /// assert_eq!(lamp.radiance(Vec3::ZERO, Vec3::Z, Vec3::NEG_Z), Spectrum::ZERO);   // from behind
     /// ```
     #[inline]
     #[must_use]
-    pub fn radiance(&self, normal: Vec3, to_eye: Vec3) -> Spectrum {
+    pub fn radiance(&self, point: Vec3, normal: Vec3, to_eye: Vec3) -> Spectrum {
         let emitted = match self {
             Self::Quad(light) => light.radiance,
             Self::Sphere(light) => light.radiance,
             Self::Mesh(light) => light.radiance,
+            Self::Picture(light) => light.radiance_at(point),
             _ => return Spectrum::ZERO,
         };
         if normal.dot(to_eye) > 0.0 { emitted } else { Spectrum::ZERO }
@@ -330,6 +341,8 @@ impl Light<'_> {
             Self::Quad(light) => (light.centre(), NEAR_FLAT * light.area()),
             Self::Sphere(light) => (light.centre, NEAR_SPHERE * light.area()),
             Self::Mesh(light) => (light.centre(), NEAR_FLAT * light.area()),
+            Self::Projector(light) => (light.position, f32::INFINITY),
+            Self::Picture(light) => (light.centre(), NEAR_FLAT * light.area()),
             Self::Sun(_) | Self::Constant(_) | Self::Environment(_) => return None,
         };
         Some(NearField { centre, radius2 })
@@ -355,7 +368,7 @@ impl Light<'_> {
 
     /// A point of the light to spread a connection around, before it is known where on a ray the
     /// connection starts. The source is `None` for a sphere, whose visible cap has to be sampled
-    /// from there.
+    /// from there, and for a projector, whose picture decides what it sends there.
     ///
     /// ```
     /// # use fogbow::{light::{Light, QuadLight, SphereLight}, math::{Vec2, Vec3}, spectrum::Spectrum};
@@ -374,6 +387,9 @@ impl Light<'_> {
             Self::Spot(light) => light.source(),
             Self::Quad(light) => light.anchor(u),
             Self::Mesh(light) => light.anchor(u)?,
+            Self::Picture(light) => light.anchor(u)?,
+            // What it sends depends on the direction.
+            Self::Projector(light) => return Some((light.position, None)),
             Self::Sphere(light) => return Some((light.centre, None)),
             Self::Sun(_) | Self::Constant(_) | Self::Environment(_) => return None,
         };
@@ -419,6 +435,8 @@ impl Light<'_> {
             Self::Quad(light) => light.radiance.mean() * light.area(),
             Self::Sphere(light) => light.radiance.mean() * 0.25 * light.area(),
             Self::Mesh(light) => light.radiance.mean() * 0.5 * light.area(),
+            Self::Projector(light) => light.most(),
+            Self::Picture(light) => light.mean_radiance().mean() * light.area(),
             Self::Sun(_) | Self::Constant(_) | Self::Environment(_) => 0.0,
         }
     }
@@ -439,6 +457,7 @@ impl Light<'_> {
     pub fn near_interval(&self, ray: &Ray, near: f32, far: f32) -> Option<(f32, f32)> {
         match self {
             Self::Spot(light) => light.lit_interval(ray, near, far),
+            Self::Projector(light) => light.lit_interval(ray, near, far),
             _ => self.near_field()?.interval(ray, near, far),
         }
     }
@@ -449,12 +468,14 @@ impl Light<'_> {
             Self::Point(light) => Bounds::of([light.position]),
             Self::Phong(light) => Bounds::of([light.position]),
             Self::Spot(light) => Bounds::of([light.position]),
+            Self::Projector(light) => Bounds::of([light.position]),
             Self::Quad(light) => {
                 let (half, centre) = (light.edges().map(|edge| edge.abs() * 0.5), light.centre());
                 Bounds { min: centre - half[0] - half[1], max: centre + half[0] + half[1] }
             }
             Self::Sphere(light) => Bounds { min: light.centre - light.radius, max: light.centre + light.radius },
             Self::Mesh(light) => light.bounds(),
+            Self::Picture(light) => light.bounds(),
             Self::Sun(_) | Self::Constant(_) | Self::Environment(_) => Bounds::of([Vec3::ZERO]),
         }
     }
@@ -478,7 +499,7 @@ impl Light<'_> {
         let Some(law) = Equiangular::new(ray.origin, ray.direction, field.centre(), near, far) else { return 0.0 };
         // A ray through the middle of a flat light is on the mean a quarter of its width away from where it shines.
         let most = match (self, field.radius()) {
-            (Self::Quad(_) | Self::Mesh(_), Some(radius)) => 2.0 * crate::math::float::PI / radius,
+            (Self::Quad(_) | Self::Mesh(_) | Self::Picture(_), Some(radius)) => 2.0 * crate::math::float::PI / radius,
             _ => f32::INFINITY,
         };
         // Capped, so that a sum over all lights stays a number.
@@ -503,6 +524,8 @@ impl Light<'_> {
             Self::Quad(light) => light.importance(from),
             Self::Sphere(light) => light.importance(from),
             Self::Mesh(light) => light.importance(from),
+            Self::Projector(light) => light.importance(from),
+            Self::Picture(light) => light.importance(from),
             Self::Sun(light) => light.irradiance.mean(),
             Self::Constant(radiance) => radiance.mean() * 4.0 * crate::math::float::PI,
             Self::Environment(map) => map.mean_radiance().mean() * 4.0 * crate::math::float::PI,
@@ -529,6 +552,8 @@ impl Light<'_> {
             Self::Quad(light) => light.radiance * (PI * light.area()),
             Self::Sphere(light) => light.radiance * (PI * light.area()),
             Self::Mesh(light) => light.radiance * (PI * light.area()),
+            Self::Projector(light) => light.power(),
+            Self::Picture(light) => light.mean_radiance() * (PI * light.area()),
             Self::Sun(light) => light.irradiance * disc,
             Self::Constant(radiance) => *radiance * (4.0 * PI * disc),
             Self::Environment(map) => map.mean_radiance() * (4.0 * PI * disc),

@@ -37,8 +37,8 @@ impl Kind {
 
     pub(super) fn of(light: &Light<'_>) -> Self {
         match light {
-            Light::Point(_) | Light::Phong(_) | Light::Spot(_) => Self::Lamp,
-            Light::Sphere(_) | Light::Mesh(_) => Self::Body,
+            Light::Point(_) | Light::Phong(_) | Light::Spot(_) | Light::Projector(_) => Self::Lamp,
+            Light::Sphere(_) | Light::Mesh(_) | Light::Picture(_) => Self::Body,
             Light::Quad(_) => Self::Panel,
             Light::Sun(_) | Light::Constant(_) | Light::Environment(_) => {
                 if light.is_sky() {
@@ -128,7 +128,9 @@ impl LightNode {
         let (axis, spread) = match light {
             Light::Phong(light) => (light.axis, 0.5 * PI + SLACK),
             Light::Spot(light) => (light.axis, light.cutoff() + SLACK),
+            Light::Projector(light) => (light.axis(), light.spread() + SLACK),
             Light::Quad(light) => (light.normal(), 0.5 * PI + SLACK),
+            Light::Picture(light) => (light.normal(), 0.5 * PI + SLACK),
             Light::Mesh(_) => (Vec3::Z, UNEVEN),
             _ => (Vec3::Z, PI),
         };

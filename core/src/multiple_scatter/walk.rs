@@ -317,7 +317,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Walk<'_, M, S> {
         let lights = &self.world.lights;
         let met = hit.light.and_then(|index| Some((index as usize, lights.get(index as usize)?)));
         let Some((index, light)) = met else { return Spectrum::ZERO };
-        let radiance = light.radiance(hit.normal, -ray.direction);
+        let radiance = light.radiance(ray.at(hit.distance), hit.normal, -ray.direction);
         if radiance.is_black() {
             return Spectrum::ZERO;
         }

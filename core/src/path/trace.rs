@@ -331,7 +331,7 @@ fn emitted<M: ?Sized, S: ?Sized>(path: &mut Path, world: &World<'_, M, S>, ray: 
     let Some((index, light)) = hit.light.and_then(|i| Some((i as usize, world.lights.get(i as usize)?))) else {
         return;
     };
-    let radiance = light.radiance(hit.normal, -ray.direction);
+    let radiance = light.radiance(point, hit.normal, -ray.direction);
     if radiance.is_black() {
         return;
     }

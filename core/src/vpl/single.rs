@@ -312,7 +312,8 @@ fn connection<M: Medium + ?Sized, S: Scene + ?Sized>(
             && hit.light == Some(index)
         {
             let found = light.pdf(point, sample.to_light, hit.distance, hit.normal);
-            let sent = light.radiance(hit.normal, -sample.to_light) * mis::power(sample.pdf, found);
+            let sent =
+                light.radiance(way.at(hit.distance), hit.normal, -sample.to_light) * mis::power(sample.pdf, found);
             if !sent.is_black() {
                 let reach = transmittance(world.medium, &way.with_length(hit.distance), rng);
                 arriving += sample.weight * sent * reach;

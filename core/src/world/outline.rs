@@ -60,16 +60,17 @@ impl LightCounts {
 
 fn is_delta(light: &Light<'_>) -> bool {
     match light {
-        Light::Point(_) | Light::Phong(_) | Light::Spot(_) | Light::Sun(_) => true,
-        Light::Quad(_) | Light::Sphere(_) | Light::Mesh(_) | Light::Constant(_) | Light::Environment(_) => false,
+        Light::Point(_) | Light::Phong(_) | Light::Spot(_) | Light::Projector(_) | Light::Sun(_) => true,
+        Light::Quad(_) | Light::Sphere(_) | Light::Mesh(_) | Light::Picture(_) => false,
+        Light::Constant(_) | Light::Environment(_) => false,
     }
 }
 
 fn is_distant(light: &Light<'_>) -> bool {
     match light {
         Light::Sun(_) | Light::Constant(_) | Light::Environment(_) => true,
-        Light::Point(_) | Light::Phong(_) | Light::Spot(_) => false,
-        Light::Quad(_) | Light::Sphere(_) | Light::Mesh(_) => false,
+        Light::Point(_) | Light::Phong(_) | Light::Spot(_) | Light::Projector(_) => false,
+        Light::Quad(_) | Light::Sphere(_) | Light::Mesh(_) | Light::Picture(_) => false,
     }
 }
 

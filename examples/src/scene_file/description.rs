@@ -10,7 +10,7 @@ use super::material::Material;
 use crate::filter::Filter;
 use crate::mesh::Mesh;
 use crate::picture::Picture;
-use crate::texture::Wrap;
+use crate::texture::{Texture, Wrap};
 use crate::transform::{Transform, to_array, to_vec3};
 use crate::vdb::BrickStorage;
 use crate::volume::{Colours, Volume};
@@ -339,6 +339,8 @@ pub struct Shape {
     pub material: Material,
     /// Radiance (W·m⁻²·sr⁻¹) it sends out on the side of its normals.
     pub radiance: Option<Spectrum>,
+    /// What that varies by, where it does: a rectangle or a mesh; `radiance` is then its mean.
+    pub glow: Option<Arc<Texture>>,
     /// Line in the file.
     pub line: u32,
 }
@@ -388,6 +390,19 @@ pub enum Emitter {
         /// Half angle where light ends (degrees).
         cutoff: f64,
         /// W/sr on the axis.
+        intensity: Spectrum,
+    },
+    /// A point that throws a picture.
+    Projector {
+        /// Where, and its axes (unit): along the picture's rows, along its columns, ahead.
+        to_world: Transform,
+        /// Tangents of half the angles along rows and columns.
+        half: [f64; 2],
+        /// Half angles (degrees) of full light and where light ends, for a spot; a screen otherwise.
+        cone: Option<[f64; 2]>,
+        /// The picture, on the unit square.
+        texture: Arc<Texture>,
+        /// W/sr where the picture is 1: on the axis, or for a screen anywhere on one a metre ahead.
         intensity: Spectrum,
     },
     /// Parallel light.

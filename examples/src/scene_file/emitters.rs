@@ -1,15 +1,19 @@
 //! `<emitter>` outside shapes.
 
+use std::sync::Arc;
+
 use fogbow::spectrum::Spectrum;
 
-use super::description::Emitter;
+use super::description::{Emitter, FovAxis, Sensor};
 use super::element::Element;
 use super::plugin::Plugin;
+use super::{sensor, textures};
 use crate::error::SceneError;
 use crate::picture::Picture;
-use crate::transform::{Transform, normalized};
+use crate::texture::Texture;
+use crate::transform::{Transform, dot, normalized};
 
-const KNOWN: &str = "point, spot, directional, constant, envmap; area inside a shape";
+const KNOWN: &str = "point, spot, projector, directional, constant, envmap; area inside a shape";
 
 /// An emitter; none where it is left out by the user's leave.
 pub(super) fn read(element: &Element<'_>) -> Result<Option<Emitter>, SceneError> {
@@ -32,11 +36,17 @@ pub(super) fn read(element: &Element<'_>) -> Result<Option<Emitter>, SceneError>
             let to_world = plugin.to_world()?.map_or(Transform::IDENTITY, |(t, _)| t);
             let cutoff = plugin.number_in("cutoff_angle", 20.0, 1e-3..=180.0)?;
             let beam = plugin.number_in("beam_width", cutoff * 0.75, 0.0..=cutoff)?;
-            if let Some(texture) = plugin.get("texture") {
-                let error = texture.error("a spot light cannot show a texture here");
-                texture.instead(error, "without it", || ())?;
-            }
             let axis = to_world.column(2);
+            if let Some((texture, source)) = textures::property(&plugin, "texture")? {
+                if !(cutoff < 89.0) {
+                    return Err(source.error("a spot that shows a texture needs a cutoff_angle below 89 degrees"));
+                }
+                let half = cutoff.to_radians().tan();
+                let shown = Shown { texture, source, half: [half; 2], cone: Some([beam, cutoff]) };
+                let emitter = shown.emitter(&to_world, [1.0, 1.0], strength(&plugin, "intensity")?)?;
+                plugin.finish()?;
+                return Ok(Some(emitter));
+            }
             Emitter::Spot {
                 position: to_world.column(3),
                 axis,
@@ -62,7 +72,8 @@ pub(super) fn read(element: &Element<'_>) -> Result<Option<Emitter>, SceneError>
             element.suspicious("no shape refers to it: an area light must stand inside a shape");
             return Ok(None);
         }
-        "projector" | "directionalarea" | "sky" | "sunsky" | "sun" | "timed_sunsky" => {
+        "projector" => projector(&plugin)?,
+        "directionalarea" | "sky" | "sunsky" | "sun" | "timed_sunsky" => {
             let reason = format!("\"{}\" cannot be rendered here yet; known here: {KNOWN}", plugin.kind);
             return element.instead(element.attribute_error("type", reason), "left out", || None);
         }
@@ -70,6 +81,64 @@ pub(super) fn read(element: &Element<'_>) -> Result<Option<Emitter>, SceneError>
     };
     plugin.finish()?;
     Ok(Some(emitter))
+}
+
+/// What a light throws.
+struct Shown<'a> {
+    texture: Texture,
+    source: Element<'a>,
+    half: [f64; 2],
+    cone: Option<[f64; 2]>,
+}
+
+impl Shown<'_> {
+    /// `signs` turn the picture's rows and columns to the axes of the light.
+    fn emitter(self, to_world: &Transform, signs: [f64; 2], intensity: Spectrum) -> Result<Emitter, SceneError> {
+        textures::check_attributes(&self.texture, None).map_err(|reason| self.source.error(reason))?;
+        let along = |index: usize, sign: f64| normalized(to_world.column(index).map(|c| c * sign));
+        let (Some(x), Some(y), Some(z)) = (along(0, signs[0]), along(1, signs[1]), along(2, 1.0)) else {
+            return Err(self.source.error("the light's to_world has an axis without length"));
+        };
+        if [dot(x, y), dot(y, z), dot(z, x)].iter().any(|c| c.abs() > 1e-4) {
+            return Err(self.source.error("a light that shows a picture cannot be sheared"));
+        }
+        let to_world = Transform::from_columns(x, y, z, to_world.column(3));
+        Ok(Emitter::Projector {
+            to_world,
+            half: self.half,
+            cone: self.cone,
+            texture: Arc::new(self.texture),
+            intensity,
+        })
+    }
+}
+
+/// `irradiance` is that on a screen one unit ahead, over π.
+fn projector(plugin: &Plugin<'_>) -> Result<Emitter, SceneError> {
+    let to_world = plugin.to_world()?.map_or(Transform::IDENTITY, |(t, _)| t);
+    let (texture, source) = match textures::property(plugin, "irradiance")? {
+        Some(found) => found,
+        None => (Texture::Constant(Spectrum::ONE), plugin.element),
+    };
+    let [width, height] = match &texture {
+        Texture::Bitmap { picture, .. } => [picture.width, picture.height].map(|n| n as f64),
+        _ => [1.0; 2],
+    };
+    let mut camera = Sensor { width: width as u32, height: height as u32, ..Sensor::default() };
+    camera.fov_axis = FovAxis::X;
+    sensor::field_of_view(plugin, &mut camera)?;
+    let scale = plugin.number_in("scale", 1.0, 0.0..=1e12)? as f32;
+    let tangent = (0.5 * camera.fov).to_radians().tan();
+    let across = match camera.fov_axis {
+        FovAxis::X => width,
+        FovAxis::Y => height,
+        FovAxis::Smaller => width.min(height),
+        FovAxis::Larger => width.max(height),
+        FovAxis::Diagonal => width.hypot(height),
+    };
+    let half = [tangent * width / across, tangent * height / across];
+    let shown = Shown { texture, source, half, cone: None };
+    shown.emitter(&to_world, [-1.0, -1.0], Spectrum::splat(scale * std::f32::consts::PI))
 }
 
 fn strength(plugin: &Plugin<'_>, name: &str) -> Result<Spectrum, SceneError> {

@@ -148,7 +148,7 @@ fn is_upright(t: &Transform) -> bool {
     (0..3).all(|i| crate::transform::dot(unit(i), unit((i + 1) % 3)).abs() < 1e-4)
 }
 
-fn field_of_view(plugin: &Plugin<'_>, sensor: &mut Sensor) -> Result<(), SceneError> {
+pub(super) fn field_of_view(plugin: &Plugin<'_>, sensor: &mut Sensor) -> Result<(), SceneError> {
     let length = plugin.string("focal_length")?;
     let angle = plugin.number("fov")?;
     match (angle, length) {

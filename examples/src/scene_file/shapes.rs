@@ -12,6 +12,7 @@ use super::plugin::Plugin;
 use super::{groups, materials, textures};
 use crate::error::SceneError;
 use crate::mesh::Mesh;
+use crate::texture::Texture;
 use crate::transform::{Transform, normalized};
 use crate::world::{Body, as_box};
 
@@ -54,7 +55,11 @@ pub(super) fn read<'a>(element: &Element<'a>, groups: &mut Groups<'a>) -> Result
 fn read_one<'a>(plugin: &Plugin<'a>) -> Result<ShapeElement<'a>, SceneError> {
     let element = &plugin.element;
     let is_flipped = plugin.boolean("flip_normals", false)?;
-    let radiance = plugin.nested("emitter").map(|e| area_emitter(&e)).transpose()?;
+    let emitter = plugin.nested("emitter");
+    let (radiance, mut glow) = match &emitter {
+        Some(emitter) => area_emitter(emitter).map(|(radiance, glow)| (Some(radiance), glow))?,
+        None => (None, None),
+    };
     let interior = side(plugin, "interior")?;
     let exterior = side(plugin, "exterior")?;
     let material = match plugin.nested("bsdf") {
@@ -72,6 +77,17 @@ fn read_one<'a>(plugin: &Plugin<'a>) -> Result<ShapeElement<'a>, SceneError> {
     let is_boundary = has_media && material.surface.transmits();
     let (container, mut is_inside_out) = if is_boundary { container_of(&geometry, element)? } else { (None, false) };
     is_inside_out ^= is_flipped;
+    if let (Some(texture), Some(emitter)) = (&glow, &emitter) {
+        let checked = match &geometry {
+            Geometry::Rectangle(_) => textures::check_attributes(texture, None),
+            Geometry::Mesh(mesh) => textures::check_attributes(texture, Some(mesh)),
+            _ => Err("light that varies over a surface is supported on rectangles and meshes only".to_owned()),
+        };
+        if let Err(reason) = checked {
+            emitter.instead(emitter.error(reason), "its mean everywhere", || ())?;
+            glow = None;
+        }
+    }
     let geometry = if radiance.is_some() { shining(geometry, is_flipped) } else { geometry };
     let mesh = match &geometry {
         Geometry::Mesh(mesh) => Some(mesh),
@@ -87,7 +103,7 @@ fn read_one<'a>(plugin: &Plugin<'a>) -> Result<ShapeElement<'a>, SceneError> {
         material
     };
     let is_visible = material.surface != Surface::Null || material.mix.is_some();
-    let shape = is_visible.then(|| Shape { geometry, is_flipped, material, radiance, line: element.line() });
+    let shape = is_visible.then(|| Shape { geometry, is_flipped, material, radiance, glow, line: element.line() });
     Ok(ShapeElement { element: *element, shape, container, is_inside_out, interior, exterior })
 }
 
@@ -133,21 +149,21 @@ fn side<'a>(plugin: &Plugin<'a>, name: &str) -> Result<Option<Element<'a>>, Scen
     }
 }
 
-fn area_emitter(element: &Element<'_>) -> Result<Spectrum, SceneError> {
+/// Radiance, and what it varies by; it is the mean then.
+fn area_emitter(element: &Element<'_>) -> Result<(Spectrum, Option<Arc<Texture>>), SceneError> {
     let plugin = Plugin::new(*element)?;
     if plugin.kind != "area" {
         return Err(plugin.unknown_type("area (inside a shape)"));
     }
-    let radiance = match plugin.get("radiance") {
-        Some(source) if source.tag() == "texture" => {
-            let mean = textures::read(&source, 0)?.mean().max(Spectrum::ZERO);
-            let error = source.error("light that varies over a surface is not supported");
-            element.instead(error, "its mean everywhere", || mean)?
-        }
-        _ => plugin.emission("radiance")?.map_or(Spectrum::ONE, |(value, _)| value),
+    let found = match plugin.get("radiance") {
+        Some(source) if source.tag() == "texture" => match textures::read(&source, 0)? {
+            Texture::Constant(value) => (value.max(Spectrum::ZERO), None),
+            texture => (texture.mean().max(Spectrum::ZERO), Some(Arc::new(texture))),
+        },
+        _ => (plugin.emission("radiance")?.map_or(Spectrum::ONE, |(value, _)| value), None),
     };
     plugin.finish()?;
-    Ok(radiance)
+    Ok(found)
 }
 
 fn read_geometry(plugin: &Plugin<'_>) -> Result<Geometry, SceneError> {

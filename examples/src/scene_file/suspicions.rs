@@ -63,6 +63,7 @@ fn hidden_lights(scene: &SceneFile, shapes: &[ShapeElement<'_>], emitters: &[Ele
         .collect();
     let lamps = scene.emitters.iter().zip(emitters).filter_map(|(emitter, element)| match emitter {
         Emitter::Point { position, .. } | Emitter::Spot { position, .. } => Some((element, *position)),
+        Emitter::Projector { to_world, .. } => Some((element, to_world.column(3))),
         _ => None,
     });
     let areas = shapes.iter().filter(|s| s.element.is_emitter()).filter_map(|source| {

@@ -27,10 +27,18 @@ impl Pieces {
         for (index, shape) in (0_u32..).zip(&scene.shapes) {
             pieces.materials.push(shape.material.clone());
             let light = shape.radiance.and_then(|_| lights.next());
+            // Of a mesh that shows a picture each triangle is a light.
+            let is_many = shape.glow.is_some() && matches!(shape.geometry, Geometry::Mesh(_));
             let is_smooth = matches!(&shape.geometry, Geometry::Mesh(mesh) if !mesh.normals.is_empty());
             let varies = is_smooth || shape.material.varies();
             let part = Part { material: index, side: if shape.is_flipped { -1.0 } else { 1.0 }, light, varies };
+            let before = pieces.corners.len();
             pieces.push(shape, part);
+            if let Some(first) = light.filter(|_| is_many) {
+                let parts = &mut pieces.triangle_parts[before..];
+                (first..).zip(parts.iter_mut()).for_each(|(light, part)| part.light = Some(light));
+                lights = first + u32::try_from(parts.len()).unwrap_or(0)..;
+            }
         }
         pieces
     }

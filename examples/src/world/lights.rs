@@ -1,12 +1,13 @@
 //! Emitters, and the tables they borrow.
 
 use fogbow::light::{
-    EnvironmentMap, Light, LightError, LightTree, MeshLight, PointLight, QuadLight, SphereLight, SpotLight, Sun,
-    Triangle,
+    EnvironmentMap, Light, LightError, LightTree, MeshLight, PictureLight, PointLight, Projector, QuadLight,
+    SphereLight, SpotLight, Sun, Triangle,
 };
 use fogbow::math::{Mat3, Vec3};
 use fogbow::spectrum::Spectrum;
 
+use super::glow::{self, Glow};
 use super::media::MediumTable;
 use crate::error::SceneError;
 use crate::mesh::has_area;
@@ -25,6 +26,10 @@ pub struct Storage {
 pub(super) struct LightTables {
     /// For each shape that is a light of triangles, in order.
     meshes: Vec<MeshTable>,
+    /// For each shape that shows a picture, in order.
+    glows: Vec<Vec<Glow>>,
+    /// For each emitter that shows one.
+    projectors: Vec<Glow>,
     environment: Option<EnvironmentTable>,
 }
 
@@ -45,7 +50,8 @@ impl Storage {
     /// Memory for the lights and media of a scene.
     #[must_use]
     pub fn new(scene: &SceneFile) -> Self {
-        let meshes = scene.shapes.iter().filter(|s| s.radiance.is_some()).filter_map(triangles_of).map(|triangles| {
+        let even = scene.shapes.iter().filter(|s| s.radiance.is_some() && s.glow.is_none());
+        let meshes = even.filter_map(triangles_of).map(|triangles| {
             let areas = vec![0.0; triangles.len()];
             MeshTable { triangles, areas }
         });
@@ -57,7 +63,10 @@ impl Storage {
             }),
             _ => None,
         });
-        let lights = LightTables { meshes: meshes.collect(), environment };
+        let glows = scene.shapes.iter().filter(|s| s.radiance.is_some() && s.glow.is_some()).map(glow::of_shape);
+        let projectors = scene.emitters.iter().filter_map(glow::of_emitter);
+        let (glows, projectors) = (glows.collect(), projectors.collect());
+        let lights = LightTables { meshes: meshes.collect(), glows, projectors, environment };
         Self { lights, media: super::media::tables(scene) }
     }
 
@@ -66,7 +75,8 @@ impl Storage {
     pub fn bytes(&self) -> usize {
         let meshes = self.lights.meshes.iter().map(|m| size_of_val(&*m.triangles) + size_of_val(&*m.areas));
         let environment = self.lights.environment.iter().map(|e| size_of_val(&*e.texels) + size_of_val(&*e.weights));
-        meshes.chain(environment).chain(self.media.iter().map(MediumTable::bytes)).sum()
+        let glows = self.lights.glows.iter().flatten().chain(&self.lights.projectors).map(Glow::bytes);
+        meshes.chain(environment).chain(glows).chain(self.media.iter().map(MediumTable::bytes)).sum()
     }
 
     pub(super) fn split(&mut self) -> (&mut LightTables, &mut [MediumTable]) {
@@ -112,8 +122,16 @@ fn cube_triangles(to_world: &Transform) -> Vec<[Vec3; 3]> {
 /// Lights in the order [`super::Part::light`] counts: shapes first, then other emitters.
 #[derive(Debug)]
 pub(super) struct Lights<'a> {
-    lights: Vec<Light<'a>>,
+    lights: Vec<Kept<'a>>,
     environment: Option<EnvironmentMap<'a>>,
+}
+
+/// A light, or what one borrows.
+#[derive(Debug)]
+enum Kept<'a> {
+    Light(Light<'a>),
+    Picture(PictureLight<'a>),
+    Projector(Projector<'a>),
 }
 
 impl<'a> Lights<'a> {
@@ -126,11 +144,18 @@ impl<'a> Lights<'a> {
             reason: error.to_string(),
         };
         let mut lights = Vec::new();
-        let mut meshes = tables.meshes.iter_mut();
+        let (mut meshes, mut glows) = (tables.meshes.iter_mut(), tables.glows.iter_mut());
+        let mut projectors = tables.projectors.iter_mut();
         for shape in &scene.shapes {
             let Some(radiance) = shape.radiance else { continue };
-            let light = area_light(shape, radiance, &mut meshes);
-            lights.push(light.map_err(|e| fail(Some(shape.line), "<emitter type=\"area\">", e))?);
+            let failed = |e| fail(Some(shape.line), "<emitter type=\"area\">", e);
+            if shape.glow.is_some() {
+                for glow in glows.next().into_iter().flatten() {
+                    lights.push(Kept::Picture(glow.light().map_err(failed)?));
+                }
+                continue;
+            }
+            lights.push(Kept::Light(area_light(shape, radiance, &mut meshes).map_err(failed)?));
         }
         let mut environment = None;
         let mut table = tables.environment.as_mut();
@@ -144,14 +169,24 @@ impl<'a> Lights<'a> {
                         .map_err(|e| fail(None, "<emitter type=\"envmap\">", e))?;
                     environment = Some(map);
                 }
-                other => lights.push(other_light(other).map_err(|e| fail(None, "<emitter>", e))?),
+                Emitter::Projector { .. } => {
+                    let Some(glow) = projectors.next() else { continue };
+                    let light = glow.projector(emitter).map_err(|e| fail(None, "<emitter>", e))?;
+                    lights.push(Kept::Projector(light));
+                }
+                other => lights.push(Kept::Light(other_light(other).map_err(|e| fail(None, "<emitter>", e))?)),
             }
         }
         Ok(Self { lights, environment })
     }
 
     pub(super) fn all(&self) -> Vec<Light<'_>> {
-        self.lights.iter().copied().chain(self.environment.iter().map(Light::Environment)).collect()
+        let light = |kept| match kept {
+            &Kept::Light(light) => light,
+            Kept::Picture(light) => Light::Picture(light),
+            Kept::Projector(light) => Light::Projector(light),
+        };
+        self.lights.iter().map(light).chain(self.environment.iter().map(Light::Environment)).collect()
     }
 }
 
@@ -205,6 +240,6 @@ fn other_light<'a>(emitter: &Emitter) -> Result<Light<'a>, LightError> {
         }
         Emitter::Directional { direction, irradiance } => Sun::new(-to_vec3(*direction), *irradiance).map(Light::Sun),
         Emitter::Constant { radiance } => Ok(Light::Constant(*radiance)),
-        Emitter::Environment { .. } => Err(LightError::Size),
+        Emitter::Environment { .. } | Emitter::Projector { .. } => Err(LightError::Size),
     }
 }

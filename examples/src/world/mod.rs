@@ -7,7 +7,7 @@
 //! | `analytic` | flat pieces, spheres, boxes: tested four at a time |
 //! | `many` | the same in a tree, where they are many |
 //! | `triangles` | meshes in a tree |
-//! | `lights` | emitters and lent tables |
+//! | `lights`, `glow` | emitters and lent tables; pictures that lights show |
 //! | `media` | media and where they are |
 //! | `body`, `contained`, `coloured` | closed meshes, and media in them; media whose colour varies |
 //! | `places` | texture coordinates and interpolated normals |
@@ -18,6 +18,7 @@ mod body;
 mod build;
 mod coloured;
 mod contained;
+mod glow;
 mod lights;
 mod many;
 mod media;

@@ -308,7 +308,7 @@ fn light(out: &mut Digest) {
             });
             let to_light = direction(&mut rng);
             out.spectrum(light.background(to_light));
-            out.spectrum(light.radiance(to_light, axis));
+            out.spectrum(light.radiance(from, to_light, axis));
         }
     }
 }

@@ -102,6 +102,7 @@ pub(super) fn read(
             is_flipped: false,
             material: material.surface.clone(),
             radiance: material.radiance,
+            glow: None,
             line: 0,
         });
     }
