@@ -3,6 +3,8 @@
 mod broken;
 mod caches;
 mod gltf;
+mod pbrt;
 mod program;
 mod shapes;
+mod shown;
 mod vdb;

@@ -7,6 +7,7 @@ use fogbow::spectrum::Spectrum;
 use super::description::{Emitter, FovAxis, Sensor};
 use super::element::Element;
 use super::plugin::Plugin;
+use super::tree::Inline;
 use super::{sensor, textures};
 use crate::error::SceneError;
 use crate::picture::Picture;
@@ -156,8 +157,13 @@ fn environment(plugin: &Plugin<'_>) -> Result<Emitter, SceneError> {
         Some((t, _)) => t,
         None => Transform::IDENTITY,
     };
-    let (file, source) = plugin.path("filename")?;
-    let mut picture = Picture::read(&file).map_err(|e| source.data_error(&e))?;
+    let (mut picture, source) = match plugin.inline()? {
+        Some(Inline::Picture(picture)) => (picture.clone(), plugin.element),
+        _ => {
+            let (file, source) = plugin.path("filename")?;
+            (Picture::read(&file).map_err(|e| source.data_error(&e))?, source)
+        }
+    };
     if picture.width < 2 || picture.height < 2 {
         return Err(source.attribute_error("value", "an environment needs at least 2 x 2 pixels"));
     }

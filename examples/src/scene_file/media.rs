@@ -9,6 +9,7 @@ use fogbow::spectrum::Spectrum;
 use super::description::{Container, Field, Matter};
 use super::element::Element;
 use super::plugin::{Plugin, is_share};
+use super::tree::Inline;
 use crate::error::SceneError;
 use crate::texture::Wrap;
 use crate::transform::Transform;
@@ -46,6 +47,20 @@ enum Extinction {
 
 fn matter(plugin: &Plugin<'_>, scale: f32, phase: Phase) -> Result<(Matter, Option<Corners>), SceneError> {
     let is_heterogeneous = plugin.kind == "heterogeneous";
+    // Of pbrt: coefficients at density 1, and densities.
+    if let Some(density) = plugin.get("density").filter(|density| is_heterogeneous && density.tag() == "volume") {
+        let coefficient = |name: &str| Ok(plugin.colour(name)?.map_or(Spectrum::ONE, |(value, _)| value) * scale);
+        let (absorption, scattering) = (coefficient("sigma_a")?, coefficient("sigma_s")?);
+        return match extinction(&density, true)?.0 {
+            Extinction::Grid { volume, to_world } => {
+                Ok((Matter::Grid { volume, to_world, absorption, scattering, phase }, None))
+            }
+            Extinction::Sparse { bricks, to_world } => {
+                Ok((Matter::Sparse { bricks, to_world, absorption, scattering, phase }, None))
+            }
+            _ => Err(density.error("densities on a grid are due, of one channel")),
+        };
+    }
     if let (Some((_, a)), Some((_, _))) = (plugin.colour("sigma_a")?, plugin.colour("sigma_s")?)
         && is_heterogeneous
     {
@@ -128,6 +143,12 @@ fn extinction(element: &Element<'_>, is_heterogeneous: bool) -> Result<(Extincti
         }
         "gridvolume" if !is_heterogeneous => Err(element.error("a homogeneous medium cannot hold a grid")),
         "gridvolume" => {
+            if let Some(Inline::Volume(volume)) = plugin.inline()? {
+                let to_world = plugin.to_world()?.map_or(Transform::IDENTITY, |(t, _)| t);
+                plugin.finish()?;
+                let volume = Arc::new(volume.clone());
+                return Ok((Extinction::Grid { volume, to_world }, Some(around(&to_world))));
+            }
             let (file, source) = plugin.path("filename")?;
             if vdb::is_named(&file) {
                 plugin.word("filter_type", &["trilinear"])?;

@@ -39,6 +39,7 @@ mod materials;
 mod media;
 mod metals;
 mod notes;
+mod pbrt;
 mod places;
 mod plugin;
 mod preprocess;
@@ -106,6 +107,12 @@ impl SceneFile {
         gltf_scene::from_bytes(file, bytes, options)
     }
 
+    /// Reads the text of a pbrt scene and all files it names, as [`SceneFile::read_with`].
+    #[must_use]
+    pub fn from_pbrt(file: &Path, text: &str, options: &ReadOptions) -> Findings {
+        pbrt::parse(file, text, options)
+    }
+
     /// Reads a scene from the text of `file`.
     ///
     /// # Errors
@@ -119,6 +126,9 @@ impl SceneFile {
     pub fn read_with(file: &Path, options: &ReadOptions) -> Findings {
         if gltf_scene::is_named(file) {
             return gltf_scene::read(file, options);
+        }
+        if options.fog.is_none() && pbrt::is_named(file) {
+            return pbrt::read(file, options);
         }
         if options.fog.is_some() {
             let reason = "--fog is for glTF scenes; here fog is a <medium>".to_owned();

@@ -10,6 +10,7 @@ use fogbow::spectrum::Spectrum;
 use super::element::Element;
 use super::spectra::{self, Role};
 use super::transforms;
+use super::tree::Inline;
 use crate::error::SceneError;
 use crate::transform::Transform;
 
@@ -263,6 +264,14 @@ impl<'a> Plugin<'a> {
             return Ok(None);
         };
         element.xyz(0.0, true).map(Some)
+    }
+
+    /// Data that stand in the scene file itself.
+    pub(super) fn inline(&self) -> Result<Option<&'a Inline>, SceneError> {
+        let Some(element) = self.get("inline") else { return Ok(None) };
+        let index = element.number("value")?;
+        let found = self.element.context.tree.inline.get(index as usize).filter(|_| index >= 0.0);
+        found.map(Some).ok_or_else(|| element.error("there are no data in this file"))
     }
 
     /// A point or vector, if given.

@@ -384,7 +384,7 @@ pub(super) fn error_at(tree: &Tree, node: &Node, reason: impl core::fmt::Display
 
 /// Every `<ref>` must lead to an element, and no way along references back to where it began. What leads nowhere is
 /// an error of its own each; circles end the reading.
-fn check_references(tree: &Tree, sink: &Sink) -> Result<(), SceneError> {
+pub(super) fn check_references(tree: &Tree, sink: &Sink) -> Result<(), SceneError> {
     for node in tree.nodes.iter().filter(|n| n.tag == "ref") {
         let error = |attribute: &str, reason: String| {
             sink.error(SceneError { attribute: Some(attribute.to_owned()), ..error_at(tree, node, reason) });

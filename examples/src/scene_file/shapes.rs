@@ -9,6 +9,7 @@ use super::description::{Container, Geometry, Shape};
 use super::element::Element;
 use super::groups::Groups;
 use super::plugin::Plugin;
+use super::tree::Inline;
 use super::{groups, materials, textures};
 use crate::error::SceneError;
 use crate::mesh::Mesh;
@@ -194,6 +195,15 @@ fn read_geometry(plugin: &Plugin<'_>) -> Result<Geometry, SceneError> {
             let mesh = Mesh::read_curves(&file, plugin.kind == "bsplinecurve", &to_world);
             Ok(Geometry::Mesh(mesh.map_err(|e| source.data_error(&e))?))
         }
+        // Of pbrt.
+        "mesh" => match plugin.inline()? {
+            Some(Inline::Mesh(mesh)) => {
+                let file = plugin.element.context.tree.file(plugin.element.node);
+                let mesh = mesh.clone().transformed(&to_world, file).map_err(|e| plugin.element.data_error(&e))?;
+                Ok(Geometry::Mesh(mesh))
+            }
+            _ => Err(plugin.unknown_type(KNOWN)),
+        },
         "ply" | "obj" | "serialized" => {
             let (file, source) = plugin.path("filename")?;
             let is_flat = plugin.boolean("face_normals", false)?;

@@ -105,6 +105,20 @@ fn even(value: f64, role: Role) -> Spectrum {
     }
 }
 
+/// The colour of light with these samples: wavelengths (nm) and values.
+///
+/// # Errors
+/// In words: too few, not finite, or wavelengths that do not increase.
+pub(super) fn of_light(samples: Vec<(f64, f64)>) -> Result<Spectrum, String> {
+    Ok(colour(&checked(samples)?, Role::Light))
+}
+
+/// The colour of a black body, with its radiance (W·m⁻²·sr⁻¹·nm⁻¹).
+pub(super) fn of_black_body(kelvin: f64) -> Spectrum {
+    let samples = (0..=470).map(|i| FIRST + f64::from(i)).map(|w| (w, planck(w, kelvin)));
+    colour(&samples.collect::<Vec<_>>(), Role::Light)
+}
+
 /// `wavelength:value` pairs.
 fn pairs(element: &Element<'_>, text: &str) -> Result<Vec<(f64, f64)>, SceneError> {
     let fail = |reason: String| element.attribute_error("value", reason);

@@ -3,6 +3,10 @@
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
+use crate::mesh::Mesh;
+use crate::picture::Picture;
+use crate::volume::Volume;
+
 /// Which element of a tree: its place in the order in which they were read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub(super) struct NodeId(pub(super) u32);
@@ -84,6 +88,16 @@ pub(super) struct Tree {
     pub(super) sources: Vec<Source>,
     /// Elements by id, aliases among them.
     pub(super) ids: HashMap<String, NodeId>,
+    /// What elements hold that have no file: `<integer name="inline">` is the index.
+    pub(super) inline: Vec<Inline>,
+}
+
+/// Data that stand in the scene file itself.
+#[derive(Debug)]
+pub(super) enum Inline {
+    Mesh(Mesh),
+    Volume(Volume),
+    Picture(Picture),
 }
 
 impl Tree {

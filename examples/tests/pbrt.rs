@@ -1,0 +1,211 @@
+//! Scenes of pbrt-v4: the same scene as a Mitsuba one is the same description; what is wrong is told with its line.
+
+use std::path::Path;
+
+use fogbow_examples::scene_file::{Findings, NoteKind, ReadOptions, SceneFile};
+
+fn read(text: &str, is_lenient: bool) -> Findings {
+    let options = ReadOptions { is_lenient, ..ReadOptions::default() };
+    SceneFile::from_pbrt(Path::new("scenes/room.pbrt"), text, &options)
+}
+
+fn errors(findings: &Findings) -> Vec<String> {
+    findings.errors.iter().map(ToString::to_string).collect()
+}
+
+/// All that a scene says but for lines and where it was read.
+fn said(scene: &SceneFile) -> Vec<String> {
+    let mut all = vec![format!("{:?} {:?}", scene.integrator, scene.sensor)];
+    all.extend(scene.emitters.iter().map(|emitter| format!("{emitter:?}")));
+    all.extend(scene.media.iter().map(|medium| format!("{medium:?}")));
+    let shape = |s: &fogbow_examples::scene_file::Shape| {
+        format!("{:?} {} {:?} {:?}", s.geometry, s.is_flipped, s.material, s.radiance)
+    };
+    all.extend(scene.shapes.iter().map(shape));
+    all
+}
+
+const ROOM: &str = r#"
+# a room with fog in a ball
+Film "rgb" "integer xresolution" 64 "integer yresolution" [ 48 ] "string filename" "room.exr"
+PixelFilter "box"
+Sampler "halton" "integer pixelsamples" 32
+Integrator "volpath" "integer maxdepth" 7
+Scale -1 1 1
+LookAt 0 1 5  0 1 0  0 1 0
+Camera "perspective" "float fov" 40
+WorldBegin
+LightSource "infinite" "rgb L" [ .1 .2 .3 ] "float scale" 2
+LightSource "point" "point3 from" [ 0 2 1 ] "rgb I" [ 3 2 1 ]
+LightSource "distant" "point3 from" [ 0 1 0 ] "point3 to" [ 0 0 0 ] "rgb L" [ 1 1 1 ]
+MakeNamedMedium "fog" "string type" "homogeneous" "rgb sigma_a" [ .1 .2 .3 ] "spectrum sigma_s" [ 200 2 900 2 ] "float g" .5 "float scale" 3
+MakeNamedMaterial "wall" "string type" "diffuse" "rgb reflectance" [ .5 .4 .3 ]
+AttributeBegin
+  NamedMaterial "wall"
+  Rotate -90 1 0 0
+  Shape "trianglemesh" "integer indices" [ 0 1 2 2 3 0 ]
+    "point3 P" [ -4 -4 0  4 -4 0  4 4 0  -4 4 0 ] "point2 uv" [ 0 0 1 0 1 1 0 1 ]
+AttributeEnd
+AttributeBegin
+  Translate 0 1 0
+  Material "interface"
+  MediumInterface "fog" ""
+  Shape "sphere" "float radius" .75
+AttributeEnd
+AttributeBegin
+  Material "conductor" "spectrum eta" "metal-Au-eta" "spectrum k" "metal-Au-k" "float roughness" .04
+  Translate 1.5 .5 0
+  Shape "sphere" "float radius" .5
+  Material "dielectric" "float eta" 1.4
+  Translate -3 0 0
+  Shape "sphere" "float radius" .5
+AttributeEnd
+AttributeBegin
+  AreaLightSource "diffuse" "rgb L" [ 4 4 4 ]
+  Material "diffuse" "rgb reflectance" [ 0 0 0 ]
+  Translate 0 3 0
+  Rotate 90 1 0 0
+  Shape "bilinearmesh" "point3 P" [ -1 -1 0  1 -1 0  -1 1 0  1 1 0 ]
+AttributeEnd
+"#;
+
+const SAME: &str = r#"<scene version="3.0.0">
+<integrator type="volpath"><integer name="max_depth" value="8"/></integrator>
+<emitter type="constant"><rgb name="radiance" value="0.2, 0.4, 0.6"/></emitter>
+<emitter type="point"><point name="position" x="0" y="2" z="1"/><rgb name="intensity" value="3, 2, 1"/></emitter>
+<emitter type="directional"><vector name="direction" x="0" y="-1" z="0"/><rgb name="irradiance" value="1"/></emitter>
+<medium id="fog" type="homogeneous"><phase type="hg"><float name="g" value="0.5"/></phase><float name="scale" value="3"/>
+  <rgb name="sigma_a" value="0.1, 0.2, 0.3"/><float name="sigma_s" value="2"/></medium>
+<sensor type="perspective"><float name="fov" value="40"/><string name="fov_axis" value="smaller"/>
+  <transform name="to_world"><matrix value="-1 0 0 0 0 1 0 1 0 0 -1 5 0 0 0 1"/></transform>
+  <sampler type="independent"><integer name="sample_count" value="32"/></sampler>
+  <film type="hdrfilm"><integer name="width" value="64"/><integer name="height" value="48"/><rfilter type="box"/></film></sensor>
+<shape type="sphere"><float name="radius" value="0.75"/><transform name="to_world"><translate y="1"/></transform>
+  <bsdf type="null"/><ref name="interior" id="fog"/></shape>
+<shape type="sphere"><float name="radius" value="0.5"/><transform name="to_world"><translate x="1.5" y="0.5"/></transform>
+  <bsdf type="twosided"><bsdf type="roughconductor"><string name="distribution" value="ggx"/><float name="alpha" value="0.2"/>
+  <string name="material" value="Au"/></bsdf></bsdf></shape>
+<shape type="sphere"><float name="radius" value="0.5"/><transform name="to_world"><translate x="-1.5" y="0.5"/></transform>
+  <bsdf type="dielectric"><float name="int_ior" value="1.4"/><float name="ext_ior" value="1"/></bsdf></shape>
+</scene>"#;
+
+#[test]
+fn a_room_is_the_same_scene_as_in_mitsubas_words() {
+    let room = read(ROOM, false);
+    assert!(room.errors.is_empty(), "{:?}", errors(&room));
+    let room = room.scene.unwrap();
+    let same = SceneFile::parse(Path::new("same.xml"), SAME).unwrap();
+    let (mut found, truth) = (said(&room), said(&same));
+    // The meshes, which no Mitsuba scene holds in itself.
+    found.retain(|line| !line.contains("Mesh"));
+    assert_eq!(found, truth);
+    let meshes: Vec<_> =
+        room.shapes.iter().filter(|shape| format!("{:?}", shape.geometry).starts_with("Mesh")).collect();
+    assert_eq!(meshes.len(), 2);
+    // The floor looks up, the lamp down.
+    for (shape, up) in [(meshes[0], 1.0), (meshes[1], -1.0)] {
+        let fogbow_examples::scene_file::Geometry::Mesh(mesh) = &shape.geometry else { unreachable!() };
+        assert_eq!(mesh.triangles.len(), 2);
+        for triangle in &mesh.triangles {
+            let [a, b, c] = mesh.corners(*triangle);
+            assert!(((b - a).cross(c - a).normalize().y - up).abs() < 1e-6);
+        }
+    }
+    assert_eq!(meshes[1].radiance, Some(fogbow::spectrum::Spectrum::splat(4.0)));
+}
+
+#[test]
+fn grids_clouds_and_objects_are_read() {
+    let text = r#"WorldBegin
+        MakeNamedMedium "smoke" "string type" "uniformgrid" "integer nx" 2 "integer ny" 1 "integer nz" 1
+            "float density" [ 1 0.5 ] "point3 p0" [ -1 0 0 ] "point3 p1" [ 1 1 1 ] "rgb sigma_s" [ 1 2 3 ] "float scale" 2
+        MakeNamedMedium "sky" "string type" "cloud" "float density" 2
+        ObjectBegin "ball"
+          Shape "sphere" "float radius" 0.1
+        ObjectEnd
+        AttributeBegin
+          Translate 3 0 0
+          ObjectInstance "ball"
+          Translate 1 0 0
+          ObjectInstance "ball"
+        AttributeEnd
+        LightSource "infinite" "blackbody L" 6500
+        AttributeBegin
+          MediumInterface "smoke" ""
+          Material ""
+          Shape "sphere" "float radius" 2
+          Translate 0 9 0
+          MediumInterface "sky" ""
+          Shape "sphere" "float radius" 1
+        AttributeEnd"#;
+    let findings = read(text, false);
+    assert!(findings.errors.is_empty(), "{:?}", errors(&findings));
+    let scene = findings.scene.unwrap();
+    assert_eq!((scene.media.len(), scene.shapes.len()), (2, 2));
+    // A sphere of two instances, moved.
+    assert!(format!("{:?}", scene.shapes[1].geometry).contains("4.0"), "{:?}", scene.shapes[1].geometry);
+    let smoke = format!("{:?}", scene.media[0].matter);
+    assert!(smoke.contains("F32([1.0, 0.5])") && smoke.contains("[2.0, 4.0, 6.0]"), "{smoke}");
+    // As bright as white, and a little bluer than an even spectrum.
+    let fogbow_examples::scene_file::Emitter::Constant { radiance } = scene.emitters[0] else { panic!() };
+    assert!((0.9..1.1).contains(&radiance[0]) && (0.9..1.1).contains(&radiance[2]), "{radiance:?}");
+}
+
+#[test]
+fn what_is_wrong_or_missing_is_told_with_its_line() {
+    for (text, line, part) in [
+        (
+            "WorldBegin\nShape \"trianglemesh\" \"point3 P\" [ 0 0 0 ] \"integer indices\" [ 0 1 2 ]",
+            2,
+            "there are 1 points",
+        ),
+        ("WorldBegin\nShape \"sphere\" \"float radius\" [ 1", 2, "no value"),
+        ("WorldBegin\n\nSpahe \"sphere\"", 3, "no directive"),
+        ("WorldBegin\nNamedMaterial \"gold\"\nShape \"sphere\"", 3, "gold"),
+        ("Translate 1 2\nWorldBegin", 1, "3 numbers"),
+        ("WorldBegin\nShape \"curve\"", 2, "not supported"),
+        ("WorldBegin\nAttributeEnd", 2, "nothing was begun"),
+        ("WorldBegin\nMaterial \"diffuse", 2, "not closed"),
+        (
+            "WorldBegin\nMakeNamedMedium \"a\" \"string type\" \"uniformgrid\" \"integer nx\" 3 \"float density\" [ 1 ]",
+            2,
+            "make 3",
+        ),
+        ("WorldBegin\nInclude \"nowhere.pbrt\"", 2, "nowhere.pbrt"),
+        ("LookAt 0 0 0 0 0 0 0 1 0", 1, "on one line"),
+        ("Film \"rgb\"", 1, "no WorldBegin"),
+    ] {
+        let all = errors(&read(text, false));
+        let place = format!("room.pbrt:{line}");
+        assert!(all.iter().any(|error| error.contains(&place) && error.contains(part)), "{text}: {all:?}");
+    }
+    let lenient =
+        read("WorldBegin\nShape \"curve\"\nLightSource \"goniometric\"\nShape \"sphere\" \"float colour\" 3", true);
+    assert!(lenient.scene.is_some(), "{:?}", errors(&lenient));
+    let of = |kind| lenient.notes.iter().filter(|note| note.kind == kind).count();
+    assert!(of(NoteKind::Replaced) == 2 && of(NoteKind::Ignored) == 1, "{:?}", lenient.notes);
+}
+
+/// Pieces of a scene in any order, some of them damaged: errors, and no panic.
+#[test]
+fn damaged_scenes_are_errors() {
+    let mut rng = fogbow::sampling::Generator::new(11);
+    let mut number = |most: usize| (fogbow::sampling::uniform(&mut rng) * most as f32) as usize;
+    for _ in 0..400 {
+        let mut bytes = ROOM.as_bytes().to_vec();
+        for _ in 0..=number(4) {
+            let (at, length) = (number(bytes.len()), number(20));
+            match number(3) {
+                0 => bytes[at] = [b'"', b'[', b']', b'-', b'9', b' '][number(6)],
+                1 => drop(bytes.drain(at..(at + length).min(bytes.len()))),
+                _ => {
+                    let piece = bytes[at..(at + length).min(bytes.len())].to_vec();
+                    let to = number(bytes.len());
+                    bytes.splice(to..to, piece);
+                }
+            }
+        }
+        let findings = read(&String::from_utf8_lossy(&bytes), number(2) == 0);
+        assert!(findings.scene.is_some() || !findings.errors.is_empty());
+    }
+}
