@@ -1,9 +1,11 @@
 // Light in fog, from what `fogbow bake SCENE.xml --basis sh0|sh1|sh2 -o NAME.ktx2` writes, or from the textures of the package in examples/web: fog.wgsl
-// for WebGL2 (GLSL ES 3.00), function by function. A 3D texture for each number of a probe, validity in alpha, and one of the medium: albedo, extinction in alpha.
+// for WebGL2 (GLSL ES 3.00), function by function. A 3D texture for each number of a probe, validity in alpha, one of the medium: albedo, extinction in alpha, and
+// two of the surfaces around probes: a point at an offset o, in cells, is behind one where dot(o, wall) > 1.
 //
 // Copy it into your shader, behind `#version 300 es` and precisions for float, int and sampler3D (highp). The textures are read texel by texel, because
-// probes in walls must have no part in what is mixed: filters do not matter. With FOG_FILTERED they are read by hardware instead (LINEAR, CLAMP_TO_EDGE): a
-// fifth of the time, right where all probes around are valid, and elsewhere what dilation has left in the others.
+// probes in walls, and those behind a wall, must have no part in what is mixed: filters do not matter. Where no wall is thinner than a cell, bind textures of one
+// texel, all 0, as `wall0` and `wall1`. With FOG_FILTERED they are read by hardware instead (LINEAR, CLAMP_TO_EDGE): a fifth of the time, right where all
+// probes around are valid and no wall stands between them; elsewhere what dilation has left in the others, and light leaks through walls.
 
 // The box: its corner, and its size (m); what light was multiplied by (--scale); numbers of a probe: 1, 4 or 9. What is bound beyond them is not read.
 uniform vec3 probes_corner;
@@ -12,6 +14,7 @@ uniform float probes_scale;
 uniform int probes_numbers;
 uniform sampler3D sh0, sh1, sh2, sh3, sh4, sh5, sh6, sh7, sh8;
 uniform sampler3D medium;
+uniform sampler3D wall0, wall1;
 
 // Spherical harmonics in the order l (l + 1) + m, orthonormal, without the sign of Condon and Shortley.
 #define EXPANSION(READ, at, first, d, light)                                                                                          \
@@ -74,8 +77,21 @@ float corner_weight(Around place, int corner) {
 
 #define TEXEL(map, at) texelFetch(map, at, 0).rgb
 
+// How much of a part a probe of the eight has in the light: 1 before a surface, next to none behind it.
+float sees(Around place, int corner) {
+    ivec3 texel = corner_texel(place, corner);
+    vec3 is_high = vec3((corner & 1) != 0, (corner & 2) != 0, (corner & 4) != 0);
+    vec3 near = texelFetch(wall0, min(texel, textureSize(wall0, 0) - 1), 0).rgb;
+    vec3 other = texelFetch(wall1, min(texel, textureSize(wall1, 0) - 1), 0).rgb;
+    vec3 offset = mix(place.share, place.share - 1.0, is_high);
+    float s = max(dot(offset, near), dot(offset, other));
+    float far = max(s, 1.0);
+    float fourth = far * far * far * far;
+    return clamp((1.0 - s) * 10.0, 0.0, 1.0) + 1e-6 / (fourth * fourth);
+}
+
 // In-scattered radiance (W/(m^2 sr)) at a point towards the eye (unit): the phase function is in it, the scattering coefficient is not.
-// sum(w v c) / sum(w v) over the eight probes around, v: 1 where a probe is valid; sum(w c) where none is.
+// sum(w v s c) / sum(w v s) over the eight probes around, v: 1 where a probe is valid, s: whether it sees the point; sum(w c) where none is valid.
 vec3 in_scattered(vec3 point, vec3 to_eye) {
     Around place = around(point);
     vec3 light = vec3(0.0);
@@ -87,9 +103,10 @@ vec3 in_scattered(vec3 point, vec3 to_eye) {
         vec4 first = texelFetch(sh0, texel, 0);
         vec3 seen;
         EXPANSION(TEXEL, texel, first.rgb, to_eye, seen)
-        light += weight * first.a * seen;
+        float part = weight * first.a * sees(place, corner);
+        light += part * seen;
         hidden += weight * seen;
-        valid += weight * first.a;
+        valid += part;
     }
     return max(valid > 0.0 ? light / valid : hidden, vec3(0.0)) / probes_scale;
 }

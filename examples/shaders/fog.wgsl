@@ -1,7 +1,9 @@
 // Light in fog, from what `fogbow bake SCENE.xml --basis sh0|sh1|sh2 -o NAME.ktx2` writes: a 3D texture for each number of a probe, validity in
-// alpha (NAME-sh0.ktx2 and so on), and one of the medium (NAME-medium.ktx2: albedo, extinction in alpha).
+// alpha (NAME-sh0.ktx2 and so on), one of the medium (NAME-medium.ktx2: albedo, extinction in alpha), and two of the surfaces around probes
+// (NAME-wall0.ktx2, NAME-wall1.ktx2: a point at an offset o, in cells, is behind one where dot(o, wall) > 1).
 //
-// Copy it into your shader. The textures are read texel by texel, because probes in walls must have no part in what is mixed: no sampler is needed.
+// Copy it into your shader. The textures are read texel by texel, because probes in walls, and those behind a wall, must have no part in what is mixed: no sampler
+// is needed. Where no wall is thinner than a cell, bind textures of one texel, all 0, as `wall0` and `wall1`.
 
 struct Probes {
     // The box: its corner, and its size (m).
@@ -24,6 +26,8 @@ struct Probes {
 @group(0) @binding(8) var sh7: texture_3d<f32>;
 @group(0) @binding(9) var sh8: texture_3d<f32>;
 @group(0) @binding(10) var medium: texture_3d<f32>;
+@group(0) @binding(11) var wall0: texture_3d<f32>;
+@group(0) @binding(12) var wall1: texture_3d<f32>;
 
 // The eight probes around a point: the texel of the lowest, of the highest, and how far between them the point lies.
 struct Around {
@@ -52,8 +56,21 @@ fn corner_weight(place: Around, corner: u32) -> f32 {
     return weights.x * weights.y * weights.z;
 }
 
+// How much of a part a probe of the eight has in the light: 1 before a surface, next to none behind it.
+fn sees(place: Around, corner: u32) -> f32 {
+    let texel = corner_texel(place, corner);
+    let is_high = vec3<bool>((corner & 1u) != 0u, (corner & 2u) != 0u, (corner & 4u) != 0u);
+    let near = textureLoad(wall0, min(texel, vec3<i32>(textureDimensions(wall0)) - 1), 0).rgb;
+    let other = textureLoad(wall1, min(texel, vec3<i32>(textureDimensions(wall1)) - 1), 0).rgb;
+    let offset = select(place.share, place.share - 1.0, is_high);
+    let s = max(dot(offset, near), dot(offset, other));
+    let far = max(s, 1.0);
+    let fourth = far * far * far * far;
+    return clamp((1.0 - s) * 10.0, 0.0, 1.0) + 1e-6 / (fourth * fourth);
+}
+
 // In-scattered radiance (W/(m^2 sr)) at a point towards the eye (unit): the phase function is in it, the scattering coefficient is not.
-// sum(w v c) / sum(w v) over the eight probes around, v: 1 where a probe is valid; sum(w c) where none is.
+// sum(w v s c) / sum(w v s) over the eight probes around, v: 1 where a probe is valid, s: whether it sees the point; sum(w c) where none is valid.
 fn in_scattered(point: vec3<f32>, to_eye: vec3<f32>) -> vec3<f32> {
     let place = around(point);
     var light = vec3<f32>(0.0);
@@ -64,9 +81,10 @@ fn in_scattered(point: vec3<f32>, to_eye: vec3<f32>) -> vec3<f32> {
         let weight = corner_weight(place, corner);
         let first = textureLoad(sh0, texel, 0);
         let seen = expansion(first.rgb, texel, to_eye);
-        light += weight * first.a * seen;
+        let part = weight * first.a * sees(place, corner);
+        light += part * seen;
         hidden += weight * seen;
-        valid += weight * first.a;
+        valid += part;
     }
     return max(select(hidden, light / valid, valid > 0.0), vec3<f32>(0.0)) / probes.scale;
 }

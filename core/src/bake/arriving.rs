@@ -6,10 +6,11 @@ use super::basis::{AXES, MOST_COEFFICIENTS, Parts, ProbeBasis, Projection, Quant
 use super::settings::BakeSettings;
 use crate::cache::{Basis, Kind, RadianceCaches, Reader, VolumeCache};
 use crate::host::{Medium, Scene};
-use crate::light::Lights;
+use crate::light::{Light, Lights};
 use crate::math::Ray;
 use crate::math::float::{PI, sqrt};
 use crate::path;
+use crate::phase::Phase;
 use crate::sampling::{Generator, uniform2, warp};
 use crate::single_scatter::lattice;
 use crate::spectrum::Spectrum;
@@ -18,14 +19,33 @@ use crate::world::World;
 /// Points of every light with extent that a pass connects to. More: less noise in half shadows, for more shadow rays.
 const CONNECTIONS: u32 = 4;
 
+/// Lights without extent, all connected to: one connection is as good as many.
+fn is_even(lights: &Lights<'_>) -> bool {
+    let has_extent =
+        |light: &Light<'_>| !matches!(light, Light::Point(_) | Light::Phong(_) | Light::Spot(_) | Light::Sun(_));
+    lights.len() <= path::FEW && !lights.iter().any(has_extent)
+}
+
 /// What knows the light of a probe.
 pub(super) struct Sampler<'a, 'c> {
     pub(super) settings: &'a BakeSettings,
     pub(super) caches: Option<&'a RadianceCaches<'c>>,
+    /// Whether photons bring all that was scattered before, and light of a sky.
+    pub(super) has_photons: bool,
+}
+
+/// The phase function of a probe: that of the medium there, or the usual one beside it.
+pub(super) fn phase_at<M: Medium + ?Sized, S: Scene + ?Sized>(
+    point: Vec3,
+    world: &World<'_, M, S>,
+    settings: &BakeSettings,
+) -> Phase {
+    let properties = world.medium.properties(point);
+    if properties.scattering.is_black() { settings.phase } else { properties.phase }
 }
 
 impl Sampler<'_, '_> {
-    /// The numbers of a probe at `point`: an estimate from one pass, unbiased but for what caches know.
+    /// Adds to the numbers of a probe at `point`: an estimate from one pass, unbiased but for what caches know; all light but what photons have brought.
     pub(super) fn sample<M: Medium + ?Sized, S: Scene + ?Sized>(
         &self,
         point: Vec3,
@@ -34,12 +54,10 @@ impl Sampler<'_, '_> {
         held: &mut [Spectrum],
     ) {
         let BakeSettings { basis, quantity, orders, ref paths, .. } = *self.settings;
-        held.fill(Spectrum::ZERO);
         if paths.max_scatterings == 0 {
             return;
         }
-        let properties = world.medium.properties(point);
-        let phase = if properties.scattering.is_black() { self.settings.phase } else { properties.phase };
+        let phase = phase_at(point, world, self.settings);
         let projection = Projection::new(basis, quantity, &phase);
         let mut due = Parts::from(orders);
         // Records of a medium do not know irradiance.
@@ -48,9 +66,13 @@ impl Sampler<'_, '_> {
             due.surfaces = due.surfaces && !self.read(Kind::Surface, point, held);
             due.medium = due.medium && !self.read(Kind::Multiple, point, held);
         }
+        if self.has_photons {
+            (due.surfaces, due.medium) = (false, false);
+        }
         let mut add = |to_light: Vec3, irradiance: Spectrum| projection.add(to_light, irradiance, held);
-        let share = 1.0 / CONNECTIONS as f32;
-        for _ in 0..CONNECTIONS {
+        let connections = if is_even(&world.lights) { 1 } else { CONNECTIONS };
+        let share = 1.0 / connections as f32;
+        for _ in 0..connections {
             let mut connected = |lights: Lights<'_>, rng: &mut Generator| {
                 let world = World { lights, ..*world };
                 path::arriving(&world, point, rng, |to_light, light| add(to_light, light * share));

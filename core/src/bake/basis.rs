@@ -134,6 +134,13 @@ impl<'a> Projection<'a> {
         Self { basis, quantity, phase, moments }
     }
 
+    /// Makes of radiance's spherical harmonics what the function of an angle makes of them.
+    pub(super) fn scale(&self, held: &mut [Spectrum]) {
+        for (l, moment) in self.moments.into_iter().enumerate() {
+            held.iter_mut().skip(l * l).take(2 * l + 1).for_each(|number| *number *= moment);
+        }
+    }
+
     /// Adds light that arrives from `to_light`, of `irradiance` (W·m⁻²) across itself.
     pub(super) fn add(&self, to_light: Vec3, irradiance: Spectrum, into: &mut [Spectrum]) {
         match self.basis {

@@ -16,7 +16,7 @@
 //! | 72 | 8 | [`Crc`] of bytes 0 to 72 and of all from 80 on |
 //! | 80 | 12 n k | numbers in colour, `k` of each of `n` probes, as `f32` |
 //! | | 4 n k | their sums of squared deviations over passes, a mean over channels, as `f32` |
-//! | | 28 n | extinction and albedo in colour as `f32`; as `u32` state in bits 0 to 2, surfaces before the next probes in bits 4 to 6 |
+//! | | 52 n | extinction and albedo in colour, planes of two surfaces, as `f32`; as `u32` state in bits 0 to 2, surfaces before the next probes in bits 4 to 6 |
 //! | | 8 b | passes, and passes that are due |
 
 use core::fmt;
@@ -36,7 +36,7 @@ use crate::storage::{Full, List};
 pub const MAGIC: [u8; 8] = *b"\x89FOGBAK\n";
 
 /// Of the layout above.
-pub const VERSION: u32 = 1;
+pub const VERSION: u32 = 2;
 
 /// Length of the header (bytes).
 pub const HEADER_BYTES: usize = 80;
@@ -115,7 +115,7 @@ impl core::error::Error for ProbeBytesError {}
 /// # let outline = Outline::of(&World { medium: &Empty, scene: &Empty, lights: (&[]).into() }, bounds);
 /// let grid = Bake::new(BakeSettings::for_outline(&outline, [5, 4, 4]))?.finish();
 /// // 80 probes of nine coefficients, two bricks.
-/// assert_eq!(bytes::byte_count(&grid), 80 + 80 * 9 * 16 + 80 * 28 + 2 * 8);
+/// assert_eq!(bytes::byte_count(&grid), 80 + 80 * 9 * 16 + 80 * 52 + 2 * 8);
 /// # }
 /// # Ok::<(), fogbow::bake::BakeError>(())
 /// ```
@@ -297,7 +297,8 @@ pub fn read<'s>(bytes: &[u8], tag: u64, memory: BakeMemory<'s>) -> Result<ProbeG
         let is_number = grid.held(index).iter().all(|number| number.is_finite())
             && deviations.iter().all(|deviation| *deviation >= 0.0 && deviation.is_finite())
             && probe.extinction.is_valid()
-            && probe.albedo.is_valid();
+            && probe.albedo.is_valid()
+            && probe.planes().iter().all(|plane| plane.is_finite());
         let is_known = probe.state & STATE <= ProbeState::Empty as u32 && probe.state & !(STATE | WALLS) == 0;
         if !is_number || !is_known {
             return Err(ProbeBytesError::Probe(index));

@@ -7,14 +7,16 @@ use core::ops::Range;
 
 use glam::Vec3;
 
-use super::arriving::Sampler;
+use super::arriving::{Sampler, phase_at};
 use super::basis::MOST_COEFFICIENTS;
+use super::flights::{Flight, FlightMemory, PROBES, Photons};
 use super::grid::{BakeMemory, Brick, Probe, ProbeGrid, WALLS_AT};
 use super::places;
 use super::settings::{BakeError, BakeSettings};
 use crate::cache::RadianceCaches;
 use crate::host::{Medium, Scene};
 use crate::math::Bounds;
+use crate::phase::Phase;
 use crate::sampling::independent;
 use crate::spectrum::Spectrum;
 use crate::storage::List;
@@ -33,6 +35,7 @@ const LEAST_PASSES: u32 = 8;
 pub struct BakedProbes<'o> {
     pub(super) values: List<'o, Spectrum>,
     pub(super) probes: List<'o, Probe>,
+    pub(super) flights: List<'o, Flight>,
     pub(super) is_cut: bool,
 }
 
@@ -50,7 +53,21 @@ impl<'o> BakedProbes<'o> {
     /// ```
     #[must_use]
     pub fn lent(values: &'o mut [Spectrum], probes: &'o mut [Probe]) -> Self {
-        Self { values: values.into(), probes: probes.into(), is_cut: false }
+        Self { values: values.into(), probes: probes.into(), flights: (&mut [][..]).into(), is_cut: false }
+    }
+
+    /// With memory for the flights of a job of [`Bake::with_photons`], of 1024 photons.
+    ///
+    /// ```
+    /// # use fogbow::{bake::{BakedProbes, Flight, Probe}, spectrum::Spectrum};
+    /// # let (mut values, mut probes) = ([Spectrum::ZERO; 64 * 9], [Probe::default(); 64]);
+    /// let mut flights = [Flight::default(); 4096];
+    /// let output = BakedProbes::lent(&mut values, &mut probes).with_flights(&mut flights);
+    /// # drop(output);
+    /// ```
+    #[must_use]
+    pub fn with_flights(self, flights: &'o mut [Flight]) -> Self {
+        Self { flights: flights.into(), ..self }
     }
 }
 
@@ -82,6 +99,7 @@ pub struct Bake<'s, 'c> {
     settings: BakeSettings,
     grid: ProbeGrid<'s>,
     caches: Option<&'c RadianceCaches<'c>>,
+    photons: Option<Photons<'s>>,
     /// The brick whose result is due.
     next: u32,
     bricks: u32,
@@ -135,7 +153,7 @@ impl<'s, 'c> Bake<'s, 'c> {
 
     fn over(grid: ProbeGrid<'s>, settings: BakeSettings) -> Self {
         let bricks = grid.memory.bricks.len() as u32;
-        Self { settings, grid, caches: None, next: 0, bricks, share: 0.0, is_cut: false }
+        Self { settings, grid, caches: None, photons: None, next: 0, bricks, share: 0.0, is_cut: false }
     }
 
     /// Goes on where an earlier bake was left, whose `grid` was baked by the same settings: the bits of one that was not. A smaller error, or
@@ -219,6 +237,49 @@ impl<'s, 'c> Bake<'s, 'c> {
         Self { caches: Some(caches), ..self }
     }
 
+    /// Lets photons from the lights find light that was scattered before it comes to a probe. All probes share them: in the atrium of the examples
+    /// sixty times faster than paths from each probe at 2 % of error with 32³ probes.
+    ///
+    /// What a probe gets is the mean over its cell, or over the part that surfaces do not hide: off by about a third of what
+    /// [`ProbeGrid::coarseness`] tells, which is in no standard error. Light straight from the lights is that at the probe. Light that a medium emits is in none.
+    /// `world` should hold all surfaces and media. For bakes that have not begun, and those that were begun so.
+    ///
+    /// ```
+    /// # use fogbow::{host::Empty, light::{Light, PointLight}, math::{Bounds, Vec3}, medium::{Homogeneous, Placed, Region}, phase::Phase};
+    /// # use fogbow::{spectrum::Spectrum, work, world::{Outline, World}};
+    /// # use fogbow::bake::{Bake, BakeSettings, BakedProbes, FlightMemory, Orders, ProbeBasis};
+    /// # #[cfg(feature = "alloc")] {
+    /// # let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::splat(0.8), Phase::ISOTROPIC)?;
+    /// # let ball = Placed::new(fog, Region::sphere(Vec3::ZERO, 1.0)?);
+    /// # let lamps = [Light::Point(PointLight::from_flux(0.2 * Vec3::Y, Spectrum::ONE)?)];
+    /// # let world = World { medium: &ball, scene: &Empty, lights: (&lamps).into() };
+    /// # let outline = Outline::of(&world, Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE });
+    /// # let settings = BakeSettings { basis: ProbeBasis::Fluence, error: 0.05, ..BakeSettings::for_outline(&outline, [4, 4, 4]) };
+    /// let mut bake = Bake::new(settings)?.with_photons(FlightMemory::default(), outline.bounds);
+    /// work::finish(&mut bake, &world, &mut BakedProbes::default());
+    /// let mut by_paths = Bake::new(settings)?;
+    /// work::finish(&mut by_paths, &world, &mut BakedProbes::default());
+    /// assert!(bake.grid().deviation(by_paths.grid()).bias.abs() < 0.05);
+    /// # }
+    /// # Ok::<(), Box<dyn core::error::Error>>(())
+    /// ```
+    #[must_use]
+    pub fn with_photons(mut self, memory: FlightMemory<'s>, world: Bounds) -> Self {
+        self.photons = Some(Photons::new(memory, world, self.grid.lattice.cell_count()));
+        self.begin_photons();
+        self
+    }
+
+    /// Begins the photons of the next pass. Bricks that have more passes than others wait for them, so that every pass of a brick is of its own photons.
+    fn begin_photons(&mut self) {
+        let Some(photons) = &mut self.photons else { return };
+        let bricks = self.grid.memory.bricks.as_mut_slice();
+        let waiting = bricks.iter().filter(|brick| brick.passes < brick.due).map(|brick| brick.passes);
+        let Some(pass) = waiting.min() else { return };
+        bricks.iter_mut().filter(|brick| brick.passes > pass).for_each(|brick| brick.due = brick.passes);
+        photons.begin(pass);
+    }
+
     /// Bakes those bricks alone that `is_wanted`, by their number; of the probes of all others nothing will be known. For a part of a grid,
     /// and to tell how far another bake is off by a few unbiased ones: [`ProbeGrid::deviation`]. For bakes that have not begun.
     ///
@@ -282,6 +343,7 @@ impl<'s, 'c> Bake<'s, 'c> {
             }
         }
         self.next = 0;
+        self.begin_photons();
     }
 
     /// The grid, as far as it is baked.
@@ -339,6 +401,13 @@ impl<'s, 'c> Bake<'s, 'c> {
         }
         self.share = done / self.bricks.max(1) as f32;
         self.next = if due > 0 { 0 } else { self.bricks };
+        self.begin_photons();
+    }
+
+    /// The jobs of photons that are due before those of bricks.
+    fn photon_jobs(&self) -> Option<(&Photons<'s>, Range<u32>)> {
+        let photons = self.photons.as_ref().filter(|_| self.jobs_left())?;
+        Some((photons, photons.jobs())).filter(|(_, jobs)| !jobs.is_empty())
     }
 }
 
@@ -346,38 +415,56 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Rounds<World<'_, M, S>> for Bake<'_,
     type Output<'o> = BakedProbes<'o>;
 
     fn jobs(&self) -> Range<u32> {
-        self.next..self.bricks
+        self.photon_jobs().map_or(self.next..self.bricks, |(_, jobs)| jobs)
     }
 
     fn run(&self, job: u32, world: &World<'_, M, S>, output: &mut BakedProbes<'_>) {
-        let BakedProbes { values, probes, is_cut } = output;
+        let BakedProbes { values, probes, flights, is_cut } = output;
         values.clear();
         probes.clear();
+        flights.clear();
         *is_cut = false;
         let (grid, settings) = (&self.grid, &self.settings);
+        if let Some((photons, _)) = self.photon_jobs() {
+            *is_cut = photons.shoot(job, world, settings, flights).is_err();
+            return;
+        }
         let Some(&Brick { passes, due }) = grid.memory.bricks.as_slice().get(job as usize) else { return };
         if passes >= due {
             return;
         }
         let (cell, each) = (grid.lattice.cell(), grid.basis.count());
-        let sampler = Sampler { settings, caches: self.caches };
-        for index in grid.in_brick(job as usize) {
+        let known = |index: usize| {
             let point = grid.lattice.centre(index);
-            let probe = if passes == 0 { looked_at(point, cell, world, settings) } else { grid.probes()[index] };
-            let mut held = [Spectrum::ZERO; MOST_COEFFICIENTS];
+            if passes == 0 { looked_at(point, cell, world, settings) } else { grid.probes()[index] }
+        };
+        let seen: heapless::Vec<Probe, PROBES> = grid.in_brick(job as usize).map(known).collect();
+        let mut all = [[Spectrum::ZERO; MOST_COEFFICIENTS]; PROBES];
+        if let Some(photons) = &self.photons {
+            let phase = |index| phase_at(grid.lattice.centre(index), world, settings);
+            let phases: heapless::Vec<Phase, PROBES> = grid.in_brick(job as usize).map(phase).collect();
+            photons.add(grid, job as usize, &seen, &phases, &mut all);
+        }
+        let sampler = Sampler { settings, caches: self.caches, has_photons: self.photons.is_some() };
+        for ((index, probe), held) in grid.in_brick(job as usize).zip(&seen).zip(&mut all) {
             let held = &mut held[..each];
             if probe.is_valid() {
                 let mut rng = independent(settings.seed, BAKE_KEY | index as u64, passes);
-                sampler.sample(point, world, &mut rng, held);
+                sampler.sample(grid.lattice.centre(index), world, &mut rng, held);
                 // No light is better than no number, which would be in all that is mixed with it.
                 held.iter_mut().filter(|number| !number.is_finite()).for_each(|number| *number = Spectrum::ZERO);
             }
-            *is_cut |= probes.push(probe).is_err() || values.extend_from_slice(held).is_err();
+            *is_cut |= probes.push(*probe).is_err() || values.extend_from_slice(held).is_err();
         }
     }
 
     fn accept(&mut self, output: &BakedProbes<'_>) {
         if !self.jobs_left() {
+            return;
+        }
+        if self.photon_jobs().is_some() {
+            let taken = self.photons.as_mut().map(|photons| photons.accept(output.flights.as_slice(), &self.grid));
+            self.is_cut |= output.is_cut || taken.is_some_and(|taken| taken.is_err());
             return;
         }
         let brick = self.next as usize;
@@ -408,7 +495,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Rounds<World<'_, M, S>> for Bake<'_,
     }
 
     fn stage(&self) -> &'static str {
-        "bake"
+        if self.photon_jobs().is_some() { "photons" } else { "bake" }
     }
 }
 
@@ -433,5 +520,6 @@ fn looked_at<M: Medium + ?Sized, S: Scene + ?Sized>(
     let extinction = world.medium.mean_extinction(point, 0.5 * cell.min_element());
     let albedo = world.medium.properties(point).albedo();
     let state = places::state(point, cell, world, settings);
-    Probe { extinction, albedo, state: state as u32 | places::walls(point, cell, world.scene) << WALLS_AT }
+    let (walls, [near, other]) = places::walls(point, cell, world.scene);
+    Probe { extinction, albedo, near, other, state: state as u32 | walls << WALLS_AT }
 }

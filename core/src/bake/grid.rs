@@ -6,12 +6,20 @@ use glam::Vec3;
 use super::basis::{MOST_COEFFICIENTS, Orders, ProbeBasis, Quantity};
 use super::settings::{BakeError, BakeSettings};
 use crate::covariance::Lattice;
+use crate::math::Bounds;
 use crate::math::float::sqrt;
 use crate::spectrum::Spectrum;
 use crate::storage::{Full, List};
 
 /// Probes along each side of a brick, which a job bakes.
 pub(super) const BRICK: u32 = 4;
+
+/// One over the share of the way to a surface within which a probe's part falls to nothing. Larger: light jumps where a surface ends in the open. Smaller: probes
+/// near a surface have a part in less.
+const SOFT: f32 = 10.0;
+
+/// What part a probe keeps behind a surface. Larger: light leaks. Smaller: nothing is gained.
+const HIDDEN: f32 = 1e-6;
 
 /// Most rounds of dilation: each goes one probe farther.
 const MOST_ROUNDS: u32 = 1024;
@@ -37,6 +45,9 @@ pub struct Probe {
     pub extinction: Spectrum,
     /// Single-scattering albedo of the medium at the probe; 0 without a medium.
     pub albedo: Spectrum,
+    /// See [`Probe::planes`].
+    pub(super) near: Vec3,
+    pub(super) other: Vec3,
     /// A [`ProbeState`] by its number, in [`STATE`]; in [`WALLS`], bits for x, y and z where a surface stands before the next probe. Above that, marks of a dilation
     /// under way.
     pub(super) state: u32,
@@ -76,6 +87,40 @@ impl Probe {
     #[must_use]
     pub fn walls(&self) -> [bool; 3] {
         [0, 1, 2].map(|axis| self.state >> (WALLS_AT + axis) & 1 == 1)
+    }
+
+    /// Planes of surfaces around the probe, up to two: what lies at an offset `o` (in cells) is behind one of them where `o · plane > 1`; zeros where there is
+    /// none.
+    ///
+    /// ```
+    /// # use fogbow::{bake::Probe, math::Vec3};
+    /// assert_eq!(Probe::default().planes(), [Vec3::ZERO; 2]);
+    /// ```
+    #[must_use]
+    pub fn planes(&self) -> [Vec3; 2] {
+        [self.near, self.other]
+    }
+
+    /// How much of a part the probe has in the light at an offset `o` (in cells): 1 before surfaces, next to none behind one. Between them it falls
+    /// within a tenth of the way to the surface, so that light does not jump where surfaces end in the open.
+    ///
+    /// ```text
+    /// min(max(10 (1 − s), 0), 1) + 10⁻⁶ max(s, 1)⁻⁸      s = max(o · plane₁, o · plane₂)
+    /// ```
+    ///
+    /// ```
+    /// # use fogbow::{bake::Probe, math::Vec3};
+    /// assert_eq!(Probe::default().sees(Vec3::splat(0.9)), 1.0 + 1e-6);
+    /// ```
+    #[must_use]
+    #[inline]
+    pub fn sees(&self, offset: Vec3) -> f32 {
+        let s = offset.dot(self.near).max(offset.dot(self.other));
+        // Where all probes are behind surfaces, as in a corner, the one that is least so counts.
+        let far = s.max(1.0);
+        let square = far * far;
+        let fourth = square * square;
+        ((1.0 - s) * SOFT).clamp(0.0, 1.0) + HIDDEN / (fourth * fourth)
     }
 
     pub(super) fn is_valid(&self) -> bool {
@@ -161,7 +206,7 @@ pub struct ProbeDeviation {
 /// let far = grid.lattice().index(Vec3::splat(0.9)).unwrap();
 /// assert!(grid.probes()[far].state() == ProbeState::Empty && grid.held(far)[0].is_black());
 /// assert!(grid.dilate() > 0 && !grid.held(far)[0].is_black());
-/// assert_eq!(grid.bytes(), 64 * (9 * 16 + 28) + 8);
+/// assert_eq!(grid.bytes(), 64 * (9 * 16 + 52) + 8);
 /// # }
 /// # Ok::<(), Box<dyn core::error::Error>>(())
 /// ```
@@ -285,7 +330,8 @@ impl ProbeGrid<'_> {
         (sum, numbers)
     }
 
-    /// Pairs of neighbours, both valid, with a surface between them: where light leaks through walls that hold no probe. Smaller cells have fewer.
+    /// Pairs of neighbours, both valid, with a surface between them: where light leaks through walls that hold no probe in engines that mix all
+    /// probes around a point, whatever they are. Look-ups here leave out those behind a surface.
     #[must_use]
     pub fn leaks(&self) -> usize {
         let [nx, ny, _] = self.lattice.size().map(|n| n as usize);
@@ -355,19 +401,31 @@ impl ProbeGrid<'_> {
     /// What share of the weights valid probes have.
     ///
     /// ```text
-    /// Σ w v c / Σ w v      w: trilinear weights, v: 1 where a probe is valid, else 0
+    /// Σ w v s c / Σ w v s      w: trilinear weights, v: 1 where a probe is valid, else 0, s: how much of a part it has at `point` (Probe::sees)
     /// ```
     ///
-    /// which is what a shader gets that mixes textures of `v c` and `v` by hardware and divides. Where no probe is valid, `Σ w c`: what
-    /// [`ProbeGrid::dilate`] has left there.
+    /// Where no probe is valid, `Σ w c`: what [`ProbeGrid::dilate`] has left there.
     pub fn look_up(&self, point: Vec3, held: &mut [Spectrum]) -> f32 {
         let bounds = self.lattice.bounds();
-        let around = self.lattice.around(point.clamp(bounds.min, bounds.max)).unwrap_or_default();
-        let valid = |index: usize| if self.probes()[index].is_valid() { 1.0 } else { 0.0 };
-        let share: f32 = around.iter().map(|&(index, weight)| weight * valid(index)).sum();
+        let point = point.clamp(bounds.min, bounds.max);
+        let around = self.lattice.around(point).unwrap_or_default();
+        // Beyond the outermost probes, as at them.
+        let cell = self.lattice.cell();
+        let inside = point.max(bounds.min + 0.5 * cell).min(bounds.max - 0.5 * cell);
+        let (mut share, mut total) = (0.0, 0.0);
+        let parts = around.map(|(index, weight)| {
+            let probe = &self.probes()[index];
+            if !(weight > 0.0 && probe.is_valid()) {
+                return 0.0;
+            }
+            let part = weight * probe.sees((inside - self.lattice.centre(index)) / cell);
+            share += weight;
+            total += part;
+            part
+        });
         held.fill(Spectrum::ZERO);
-        for (index, weight) in around {
-            let weight = if share > 0.0 { weight * valid(index) / share } else { weight };
+        for ((index, weight), part) in around.into_iter().zip(parts) {
+            let weight = if total > 0.0 { part / total } else { weight };
             if weight > 0.0 {
                 held.iter_mut().zip(self.held(index)).for_each(|(sum, value)| *sum += *value * weight);
             }
@@ -485,6 +543,17 @@ impl ProbeGrid<'_> {
         let [bx, by, _] = self.brick_counts().map(|n| n as usize);
         let [x, y, z] = [index % nx, index / nx % ny, index / (nx * ny)].map(|i| i / BRICK as usize);
         x + bx * (y + by * z)
+    }
+
+    /// The cells of a brick, in the same order.
+    pub(super) fn brick_lattice(&self, brick: usize) -> Option<Lattice> {
+        let (size, [bx, by, _]) = (self.lattice.size(), self.brick_counts().map(|n| n as usize));
+        let first = [brick % bx, brick / bx % by, brick / (bx * by)].map(|i| i as u32 * BRICK);
+        let end: [u32; 3] = core::array::from_fn(|i| (first[i] + BRICK).min(size[i]));
+        let at =
+            |at: [u32; 3]| self.lattice.bounds().min + self.lattice.cell() * Vec3::from_array(at.map(|n| n as f32));
+        let counts = core::array::from_fn(|i| end[i] - first[i]);
+        Lattice::new(Bounds { min: at(first), max: at(end) }, counts).ok()
     }
 
     /// The probes of a brick, in the order in which jobs leave them.

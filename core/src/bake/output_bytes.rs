@@ -1,16 +1,20 @@
 //! What jobs of a bake leave, as bytes: for workers that share no memory.
 
+use glam::Vec3;
+
 use super::fill::BakedProbes;
+use super::flights::Flight;
 use super::grid::Probe;
 use crate::sent::{JobBytesError, Packed, Received, Sending, byte_count, packed};
 use crate::spectrum::Spectrum;
 
-packed!(Probe { extinction: Spectrum, albedo: Spectrum, state: u32 });
+packed!(Flight { origin: Vec3, direction: Vec3, length: f32, power: Spectrum });
+packed!(Probe { extinction: Spectrum, albedo: Spectrum, near: Vec3, other: Vec3, state: u32 });
 
 /// Tells such jobs from others.
 const KIND: u32 = 2;
 
-const EACH: [usize; 4] = [Spectrum::WORDS, Probe::WORDS, 0, 0];
+const EACH: [usize; 4] = [Spectrum::WORDS, Probe::WORDS, Flight::WORDS, 0];
 
 impl BakedProbes<'_> {
     /// Number of bytes that [`BakedProbes::write`] writes.
@@ -21,7 +25,8 @@ impl BakedProbes<'_> {
     /// ```
     #[must_use]
     pub fn byte_count(&self) -> usize {
-        byte_count(bool::WORDS + self.values.len() * Spectrum::WORDS + self.probes.len() * Probe::WORDS)
+        let flights = self.flights.len() * Flight::WORDS;
+        byte_count(bool::WORDS + self.values.len() * Spectrum::WORDS + self.probes.len() * Probe::WORDS + flights)
     }
 
     /// Hands what a job has left to `sink` in little-endian bytes, with a checksum: for workers that share no memory, as
@@ -39,10 +44,11 @@ impl BakedProbes<'_> {
     /// # }
     /// ```
     pub fn write<F>(&self, sink: impl FnMut(&[u8]) -> Result<(), F>) -> Result<(), F> {
-        let mut sending = Sending::new(sink, KIND, [self.values.len(), self.probes.len(), 0, 0])?;
+        let mut sending = Sending::new(sink, KIND, [self.values.len(), self.probes.len(), self.flights.len(), 0])?;
         sending.put(&self.is_cut)?;
         sending.list(self.values.as_slice())?;
         sending.list(self.probes.as_slice())?;
+        sending.list(self.flights.as_slice())?;
         sending.finish()
     }
 
@@ -81,6 +87,7 @@ impl BakedProbes<'_> {
         let mut received = Received::new(bytes, KIND, bool::WORDS, EACH)?;
         self.is_cut = received.take();
         received.list(&mut self.values)?;
-        received.list(&mut self.probes)
+        received.list(&mut self.probes)?;
+        received.list(&mut self.flights)
     }
 }

@@ -42,13 +42,68 @@ pub(super) fn state<M: Medium + ?Sized, S: Scene + ?Sized>(
     if lights_surfaces || has_medium_near(point, cell, world.medium) { ProbeState::Valid } else { ProbeState::Empty }
 }
 
-/// Bits for x, y and z: whether a surface stands between a probe and the next one.
-pub(super) fn walls(point: Vec3, cell: Vec3, scene: &(impl Scene + ?Sized)) -> u32 {
-    let bit = |axis: usize| {
-        let next = point + Vec3::from_array(core::array::from_fn(|i| if i == axis { cell[i] } else { 0.0 }));
-        u32::from(scene.is_blocked(&Ray::between(point, next))) << axis
+/// Longest plane vector: of a surface a thousandth of a cell away.
+const NEAREST: f32 = 1024.0;
+
+/// Probes around another one.
+const AROUND: usize = 26;
+
+/// Surfaces around a probe: bits for x, y and z where one stands before the next probe, and the planes of two.
+///
+/// Rays to all probes around tell which of them a surface hides, each with its plane. Taken is the plane that hides most of those that are hidden and fewest of
+/// those that are seen; then another one that does most for the rest. Any number of surfaces in two planes, as a wall, a pane, or the edge of two, are told exactly.
+pub(super) fn walls(point: Vec3, cell: Vec3, scene: &(impl Scene + ?Sized)) -> (u32, [Vec3; 2]) {
+    let offsets: [Vec3; AROUND] = core::array::from_fn(|i| {
+        // Without the probe itself, number 13 of 27.
+        let i = i + usize::from(i >= AROUND / 2);
+        Vec3::new((i % 3) as f32 - 1.0, (i / 3 % 3) as f32 - 1.0, (i / 9) as f32 - 1.0)
+    });
+    let met = offsets.map(|offset| {
+        let ray = Ray::between(point, point + offset * cell);
+        let hit = nearest_surface(&ray, scene)?;
+        // In cells, planes have normals that are as much longer as cells are.
+        let normal = hit.normal * cell;
+        let along = normal.dot(offset) * (hit.distance / ray.length);
+        let plane = normal / along;
+        let size = plane.abs().max_element();
+        // Along the surface itself there is no telling.
+        size.is_finite().then(|| half(plane * (NEAREST / size).min(1.0)))
+    });
+    let bits =
+        [14, 16, 22].into_iter().zip(0..).fold(0, |bits, (i, axis)| bits | u32::from(met[i - 1].is_some()) << axis);
+    if met.iter().all(Option::is_none) {
+        return (bits, [Vec3::ZERO; 2]);
+    }
+    let mut planes = [Vec3::ZERO; 2];
+    for number in 0..planes.len() {
+        let is_told = |offset: Vec3| planes[..number].iter().any(|plane| plane.dot(offset) > 1.0);
+        let worth = |plane: &Vec3| {
+            let of = |(offset, met): (&Vec3, &Option<Vec3>)| match (plane.dot(*offset) > 1.0, met.is_some()) {
+                (true, true) if !is_told(*offset) => 1,
+                (true, false) if !is_told(*offset) => -1,
+                _ => 0,
+            };
+            offsets.iter().zip(&met).map(of).sum::<i32>()
+        };
+        // Of equals the first.
+        let best =
+            met.iter().flatten().map(|plane| (worth(plane), *plane)).reduce(|a, b| if b.0 > a.0 { b } else { a });
+        if let Some((1.., plane)) = best {
+            planes[number] = plane;
+        }
+    }
+    (bits, planes)
+}
+
+/// Numbers that half floats hold, so that shaders see surfaces where the core does.
+fn half(plane: Vec3) -> Vec3 {
+    const REST: u32 = (1 << 13) - 1;
+    let round = |number: f32| {
+        // What is smaller than half floats hold exactly makes no difference.
+        let number = if number.abs() < 1e-4 { 0.0 } else { number };
+        f32::from_bits((number.to_bits() + REST / 2 + 1) & !REST)
     };
-    bit(0) | bit(1) | bit(2)
+    Vec3::from_array(plane.to_array().map(round))
 }
 
 /// Whether there may be any medium where the probe has a part in look-ups: up to its neighbours.

@@ -14,7 +14,7 @@ use crate::world::World;
 
 /// Up to this number every light is connected to. More: choosing one at random would be cheaper, but which was chosen
 /// is the most part of the noise.
-const FEW: usize = 4;
+pub(crate) const FEW: usize = 4;
 
 /// What the lights alone send to `point` and is scattered there by `value(to_light)` (with the cosine, at a surface): a
 /// connection to each, or to one of them where there are more than a few. Rays start at `origin(to_light)`.

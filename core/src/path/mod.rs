@@ -26,7 +26,7 @@ pub mod trace;
 
 pub(crate) use connect::pdf as connection_pdf;
 pub use in_scatter::in_scattered;
-pub(crate) use in_scatter::{arriving, direct};
+pub(crate) use in_scatter::{FEW, arriving, direct};
 pub use trace::{Delegate, radiance, radiance_beyond};
 
 use crate::spectrum::Spectrum;

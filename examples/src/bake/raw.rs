@@ -6,9 +6,10 @@ use fogbow::bake::ProbeState;
 use fogbow::math::Vec3;
 
 use super::Baked;
+use super::texture::WALLS;
 
 /// Version of the description.
-pub const VERSION: u32 = 1;
+pub const VERSION: u32 = 2;
 
 /// A plain array of numbers of each probe.
 struct Array {
@@ -40,6 +41,9 @@ fn arrays(baked: &Baked) -> Vec<Array> {
     all.push(floats("coarseness", 1, &|index| vec![grid.coarseness(index) * baked.scale]));
     all.push(floats("extinction", 3, &|index| grid.probes()[index].extinction.0.to_vec()));
     all.push(floats("albedo", 3, &|index| grid.probes()[index].albedo.0.to_vec()));
+    for (number, name) in WALLS.into_iter().enumerate() {
+        all.push(floats(name, 3, &|index| grid.probes()[index].planes()[number].to_array().to_vec()));
+    }
     let state = |probe: &fogbow::bake::Probe| match probe.state() {
         ProbeState::Valid => 1,
         ProbeState::InWall => 2,

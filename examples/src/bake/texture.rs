@@ -40,7 +40,8 @@ pub fn textures(baked: &Baked, layout: Layout) -> Result<Vec<Texture>, String> {
     }
 }
 
-/// A texture for each number with validity in alpha, and one for the medium: extinction (per metre, a mean over channels) in alpha, albedo in colour.
+/// A texture for each number with validity in alpha; one for the medium: extinction (per metre, a mean over channels) in alpha, albedo in colour; and two for the
+/// surfaces around probes, [`Probe::planes`](fogbow::bake::Probe::planes).
 fn plain(baked: &Baked) -> Vec<Texture> {
     let grid = &baked.grid;
     let size = grid.lattice().size();
@@ -52,8 +53,15 @@ fn plain(baked: &Baked) -> Vec<Texture> {
     let mut all: Vec<Texture> = Baked::names(grid.basis()).into_iter().enumerate().map(of).collect();
     let medium = grid.probes().iter().map(|probe| rgba(probe.albedo, probe.extinction.mean())).collect();
     all.push(Texture { name: "medium".to_owned(), size, texels: medium });
+    for (number, name) in WALLS.into_iter().enumerate() {
+        let planes = grid.probes().iter().map(|probe| probe.planes()[number].extend(0.0).to_array()).collect();
+        all.push(Texture { name: name.to_owned(), size, texels: planes });
+    }
     all
 }
+
+/// Surfaces around probes: names of the textures, and of the arrays of plain numbers.
+pub const WALLS: [&str; 2] = ["wall0", "wall1"];
 
 fn rgba(colour: Spectrum, alpha: f32) -> [f32; 4] {
     [colour[0], colour[1], colour[2], alpha]

@@ -370,7 +370,8 @@ export class Probes extends Held {
     const each = 4 * this.counts[0] * this.counts[1] * this.counts[2];
     const numbers = (this.degree + 1) ** 2;
     const harmonics = Array.from({ length: numbers }, (_, i) => all.subarray(i * each, (i + 1) * each));
-    return { counts: this.counts, harmonics, medium: all.subarray(numbers * each) };
+    const [medium, ...walls] = [0, 1, 2].map((i) => all.subarray((numbers + i) * each, (numbers + i + 1) * each));
+    return { counts: this.counts, harmonics, medium, walls };
   }
 
   save() {

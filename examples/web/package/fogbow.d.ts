@@ -171,6 +171,8 @@ export interface Textures {
   harmonics: Float32Array[];
   /** Albedo, and extinction (m⁻¹). */
   medium: Float32Array;
+  /** Planes of two surfaces around probes: a point at an offset o, in cells, is behind one where o · plane > 1. */
+  walls: [Float32Array, Float32Array];
 }
 
 /** What the library has refused, in its words. */

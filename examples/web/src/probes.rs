@@ -161,7 +161,8 @@ impl WebProbes {
     }
 
     /// The numbers of all probes, number after number, each four floats: red, green, blue, and 1 where the probe is valid, else 0. Then the
-    /// medium: albedo, and extinction (m⁻¹; mean of the channels). As 3D textures have them. If `is_dilated`, light has spread into invalid probes.
+    /// medium: albedo, and extinction (m⁻¹; mean of the channels). Then planes of two surfaces around probes, and 0. As 3D textures have them. If `is_dilated`, light
+    /// has spread into invalid probes.
     ///
     /// # Errors
     /// No memory.
@@ -173,7 +174,7 @@ impl WebProbes {
             copy.dilate();
         }
         let (cells, numbers) = (grid.lattice().cell_count(), grid.basis().count());
-        let mut all = Vec::with_capacity(4 * cells * (numbers + 1));
+        let mut all = Vec::with_capacity(4 * cells * (numbers + 3));
         for number in 0..numbers {
             for (cell, probe) in grid.probes().iter().enumerate() {
                 let is_valid = probe.state() == ProbeState::Valid;
@@ -184,6 +185,11 @@ impl WebProbes {
         for probe in grid.probes() {
             all.extend_from_slice(&probe.albedo.0);
             all.push(probe.extinction.mean());
+        }
+        for number in 0..2 {
+            for probe in grid.probes() {
+                all.extend_from_slice(&probe.planes()[number].extend(0.0).to_array());
+            }
         }
         Ok(all)
     }

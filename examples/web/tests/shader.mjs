@@ -24,7 +24,7 @@ await browse(async (browser) => {
     });
     const probes = new Probes(world, { box, counts: [7, 6, 9], degree: 2, error: 0.5, passes: 8 });
     while (probes.bake());
-    const { harmonics, medium, counts } = probes.textures({ dilated: false });
+    const { harmonics, medium, walls, counts } = probes.textures({ dilated: false });
     const invalid = harmonics[0].filter((v, i) => i % 4 === 3 && v === 0).length;
 
     const [W, H] = [400, 250];
@@ -83,6 +83,7 @@ void main() {
       bind(gl.TEXTURE_2D, "directions", flat(directions));
       harmonics.forEach((data, i) => bind(gl.TEXTURE_3D, `sh${i}`, deep(data)));
       bind(gl.TEXTURE_3D, "medium", deep(medium));
+      walls.forEach((data, i) => bind(gl.TEXTURE_3D, `wall${i}`, deep(data)));
       gl.uniform3f(gl.getUniformLocation(program, "probes_corner"), ...box[0]);
       gl.uniform3f(gl.getUniformLocation(program, "probes_size"), ...box[1]);
       gl.uniform1f(gl.getUniformLocation(program, "probes_scale"), 1);

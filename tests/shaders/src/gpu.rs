@@ -110,6 +110,10 @@ pub fn answers(grid: &ProbeGrid<'_>, questions: &[Question]) -> Result<Vec<[f32;
         ([albedo[0], albedo[1], albedo[2]], probe.extinction.mean())
     });
     views.push(texture(texels(matter)));
+    for number in 0..2 {
+        let planes = grid.probes().iter().map(|probe| (probe.planes()[number].to_array(), 0.0));
+        views.push(texture(texels(planes)));
+    }
 
     let asked = buffer(bytemuck::cast_slice(questions), BufferUsages::STORAGE);
     let size = (questions.len() * 2 * size_of::<[f32; 4]>()) as u64;

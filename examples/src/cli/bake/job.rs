@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use fogbow::bake::{Bake, BakeSettings, OneLight, ProbeBasis, ProbeDeviation, ProbeGrid};
+use fogbow::bake::{Bake, BakeSettings, FlightMemory, OneLight, ProbeBasis, ProbeDeviation, ProbeGrid};
 use fogbow::cache::{Asked, ERROR_BOUNDS, Kind, RadianceCaches, Settings, USUAL_ERROR};
 use fogbow::host::{Medium, Scene};
 use fogbow::light::Lights;
@@ -31,9 +31,13 @@ pub(super) fn check(method: Source, paths: &path::Settings, world: &World<'_>) -
         return Ok(());
     }
     if world.media().glow() {
-        return Err("--method radiance-cache: light that a medium emits is not in caches; take --method path".into());
+        let (name, place) = match method {
+            Source::Photons => ("photons", "sends no photons"),
+            _ => ("radiance-cache", "is not in caches"),
+        };
+        return Err(format!("--method {name}: light that a medium emits {place}; take --method path").into());
     }
-    if paths.max_scatterings != u32::MAX {
+    if method == Source::RadianceCache && paths.max_scatterings != u32::MAX {
         return Err("--method radiance-cache: caches hold light of paths of any depth, and the scene limits it; \
                     take --method path"
             .into());
@@ -125,7 +129,7 @@ impl BakeJob<'_> {
         let control = Control { cancel: Some(stop_flag()), ..Control::default() };
         let bar = Bar::new(Voice::unless(self.arguments.quiet));
         let mut caches = None;
-        if self.method != Source::Path {
+        if self.method == Source::RadianceCache {
             let mut filling = self.caches(outline).fill(Asked::anywhere_in(self.bounds));
             let tell = |filling: &_| bar.tell(Rounds::<LitWorld<'_, M, S>>::stage(filling), 0.0);
             let ran = threads::run(&mut filling, world, &pool, &control, None, tell);
@@ -149,6 +153,7 @@ impl BakeJob<'_> {
         };
         let mut bake = match &caches {
             Some(caches) => bake.with_caches(caches),
+            None if self.method == Source::Photons => bake.with_photons(FlightMemory::default(), outline.bounds),
             None => bake,
         };
         let (clock, mut written, mut trouble) = (Stopwatch::start(), 0.0, None);

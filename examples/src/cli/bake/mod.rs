@@ -152,6 +152,8 @@ pub enum Source {
     RadianceCache,
     /// Path tracing from every probe: unbiased.
     Path,
+    /// Photons from the lights, which all probes share: many times faster. What was scattered before it comes to a probe is the mean over its cell.
+    Photons,
 }
 
 /// How numbers lie in textures.
@@ -442,6 +444,7 @@ fn bake(arguments: &BakeArguments, file: &SceneArguments, light: Option<u32>) ->
     let name = match method {
         Source::RadianceCache => "radiance-cache",
         Source::Path => "path",
+        Source::Photons => "photons",
     };
     let baked = Baked { grid, method: Some(name), mean_cosine: Some(mean_cosine), deviation, scale: 1.0 };
     if baked.counts()[0] == 0 && ending == Ending::Done {
@@ -468,7 +471,7 @@ fn tag(
 ) -> Result<u64, Failure> {
     let mut crc = Crc::new();
     let method = arguments.method;
-    let of_caches = if method != Source::Path { arguments.error.unwrap_or(0.0).to_bits() } else { 0 };
+    let of_caches = if method == Source::RadianceCache { arguments.error.unwrap_or(0.0).to_bits() } else { 0 };
     for number in [paths.roulette_after, method as u32, of_caches, light.map_or(0, |number| number + 1)] {
         crc.add(&number.to_le_bytes());
     }

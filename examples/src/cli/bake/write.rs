@@ -6,6 +6,7 @@ use fogbow::bake::{ProbeGrid, bytes};
 use fogbow_std::image::{Layer, write as write_picture};
 
 use super::{BakeArguments, Made};
+use crate::bake::texture::Texel;
 use crate::bake::{Baked, Layout, ktx2, raw, sheets, texture};
 
 /// What a file is, by its extension.
@@ -73,7 +74,7 @@ pub(super) fn all(arguments: &BakeArguments, made: Made, files: &[&PathBuf]) -> 
     let leaks = match baked.grid.leaks() {
         0 => String::new(),
         pairs => format!(
-            "{pairs} pairs of neighbours have a surface between them, through which light leaks: smaller cells have fewer\n"
+            "{pairs} pairs of neighbours have a surface between them: light leaks through it where engines mix all probes, and not where they read planes of surfaces\n"
         ),
     };
     let [usual, worst] = baked.grid.relative_coarseness().map(|share| 100.0 * share);
@@ -108,7 +109,9 @@ fn textures(arguments: &BakeArguments, baked: &Baked, file: &Path) -> Result<Vec
     let place = |name: &str| if arguments.layout() == Layout::Plain { named(file, name) } else { file.to_owned() };
     let encoded = textures.iter().map(|one| {
         let about = [&about[..], &[("fogbow.texture", one.name.as_str())]].concat();
-        Ok((place(&one.name), ktx2::encode(one, arguments.texel(), &about)?))
+        // Planes have any sign, and are read as they are.
+        let texel = if texture::WALLS.contains(&one.name.as_str()) { Texel::Rgba16F } else { arguments.texel() };
+        Ok((place(&one.name), ktx2::encode(one, texel, &about)?))
     });
     // All or none.
     let encoded: Vec<_> = encoded.collect::<Result<_, String>>().map_err(fail)?;
