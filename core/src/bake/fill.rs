@@ -376,32 +376,63 @@ impl<'s, 'c> Bake<'s, 'c> {
 
     /// Which bricks have one more pass.
     fn plan(&mut self) {
-        let Self { settings, grid, .. } = self;
-        let level = grid.level();
+        let level = self.grid.level();
+        let times = self.photons.is_some().then(|| self.grid.relative_error() / self.settings.error);
+        let bricks = self.grid.memory.bricks.as_slice();
+        let most = bricks.iter().map(|brick| brick.passes).max().unwrap_or(0);
         let (mut due, mut done) = (0_u32, 0.0_f32);
         for brick in 0..self.bricks as usize {
-            let (sum, numbers) = grid.squared_errors(grid.in_brick(brick));
-            let relative = libm::sqrt(sum / f64::from(numbers.max(1))) / level;
-            let Brick { passes, .. } = grid.memory.bricks.as_slice()[brick];
-            // Where nothing is random nothing is gained; but what is black so far may have rare light.
-            let is_lit = || grid.in_brick(brick).any(|index| grid.held(index).iter().any(|number| !number.is_black()));
-            let is_known = sum == 0.0 && passes >= 2 && is_lit();
-            // In the dark the quotient is no number, and all is good.
-            let is_good = is_known || passes >= LEAST_PASSES && !(relative > f64::from(settings.error));
-            if passes == 0 || numbers == 0 || is_good || passes >= settings.most_passes {
-                done += 1.0;
-                continue;
+            let share = match times {
+                None => self.share_of_brick(brick, level),
+                Some(times) => self.share_by_photons(brick, most, times),
+            };
+            done += share.unwrap_or(1.0);
+            if share.is_some() {
+                let brick = &mut self.grid.memory.bricks.as_mut_slice()[brick];
+                brick.due = brick.passes + 1;
+                due += 1;
             }
-            let whole =
-                f64::from(passes) * (relative / f64::from(settings.error)) * (relative / f64::from(settings.error));
-            let whole = whole.max(f64::from(LEAST_PASSES)).min(f64::from(settings.most_passes));
-            done += (f64::from(passes) / whole).min(1.0) as f32;
-            grid.memory.bricks.as_mut_slice()[brick].due = passes + 1;
-            due += 1;
         }
         self.share = done / self.bricks.max(1) as f32;
         self.next = if due > 0 { 0 } else { self.bricks };
         self.begin_photons();
+    }
+
+    /// The share of a brick's passes that it has; `None` where it has all.
+    fn share_of_brick(&self, brick: usize, level: f64) -> Option<f32> {
+        let Self { settings, grid, .. } = self;
+        let (sum, numbers) = grid.squared_errors(grid.in_brick(brick));
+        let relative = libm::sqrt(sum / f64::from(numbers.max(1))) / level;
+        let Brick { passes, .. } = grid.memory.bricks.as_slice()[brick];
+        // Where nothing is random nothing is gained; but what is black so far may have rare light.
+        let is_lit = || grid.in_brick(brick).any(|index| grid.held(index).iter().any(|number| !number.is_black()));
+        let is_known = sum == 0.0 && passes >= 2 && is_lit();
+        // In the dark the quotient is no number, and all is good.
+        let is_good = is_known || passes >= LEAST_PASSES && !(relative > f64::from(settings.error));
+        if passes == 0 || numbers == 0 || is_good || passes >= settings.most_passes {
+            return None;
+        }
+        Some(self.share_of_passes(passes, relative / f64::from(settings.error)))
+    }
+
+    /// The same where photons serve all bricks: then the error of the whole grid, so many times that asked for, says when they are enough, and all bricks
+    /// have as many passes.
+    fn share_by_photons(&self, brick: usize, most: u32, times: f32) -> Option<f32> {
+        let Self { settings, grid, .. } = self;
+        let Brick { passes, .. } = grid.memory.bricks.as_slice()[brick];
+        let is_empty = || !grid.in_brick(brick).any(|index| grid.probes()[index].is_valid());
+        let is_enough = passes >= LEAST_PASSES && times <= 1.0 || passes >= settings.most_passes;
+        if passes == 0 || passes == most && is_enough || is_empty() {
+            return None;
+        }
+        Some(self.share_of_passes(passes, f64::from(times)))
+    }
+
+    /// Of the passes that there will be, if the error is so many times that asked for.
+    fn share_of_passes(&self, passes: u32, times: f64) -> f32 {
+        let whole = f64::from(passes) * times * times;
+        let whole = whole.max(f64::from(LEAST_PASSES)).min(f64::from(self.settings.most_passes));
+        (f64::from(passes) / whole).min(1.0) as f32
     }
 
     /// The jobs of photons that are due before those of bricks.

@@ -9,6 +9,7 @@ use fogbow_std::image;
 use serde_json::Value;
 
 use super::{Folder, SCENE, said};
+use crate::shaders::{check, schema};
 
 /// Quick, and not good.
 const QUICK: [&str; 4] = ["--passes", "2", "--counts", "6x5x3"];
@@ -28,8 +29,11 @@ fn grid(folder: &Folder, name: &str) -> ProbeGrid<'static> {
     bytes::read(&file, bytes::tag(&file).unwrap(), BakeMemory::default()).unwrap()
 }
 
+/// A description, which is what the schema says.
 fn json(folder: &Folder, name: &str) -> Value {
-    serde_json::from_slice(&file(folder, name)).unwrap()
+    let value = serde_json::from_slice(&file(folder, name)).unwrap();
+    check(&schema(), &value, name);
+    value
 }
 
 fn texture(folder: &Folder, name: &str) -> (Texture, Texel) {
@@ -102,6 +106,16 @@ fn every_format_has_the_same_numbers() {
     }
     let (medium, _) = texture(&folder, "a-medium.ktx2");
     assert!((medium.texels[40][3] / kept.probes()[40].extinction.mean() - 1.0).abs() < 1e-3);
+
+    for number in 0..2 {
+        // Whatever the texels of light, planes have any sign; the core rounds them to half floats.
+        let (walls, texel) = texture(&folder, &format!("a-wall{number}.ktx2"));
+        assert_eq!(texel, Texel::Rgba16F);
+        for (texel, probe) in walls.texels.iter().zip(kept.probes()) {
+            assert_eq!(texel[..3], probe.planes()[number].to_array());
+        }
+        assert!(number == 1 || walls.texels.iter().any(|texel| texel[0] != 0.0));
+    }
 
     // From one into others, the same bytes; scaled, others.
     let output = folder.run(&["bake", "--from-file", "a.bake", "-o", "b.json", "-o", "b.exr", "-o", "b.bake"]);
@@ -262,6 +276,42 @@ const TWO: &str = r#"<scene version="3.0.0"><integrator type="volpath"><integer 
     <sensor type="perspective"><float name="fov" value="36"/><string name="fov_axis" value="x"/>
     <transform name="to_world"><lookat origin="0, 0, 4" target="0, 0, 0" up="0, 1, 0"/></transform>
     <film type="hdrfilm"><rfilter type="box"/></film></sensor></scene>"#;
+
+#[test]
+fn photons_are_gone_on_with_and_say_what_they_are() {
+    let folder = Folder::new("bake-photons");
+    let options = ["--method", "photons", "--counts", "6x5x3", "--error", "0.03"];
+    bake(&folder, &[&options[..], &["--threads", "1", "-o", "a.bake", "-o", "a.json"]].concat());
+    let about = json(&folder, "a.json");
+    assert_eq!(about["method"], "photons");
+    assert!(about["relative_error"].as_f64().unwrap() <= 0.03);
+    bake(&folder, &[&options[..], &["--threads", "3", "-o", "b.bake"]].concat());
+    assert!(file(&folder, "a.bake") == file(&folder, "b.bake"));
+    // What another method has begun is not gone on with.
+    let output = folder.run(&["bake", SCENE, "-q", "--counts", "6x5x3", "--resume", "-o", "a.bake"]);
+    assert!(output.status.code() == Some(1) && said(&output).contains("another --method"), "{}", said(&output));
+}
+
+/// Killed without a word, at any time: what is there is a whole file, and is gone on with to the same bytes.
+#[test]
+fn a_killed_bake_is_gone_on_with() {
+    let folder = Folder::new("bake-killed");
+    let options = ["bake", SCENE, "-q", "--counts", "8x8x4", "--passes", "60", "--error", "1e-6", "--seed", "3"];
+    let whole = folder.run(&[&options[..], &["-o", "whole.bake"]].concat());
+    assert_eq!(whole.status.code(), Some(0), "{}", said(&whole));
+    let resumed = [&options[..], &["--resume", "--checkpoint-every", "0.02", "-o", "killed.bake"]].concat();
+    for kill in 0..3 {
+        let mut child = folder.fogbow().args(&resumed).spawn().unwrap();
+        std::thread::sleep(std::time::Duration::from_millis(150 + 60 * kill));
+        child.kill().unwrap();
+        child.wait().unwrap();
+        if folder.0.join("killed.bake").exists() {
+            let _ = grid(&folder, "killed.bake");
+        }
+    }
+    assert_eq!(folder.run(&resumed).status.code(), Some(0));
+    assert!(file(&folder, "killed.bake") == file(&folder, "whole.bake"));
+}
 
 #[test]
 fn layers_of_single_lights_add_up() {

@@ -35,6 +35,7 @@ export async function browse(work, options = {}) {
     args: [
       "--no-sandbox", "--disable-quic", "--no-first-run", "--disable-background-networking", "--disable-component-update", "--disable-sync",
       "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist",
+      "--enable-unsafe-webgpu", "--use-webgpu-adapter=swiftshader",
     ],
     viewport: { width: 1280, height: 800 },
     ...options,

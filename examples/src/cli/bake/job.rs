@@ -21,9 +21,6 @@ use super::super::{Ending, Failure};
 use super::{BakeArguments, Source, begun, write};
 use crate::world::{WithMedium, World};
 
-/// Seconds between two writings of what is done: no more than these are lost. More often, and large grids are mostly being written.
-const BETWEEN_WRITINGS: f64 = 30.0;
-
 /// # Errors
 /// Caches of light that they cannot hold.
 pub(super) fn check(method: Source, paths: &path::Settings, world: &World<'_>) -> Result<(), Failure> {
@@ -160,7 +157,7 @@ impl BakeJob<'_> {
         let ran = threads::run(&mut bake, world, &pool, &control, None, |bake| {
             let elapsed = clock.elapsed().wall;
             bar.share(bake.share(), elapsed);
-            if let Some(file) = self.kept.as_ref().filter(|_| elapsed - written > BETWEEN_WRITINGS) {
+            if let Some(file) = self.kept.as_ref().filter(|_| elapsed - written > self.arguments.checkpoint_every) {
                 written = elapsed;
                 trouble = trouble.take().or(write::keep(file, bake.grid(), self.tag).err());
             }

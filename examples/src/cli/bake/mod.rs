@@ -73,6 +73,9 @@ pub struct BakeArguments {
     /// Goes on where the .bake file that is to be written was left. Without such a file, begins.
     #[arg(long)]
     pub resume: bool,
+    /// Seconds between two writings of the .bake file while it is baked.
+    #[arg(long, value_name = "SECONDS", value_parser = output::positive, default_value_t = 30.0)]
+    pub checkpoint_every: f64,
     /// How numbers lie in .ktx2 files.
     #[arg(long, value_enum, default_value_t = Packing::Plain)]
     pub layout: Packing,
