@@ -51,7 +51,10 @@ fn godots_shader_is_the_one_for_webgl() {
     if std::env::var_os("FOGBOW_WRITE_SHADERS").is_some() {
         std::fs::write(file("fog.gdshaderinc"), &due).unwrap();
     }
-    assert!(text("fog.gdshaderinc") == due, "fog.gdshaderinc is not what fog.glsl makes: FOGBOW_WRITE_SHADERS=1 writes it");
+    assert!(
+        text("fog.gdshaderinc") == due,
+        "fog.gdshaderinc is not what fog.glsl makes: FOGBOW_WRITE_SHADERS=1 writes it"
+    );
     // What Godot has not.
     for word in ["#version", "precision ", "layout(", "gl_"] {
         assert!(!due.contains(word), "{word}");

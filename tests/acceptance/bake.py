@@ -108,8 +108,166 @@ def leaks(folder):
     return held
 
 
+def slab(scene, counts, folder):
+    """The bounds of the grid that a bake of a scene takes, and of its cells in a slab across it: all of x, the middle four of y, four of z beside the middle."""
+    run("bake", scene, "--counts", "1x1x1", "--passes", 2, "--basis", "sh0", "-o", folder / "one.json")
+    box = json.loads((folder / "one.json").read_text())["box"]
+    low, high = np.array(box["min"]), np.array(box["max"])
+    first, count = np.array([0, counts // 2 - 2, counts // 4]), np.array([counts, 4, 4])
+    cell = (high - low) / counts
+    corner = lambda v: ",".join(f"{c:.7f}" for c in v)
+    part = f"{corner(low + first * cell)} {corner(low + (first + count) * cell)}"
+    return part, tuple(slice(f, f + c) for f, c in zip(first[::-1], count[::-1]))
+
+
+def apart(probes, where, due, name):
+    """How far numbers are off, in per cent of the mean: root mean squares of all and of degree 0, without what their standard errors explain, and how many are within three."""
+    valid = probes.valid[where] & due.valid
+    off = (probes.numbers()[where] - due.numbers())[valid]
+    squares = (off**2).mean(-1)
+    variances = (probes.errors()[where] ** 2 + due.errors() ** 2)[valid]
+    level = due.numbers()[due.valid][:, 0].mean()
+    share = lambda squares: 100 * np.sqrt(max(squares.mean(), 0)) / level
+    # A probe in light that is far brighter than the mean, or at the edge of a shadow, is off by more than all the rest: the median tells of the usual one.
+    each = [share(squares[:, k] - variances[:, k]) for k in range(squares.shape[1])]
+    within = 100 * (squares <= 9 * variances + (1e-4 * level) ** 2).mean()
+    usual = 100 * np.median(np.sqrt(squares)) / level
+    print(
+        f"{name}: {valid.sum()} probes, numbers off by {share(squares):.2f} % (noise {share(variances):.2f} %), beyond noise at most {max(each):.2f} % in one coefficient, "
+        f"median {usual:.2f} %; {within:.1f} % within three standard errors; mean {100 * off[:, 0].mean() / level:+.2f} %",
+        flush=True,
+    )
+    return max(each) < 2, within
+
+
+def truth(folder):
+    """Probes of a slab through each scene, of 32³, against the same probes path traced to a third of the error."""
+    held = True
+    public = pathlib.Path(os.environ.get("FOGBOW_REFERENCE", "/nowhere")) / "public"
+    boxes = [public / f"cornell-{name}.xml" for name in ("homog-iso", "homog-hg06", "hetero-iso", "hetero-hg06")]
+    for scene in [*[box for box in boxes if box.exists()], SCENES / "atrium.xml"]:
+        part, where = slab(scene, 32, folder)
+        run("bake", scene, "--box", part, "--counts", "32x4x4", "--error", 0.007, "--passes", 100000, "--seed", 7, "-o", folder / "due.json")
+        due = Probes(folder / "due.json")
+        _, seconds = run("bake", scene, "--box", part, "--counts", "32x4x4", "--error", 0.02, "-o", folder / "paths.json")
+        near, within = apart(Probes(folder / "paths.json"), np.s_[:, :, :], due, f"{scene.stem} by paths ({seconds:.1f} s)")
+        held &= near and within >= 97
+        _, seconds = run("bake", scene, "--counts", "32x32x32", "--error", 0.02, "--method", "photons", "-o", folder / "photons.json")
+        near, _ = apart(Probes(folder / "photons.json"), where, due, f"{scene.stem} by photons, all 32³ ({seconds:.1f} s)")
+        held &= near
+    return held
+
+
+def speed(folder):
+    """Processor seconds to 2 % in the atrium; of paths those of 16³, eight times, since each probe has paths of its own."""
+    scene, seconds = SCENES / "atrium.xml", {}
+    for method, side, times in (("photons", 16, 1), ("photons", 32, 1), ("photons", 64, 1), ("path", 16, 8)):
+        _, took = run("bake", scene, "--counts", f"{side}x{side}x{side}", "--error", 0.02, "--method", method, "--threads", 1, "-o", folder / "speed.json")
+        error = Probes(folder / "speed.json").about["relative_error"]
+        # At equal error: what is sampled goes as its inverse square.
+        seconds[method, side] = took * (error / 0.02) ** 2 * times
+        print(f"atrium {side}³ by {method}: {took:.1f} s, error {100 * error:.2f} %", flush=True)
+    ratio = seconds["path", 16] / seconds["photons", 32]
+    print(f"32³ at 2 %: photons {seconds['photons', 32]:.1f} s, paths {seconds['path', 16]:.0f} s: {ratio:.0f} times")
+    return ratio >= 50
+
+
+def kill(folder):
+    """Ended without a word at ten times, and gone on with; by paths and by photons."""
+    held = True
+    for method, passes in (("path", 40), ("photons", 24)):
+        asked = [FOGBOW, "bake", SCENES / "smoke-box-homogeneous-isotropic.xml", "--counts", "12x12x12", "--error", 0.001, "--passes", passes, "--method", method, "-q"]
+        asked = [*map(str, asked)]
+        subprocess.run([*asked, "-o", folder / "whole.bake"], check=True)
+        file = folder / f"killed-{method}.bake"
+        again = [*asked, "--resume", "--checkpoint-every", "0.05", "-o", file]
+        kills = 0
+        for i in range(10):
+            child = subprocess.Popen(again)
+            time.sleep(0.3 + 0.17 * i)
+            kills += child.poll() is None
+            child.send_signal(signal.SIGKILL)
+            child.wait()
+        subprocess.run([*again, "--threads", "1"], check=True)
+        same = file.read_bytes() == (folder / "whole.bake").read_bytes()
+        print(f"{method}: killed {kills} times, then gone on with by one thread: {'the same bytes' if same else 'OTHER bytes'}")
+        held &= same and kills > 0
+    return held
+
+
+def schema(folder):
+    import jsonschema
+
+    due = json.loads((ROOT / "examples/shaders/bake.schema.json").read_text())
+    jsonschema.Draft202012Validator.check_schema(due)
+    scene = SCENES / "smoke-box-homogeneous-isotropic.xml"
+    for options in ([], ["--basis", "ambient-cube", "--quantity", "irradiance"], ["--basis", "fluence", "--method", "photons"], ["--method", "radiance-cache", "--error", "0.2"]):
+        outputs = [word for kind in ("json", "ktx2", "exr") for word in ("-o", folder / f"a.{kind}")]
+        run("bake", scene, "--counts", "4x4x4", "--passes", 2, *options, *outputs)
+        for name in ("a.json", "a.ktx2.json", "a.exr.json"):
+            jsonschema.validate(json.loads((folder / name).read_text()), due)
+    print("12 descriptions are what the schema says")
+    return True
+
+
+def pictures(folder):
+    """The medium's light marched from probes against path tracing, blocks of 8 × 8 pixels; a plot of error over resolution."""
+    public = pathlib.Path(os.environ.get("FOGBOW_REFERENCE", "/nowhere")) / "public"
+    sys.path.insert(0, str(public.parent))
+    held, curves = True, {}
+    for scene in (SCENES / "atrium.xml", public / "cornell-hetero-iso.xml"):
+        size = ["--size", "64x64", "--aov"]
+        for seed in (1, 2):
+            run("render", scene, *size, "--method", "path", "--spp", 1024, "--seed", seed, "-o", folder / f"due{seed}.exr")
+        due = [medium(folder / f"due{seed}.exr") for seed in (1, 2)]
+        noise = np.sqrt(((due[0] - due[1]) ** 2).mean()) / 2
+        due = (due[0] + due[1]) / 2
+        for side in (16, 32, 64, 128):
+            counts = f"{side}x{side}x{side}"
+            asked = ["bake", scene, "--counts", counts, "--orders", "indirect", "--method", "photons", "--error", 0.05 if side > 64 else 0.02]
+            text, seconds = run(*asked, "-o", folder / "probes.bake", "-o", folder / "probes.json")
+            coarse = json.loads((folder / "probes.json").read_text())["relative_coarseness"]["root_mean_square"]
+            run("render", scene, *size, "--method", "march", "--bake", folder / "probes.bake", "--spp", 256, "-o", folder / "marched.exr")
+            off = medium(folder / "marched.exr") - due
+            error = np.sqrt(max((off**2).mean() - noise**2, 0)) / due.mean()
+            curves.setdefault(scene.stem, []).append((side, 100 * error))
+            print(
+                f"{scene.stem} {side}³ ({seconds:.0f} s): blocks off by {100 * error:.2f} % of the mean (noise of the truth {100 * noise / due.mean():.2f} %), mean {100 * off.mean() / due.mean():+.2f} %; "
+                f"the grid says {100 * coarse:.0f} % between probes",
+                flush=True,
+            )
+            held &= side != 64 or error < 0.05
+    import matplotlib
+
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+
+    for name, points in curves.items():
+        plt.loglog(*zip(*points), "o-", label=name)
+    plt.xlabel("probes along a side")
+    plt.ylabel("error of 8 x 8 blocks (% of the mean)")
+    plt.xticks([16, 32, 64, 128], ["16", "32", "64", "128"])
+    plt.grid(True, which="both", alpha=0.3)
+    plt.legend()
+    plot = pathlib.Path(os.environ.get("FOLDER", ".")) / "error-over-resolution.png"
+    plt.savefig(plot, dpi=120)
+    print(f"to be looked at: {plot}")
+    return held
+
+
+def medium(file):
+    """The medium's layers of a picture, in blocks of 8 × 8 pixels."""
+    import OpenEXR
+
+    channels = OpenEXR.File(str(file)).channels()
+    layers = [c.pixels for name, c in channels.items() if name.startswith(("medium_single", "medium_multiple"))]
+    assert layers, list(channels)
+    light = sum(layer if layer.ndim == 3 else np.repeat(layer[..., None], 3, -1) / 3 for layer in layers).mean(-1)
+    return light.reshape(light.shape[0] // 8, 8, light.shape[1] // 8, 8).mean((1, 3))
+
+
 def main():
-    tasks = {"leaks": leaks}
+    tasks = {"leaks": leaks, "truth": truth, "pictures": pictures, "speed": speed, "kill": kill, "schema": schema}
     asked = sys.argv[1:] or list(tasks)
     with tempfile.TemporaryDirectory() as folder:
         folder = pathlib.Path(os.environ.get("FOLDER", folder))

@@ -16,7 +16,7 @@
 //! | 72 | 8 | [`Crc`] of bytes 0 to 72 and of all from 80 on |
 //! | 80 | 12 n k | numbers in colour, `k` of each of `n` probes, as `f32` |
 //! | | 4 n k | their sums of squared deviations over passes, a mean over channels, as `f32` |
-//! | | 52 n | extinction and albedo in colour, planes of two surfaces, as `f32`; as `u32` state in bits 0 to 2, surfaces before the next probes in bits 4 to 6 |
+//! | | 80 n | extinction and albedo in colour, planes of four surfaces, share of its cell, as `f32`; as `u32` state in bits 0 to 2, surfaces before the next probes in bits 4 to 6 |
 //! | | 8 b | passes, and passes that are due |
 
 use core::fmt;
@@ -115,7 +115,7 @@ impl core::error::Error for ProbeBytesError {}
 /// # let outline = Outline::of(&World { medium: &Empty, scene: &Empty, lights: (&[]).into() }, bounds);
 /// let grid = Bake::new(BakeSettings::for_outline(&outline, [5, 4, 4]))?.finish();
 /// // 80 probes of nine coefficients, two bricks.
-/// assert_eq!(bytes::byte_count(&grid), 80 + 80 * 9 * 16 + 80 * 52 + 2 * 8);
+/// assert_eq!(bytes::byte_count(&grid), 80 + 80 * 9 * 16 + 80 * 80 + 2 * 8);
 /// # }
 /// # Ok::<(), fogbow::bake::BakeError>(())
 /// ```
@@ -298,7 +298,8 @@ pub fn read<'s>(bytes: &[u8], tag: u64, memory: BakeMemory<'s>) -> Result<ProbeG
             && deviations.iter().all(|deviation| *deviation >= 0.0 && deviation.is_finite())
             && probe.extinction.is_valid()
             && probe.albedo.is_valid()
-            && probe.planes().iter().all(|plane| plane.is_finite());
+            && [probe.near, probe.other, probe.third, probe.fourth].iter().all(|plane| plane.is_finite())
+            && (0.0..=1.0).contains(&probe.open);
         let is_known = probe.state & STATE <= ProbeState::Empty as u32 && probe.state & !(STATE | WALLS) == 0;
         if !is_number || !is_known {
             return Err(ProbeBytesError::Probe(index));

@@ -9,7 +9,7 @@ use glam::Vec3;
 
 use super::arriving::{Sampler, phase_at};
 use super::basis::MOST_COEFFICIENTS;
-use super::flights::{Flight, FlightMemory, PROBES, Photons};
+use super::flights::{Flight, FlightMemory, PROBES, Photons, open_share};
 use super::grid::{BakeMemory, Brick, Probe, ProbeGrid, WALLS_AT};
 use super::places;
 use super::settings::{BakeError, BakeSettings};
@@ -551,6 +551,16 @@ fn looked_at<M: Medium + ?Sized, S: Scene + ?Sized>(
     let extinction = world.medium.mean_extinction(point, 0.5 * cell.min_element());
     let albedo = world.medium.properties(point).albedo();
     let state = places::state(point, cell, world, settings);
-    let (walls, [near, other]) = places::walls(point, cell, world.scene);
-    Probe { extinction, albedo, near, other, state: state as u32 | walls << WALLS_AT }
+    let (walls, planes) = places::walls(point, cell, world.scene);
+    let [near, other, third, fourth] = planes;
+    Probe {
+        extinction,
+        albedo,
+        near,
+        other,
+        third,
+        fourth,
+        open: open_share(planes),
+        state: state as u32 | walls << WALLS_AT,
+    }
 }

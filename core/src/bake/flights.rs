@@ -12,6 +12,7 @@ use glam::Vec3;
 
 use super::basis::{Parts, ProbeBasis, Projection, Quantity};
 use super::grid::{BRICK, Probe, ProbeGrid};
+use super::places::PLANES;
 use super::settings::BakeSettings;
 use crate::covariance::Lattice;
 use crate::host::{Medium, Scene};
@@ -218,10 +219,7 @@ impl<'s> Photons<'s> {
         let Some(cells) = grid.brick_lattice(brick) else { return };
         let (basis, quantity) = (grid.basis(), grid.quantity());
         let each = 1.0 / (self.jobs * JOB) as f32 / cells.cell().element_product();
-        let parts: heapless::Vec<Part, PROBES> = probes
-            .iter()
-            .map(|probe| Part::new(probe.planes(), each * f32::from(u8::from(probe.is_valid()))))
-            .collect();
+        let parts: heapless::Vec<Part, PROBES> = probes.iter().map(|probe| Part::of(probe, each)).collect();
         let projections: heapless::Vec<Projection<'_>, PROBES> =
             phases.iter().map(|phase| Projection::new(basis, quantity, phase)).collect();
         let mut y = [0.0; super::MOST_COEFFICIENTS];
@@ -265,41 +263,44 @@ impl<'s> Photons<'s> {
     }
 }
 
+/// A half space `o · normal ≤ most`, `o` in cells from the probe.
+type HalfSpace = (Vec3, f32);
+
 /// The part of a cell whose mean a probe gets: before the planes of surfaces, and about as far on the other side of the probe.
 struct Part {
-    /// Half spaces `o · normal ≤ most`, `o` in cells from the probe; none where `normal` is 0.
-    bounds: [(Vec3, f32); 4],
-    is_whole: bool,
+    bounds: heapless::Vec<HalfSpace, { 2 * PLANES }>,
     /// What a length in the part weighs: 1/(N V).
     weight: f32,
 }
 
-impl Part {
-    fn new(planes: [Vec3; 2], weight: f32) -> Self {
-        let mut bounds = [(Vec3::ZERO, 1.0); 4];
-        let mut is_whole = true;
-        // Planes that do not cut the cell are of no concern.
-        for (i, plane) in planes.into_iter().enumerate().filter(|(_, plane)| plane.abs().element_sum() > 2.0) {
-            bounds[2 * i] = (plane, 1.0);
-            bounds[2 * i + 1] = (-plane, (LEAST_ROOM * plane.length()).max(1.0));
-            is_whole = false;
-        }
-        let mut part = Self { bounds, is_whole, weight };
-        if !is_whole && weight > 0.0 {
-            let inside = (0..VOLUME_POINTS).filter(|i| part.holds(Vec3::from(even3(*i)) - 0.5)).count();
-            part.weight = if inside > 0 { weight * VOLUME_POINTS as f32 / inside as f32 } else { 0.0 };
-        }
-        part
-    }
+fn half_spaces(planes: [Vec3; PLANES]) -> heapless::Vec<HalfSpace, { 2 * PLANES }> {
+    // Planes that do not cut the cell are of no concern.
+    let cutting = planes.into_iter().filter(|plane| plane.abs().element_sum() > 2.0);
+    cutting.flat_map(|plane| [(plane, 1.0), (-plane, (LEAST_ROOM * plane.length()).max(1.0))]).collect()
+}
 
-    fn holds(&self, offset: Vec3) -> bool {
-        self.bounds.iter().all(|(normal, most)| normal.dot(offset) <= *most)
+/// What share of a cell the part is that photons count in.
+pub(super) fn open_share(planes: [Vec3; PLANES]) -> f32 {
+    let bounds = half_spaces(planes);
+    let holds = |offset: Vec3| bounds.iter().all(|(normal, most)| normal.dot(offset) <= *most);
+    if bounds.is_empty() {
+        return 1.0;
+    }
+    let inside = (0..VOLUME_POINTS).filter(|i| holds(Vec3::from(even3(*i)) - 0.5)).count();
+    inside as f32 / VOLUME_POINTS as f32
+}
+
+impl Part {
+    fn of(probe: &Probe, weight: f32) -> Self {
+        let is_open = probe.is_valid() && probe.open > 0.0;
+        let bounds = half_spaces([probe.near, probe.other, probe.third, probe.fourth]);
+        Self { bounds, weight: if is_open { weight / probe.open } else { 0.0 } }
     }
 
     /// How long a ray is in the part (m), between two distances at which it is in the cell.
     #[inline]
     fn length(&self, ray: &Ray, cells: &Lattice, cell: usize, enter: f32, leave: f32) -> f32 {
-        if self.is_whole {
+        if self.bounds.is_empty() {
             return leave - enter;
         }
         let (size, centre) = (cells.cell(), cells.centre(cell));

@@ -45,9 +45,13 @@ pub struct Probe {
     pub extinction: Spectrum,
     /// Single-scattering albedo of the medium at the probe; 0 without a medium.
     pub albedo: Spectrum,
-    /// See [`Probe::planes`].
+    /// See [`Probe::planes`]; while light is baked, two more of them.
     pub(super) near: Vec3,
     pub(super) other: Vec3,
+    pub(super) third: Vec3,
+    pub(super) fourth: Vec3,
+    /// What share of its cell photons count in.
+    pub(super) open: f32,
     /// A [`ProbeState`] by its number, in [`STATE`]; in [`WALLS`], bits for x, y and z where a surface stands before the next probe. Above that, marks of a dilation
     /// under way.
     pub(super) state: u32,
@@ -206,7 +210,7 @@ pub struct ProbeDeviation {
 /// let far = grid.lattice().index(Vec3::splat(0.9)).unwrap();
 /// assert!(grid.probes()[far].state() == ProbeState::Empty && grid.held(far)[0].is_black());
 /// assert!(grid.dilate() > 0 && !grid.held(far)[0].is_black());
-/// assert_eq!(grid.bytes(), 64 * (9 * 16 + 52) + 8);
+/// assert_eq!(grid.bytes(), 64 * (9 * 16 + 80) + 8);
 /// # }
 /// # Ok::<(), Box<dyn core::error::Error>>(())
 /// ```

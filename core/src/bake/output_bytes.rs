@@ -9,7 +9,16 @@ use crate::sent::{JobBytesError, Packed, Received, Sending, byte_count, packed};
 use crate::spectrum::Spectrum;
 
 packed!(Flight { origin: Vec3, direction: Vec3, length: f32, power: Spectrum });
-packed!(Probe { extinction: Spectrum, albedo: Spectrum, near: Vec3, other: Vec3, state: u32 });
+packed!(Probe {
+    extinction: Spectrum,
+    albedo: Spectrum,
+    near: Vec3,
+    other: Vec3,
+    third: Vec3,
+    fourth: Vec3,
+    open: f32,
+    state: u32,
+});
 
 /// Tells such jobs from others.
 const KIND: u32 = 2;

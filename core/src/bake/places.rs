@@ -48,11 +48,14 @@ const NEAREST: f32 = 1024.0;
 /// Probes around another one.
 const AROUND: usize = 26;
 
-/// Surfaces around a probe: bits for x, y and z where one stands before the next probe, and the planes of two.
+/// Planes of surfaces that are kept of a probe: look-ups have two of them. Fewer: photons count behind the walls of a pillar.
+pub(super) const PLANES: usize = 4;
+
+/// Surfaces around a probe: bits for x, y and z where one stands before the next probe, and the planes of some.
 ///
 /// Rays to all probes around tell which of them a surface hides, each with its plane. Taken is the plane that hides most of those that are hidden and fewest of
-/// those that are seen; then another one that does most for the rest. Any number of surfaces in two planes, as a wall, a pane, or the edge of two, are told exactly.
-pub(super) fn walls(point: Vec3, cell: Vec3, scene: &(impl Scene + ?Sized)) -> (u32, [Vec3; 2]) {
+/// those that are seen; then those that do most for the rest. Any number of surfaces in two planes, as a wall, a pane, or the edge of two, are told exactly by the first two.
+pub(super) fn walls(point: Vec3, cell: Vec3, scene: &(impl Scene + ?Sized)) -> (u32, [Vec3; PLANES]) {
     let offsets: [Vec3; AROUND] = core::array::from_fn(|i| {
         // Without the probe itself, number 13 of 27.
         let i = i + usize::from(i >= AROUND / 2);
@@ -72,9 +75,9 @@ pub(super) fn walls(point: Vec3, cell: Vec3, scene: &(impl Scene + ?Sized)) -> (
     let bits =
         [14, 16, 22].into_iter().zip(0..).fold(0, |bits, (i, axis)| bits | u32::from(met[i - 1].is_some()) << axis);
     if met.iter().all(Option::is_none) {
-        return (bits, [Vec3::ZERO; 2]);
+        return (bits, [Vec3::ZERO; PLANES]);
     }
-    let mut planes = [Vec3::ZERO; 2];
+    let mut planes = [Vec3::ZERO; PLANES];
     for number in 0..planes.len() {
         let is_told = |offset: Vec3| planes[..number].iter().any(|plane| plane.dot(offset) > 1.0);
         let worth = |plane: &Vec3| {

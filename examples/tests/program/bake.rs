@@ -289,25 +289,31 @@ fn photons_are_gone_on_with_and_say_what_they_are() {
     assert!(file(&folder, "a.bake") == file(&folder, "b.bake"));
     // What another method has begun is not gone on with.
     let output = folder.run(&["bake", SCENE, "-q", "--counts", "6x5x3", "--resume", "-o", "a.bake"]);
-    assert!(output.status.code() == Some(1) && said(&output).contains("another --method"), "{}", said(&output));
+    assert!(output.status.code() == Some(2) && said(&output).contains("another --method"), "{}", said(&output));
 }
 
 /// Killed without a word, at any time: what is there is a whole file, and is gone on with to the same bytes.
 #[test]
 fn a_killed_bake_is_gone_on_with() {
     let folder = Folder::new("bake-killed");
-    let options = ["bake", SCENE, "-q", "--counts", "8x8x4", "--passes", "60", "--error", "1e-6", "--seed", "3"];
+    let options = ["bake", SCENE, "-q", "--counts", "8x8x4", "--passes", "60", "--error", "0.001", "--seed", "3"];
     let whole = folder.run(&[&options[..], &["-o", "whole.bake"]].concat());
     assert_eq!(whole.status.code(), Some(0), "{}", said(&whole));
     let resumed = [&options[..], &["--resume", "--checkpoint-every", "0.02", "-o", "killed.bake"]].concat();
     for kill in 0..3 {
         let mut child = folder.fogbow().args(&resumed).spawn().unwrap();
-        std::thread::sleep(std::time::Duration::from_millis(150 + 60 * kill));
+        let wait = |millis| std::thread::sleep(std::time::Duration::from_millis(millis));
+        for _ in 0..1000 {
+            if folder.0.join("killed.bake").exists() || child.try_wait().unwrap().is_some() {
+                break;
+            }
+            wait(10);
+        }
+        wait(40 * kill);
         child.kill().unwrap();
         child.wait().unwrap();
-        if folder.0.join("killed.bake").exists() {
-            let _ = grid(&folder, "killed.bake");
-        }
+        let passes = grid(&folder, "killed.bake").passes(0);
+        assert!(passes > 0 && passes <= 60);
     }
     assert_eq!(folder.run(&resumed).status.code(), Some(0));
     assert!(file(&folder, "killed.bake") == file(&folder, "whole.bake"));
