@@ -7,7 +7,7 @@ sys.path.insert(0, REFERENCE)
 import compare  # noqa: E402
 
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
-PROGRAM = os.path.join(os.environ.get("CARGO_TARGET_DIR", os.path.join(ROOT, "target")), "release", "fogbow")
+PROGRAM = os.environ.get("FOGBOW_PROGRAM") or os.path.join(os.environ.get("CARGO_TARGET_DIR", os.path.join(ROOT, "target")), "release", "fogbow")
 PUBLIC = os.path.join(REFERENCE, "public")
 
 

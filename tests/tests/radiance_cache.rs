@@ -202,6 +202,61 @@ fn take(filling: &mut Filling<'static, Eye>, output: &FilledRecords<'static>) {
     Rounds::<Room<'_>>::accept(filling, output);
 }
 
+/// With less than half the error.
+fn finer(settings: Settings) -> Settings {
+    let finer = |effort: Effort| Effort { samples: 8 * effort.samples, tolerance: 0.8 * effort.tolerance, ..effort };
+    let [surface, multiple, irradiance] =
+        [settings.surface, settings.multiple, settings.irradiance].map(|effort| effort.map(finer));
+    let photons = settings.photons.map(|photons| PhotonEffort { paths: 4 * photons.paths, ..photons });
+    Settings { surface, multiple, irradiance, photons, ..settings }
+}
+
+/// Caches of two levels.
+fn refined(settings: Settings, threads: usize) -> (Caches, [u64; 5]) {
+    let (fog, room, lights) = (fog(), room(), [lamp()]);
+    let world = World { medium: &fog, scene: &room, lights: (&lights).into() };
+    let (mut filling, _) = fill_on(RadianceCaches::new(settings), &fog, threads, &Control::default());
+    let coarse = counts(filling.caches());
+    filling.refine(finer(settings));
+    assert!(
+        filling.caches().is_open() && counts(filling.caches())[1..] == coarse[1..],
+        "they stay until they are better"
+    );
+    run(&mut filling, &world, &Threads::new(threads).unwrap(), &Control::default(), None, |_| {});
+    let computed = computed(&filling);
+    (filling.finish(), computed)
+}
+
+#[test]
+fn levels_that_are_given_beforehand_hold_the_same_bits_for_any_number_of_threads() {
+    let (one, expected) = refined(settings(), 1);
+    let (two, computed) = refined(settings(), 2);
+    assert!(stored(&one) == stored(&two) && computed == expected && !one.is_open());
+    assert_eq!(one.settings().multiple.unwrap().samples, 8 * 32);
+    // What is full at this level is full.
+    assert_eq!(fill_in(one, &fog()).1, [0; 5]);
+}
+
+/// Relative root mean square of what two pictures differ by.
+fn apart(a: &Film, b: &Film) -> f64 {
+    let [a, b] = [a, b].map(|film| film.mean(0).unwrap().pixels);
+    let square = |(a, b): (&Spectrum, &Spectrum)| f64::from((a.mean() - b.mean()) / b.mean()).powi(2);
+    (a.iter().zip(&b).map(square).sum::<f64>() / a.len() as f64).sqrt()
+}
+
+#[test]
+fn a_finer_level_is_as_good_as_caches_made_for_it_and_costs_less() {
+    let seeds = [1, 2].map(|seed| Settings { seed, ..settings() });
+    let coarse = seeds.map(|settings| picture(&filled(settings), 2).0);
+    let ((fine, computed), (anew, computed_anew)) =
+        (refined(seeds[0], 2), fill_in(RadianceCaches::new(finer(seeds[1])), &fog()));
+    let (few, many) = (computed.iter().sum::<u64>(), computed_anew.iter().sum::<u64>());
+    assert!(few < many - many / 8, "{computed:?} {computed_anew:?}");
+    let between = [apart(&coarse[0], &coarse[1]), apart(&picture(&fine, 2).0, &picture(&anew, 2).0)];
+    // Eight times the samples: between them there is some 2.8 times less noise.
+    assert!(between[1] < 0.5 * between[0], "{between:?}");
+}
+
 #[test]
 fn a_box_of_points_has_records_everywhere_in_it() {
     let (fog, room, lights) = (fog(), room(), [lamp()]);

@@ -32,6 +32,7 @@ use crate::work::Rounds;
 use crate::world::World;
 
 mod estimates;
+mod finer;
 mod glances;
 mod pilot;
 mod shoot;
@@ -39,6 +40,8 @@ mod smooth;
 mod steps;
 
 pub(super) use estimates::MOST_PARTS;
+
+use finer::Held;
 
 /// Eye rays of one job. More: jobs take longer than some milliseconds in dense worlds.
 pub(super) const RAYS_PER_JOB: u32 = 16;
@@ -144,6 +147,11 @@ pub struct Filling<'s, F> {
     left: Option<f32>,
     /// Rounds of more estimates so far.
     again: u32,
+    /// How often [`Filling::refine`] was called, and what records there were then.
+    level: u32,
+    held: ByKind<Held>,
+    /// How often records of each kind have been estimated anew since.
+    estimated: ByKind<u32>,
     /// From these records on nothing is final.
     before: ByKind<usize>,
     /// All records computed, by kind.
@@ -226,6 +234,9 @@ impl<'s> RadianceCaches<'s> {
             efforts: ByKind([[0.0; 2]; Kind::COUNT]),
             left: None,
             again: 0,
+            level: 0,
+            held: ByKind([Held::NONE; Kind::COUNT]),
+            estimated: ByKind([0; Kind::COUNT]),
             before,
             all_computed: ByKind([0; Kind::COUNT]),
             photons_before: 0,
@@ -297,9 +308,9 @@ impl<'s, F> Filling<'s, F> {
         &self.caches.settings
     }
 
-    /// Records in place of dropped ones meet other chances.
+    /// Records in place of dropped ones meet other chances, and estimates of another level.
     fn seed(&self) -> u64 {
-        self.settings().seed ^ u64::from(self.caches.dropped) << 32
+        self.settings().seed ^ u64::from(self.caches.dropped) << 32 ^ u64::from(self.level) << 48
     }
 
     /// The step at hand and its effort.
@@ -312,11 +323,12 @@ impl<'s, F> Filling<'s, F> {
 
     /// Whether the final caches have all that is asked for at a place.
     fn is_known(&self, place: &Place) -> bool {
-        Kind::FINAL.into_iter().all(|kind| {
-            let Some(effort) = self.settings().effort(kind) else { return true };
-            let reading = Reading { margin: self.settings().margin, ..Reading::new(effort.tolerance) };
-            self.caches.slots[kind].covers(place, &reading)
-        })
+        !self.is_loose()
+            && Kind::FINAL.into_iter().all(|kind| {
+                let Some(effort) = self.settings().effort(kind) else { return true };
+                let reading = Reading { margin: self.settings().margin, ..Reading::new(effort.tolerance) };
+                self.caches.slots[kind].covers(place, &reading)
+            })
     }
 
     /// How a cache is read to see where records are missing.
@@ -409,7 +421,7 @@ impl<'s, F> Filling<'s, F> {
                 } else if let Some((effort, seed)) = self.caches.photon_effort()
                     && !self.memory.photons.is_made_for(&effort, seed)
                 {
-                    self.is_cut |= self.memory.photons.reset(&effort).is_err();
+                    self.is_cut |= self.memory.photons.prepare(&effort, seed).is_err();
                     self.shoot_more();
                 } else {
                     self.begin(0);
@@ -446,6 +458,7 @@ impl<'s, F> Filling<'s, F> {
             }
             Round::Again { from } => {
                 self.blend(from as usize);
+                self.count_estimates();
                 let next = if self.take_round() { self.step } else { self.step + 1 };
                 self.begin(next);
             }
@@ -464,6 +477,7 @@ impl<'s, F> Filling<'s, F> {
     /// Everything was done. A view whose memory was too small may miss something, and is filled again when it is asked for.
     fn complete(&mut self) {
         self.is_cut |= !self.is_cut && self.caches.views.push(self.view).is_err();
+        self.hold();
         for kind in Kind::ALL {
             self.caches.settled[kind] = self.caches.slots[kind].len();
         }

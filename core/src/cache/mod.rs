@@ -99,7 +99,7 @@ pub use presets::{ERROR_BOUNDS, MOST_REPAIRS, MOST_SAMPLES, USUAL_ERROR};
 pub use radius::{Limits, clamp_gradient, clearance, log_gradient_radius, neighbour_clamped, valid_radius};
 pub use readers::ScatteredLight;
 pub use record::{Attachment, Facing, Record};
-pub use refine::Refinement;
+pub use refine::{LevelPicture, Refinement};
 pub use room::{Room, Slots, room_for};
 pub use set_bytes::CachesError;
 pub use settings::{Effort, Settings};

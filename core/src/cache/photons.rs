@@ -130,8 +130,10 @@ pub struct PhotonGrid<'s> {
     moments: List<'s, Spectrum>,
     paths: u32,
     flights: u64,
-    /// How many paths were only counted, and up to which number light is brought; `None` while all are counted.
-    lit: Option<[u32; 2]>,
+    /// How many paths were only counted.
+    counted: u32,
+    /// Up to how many paths light is brought; `None` while they are only counted.
+    lit: Option<u32>,
     /// What all this was done for, and with which random numbers, once it is done.
     made_for: Option<(PhotonEffort, u64)>,
 }
@@ -171,22 +173,32 @@ impl PhotonGrid<'static> {
         walk: &crate::path::Settings,
         seed: u64,
     ) -> Self {
-        let (mut cells, mut deposits) = (Self::default(), List::default());
+        let mut cells = Self::default();
         // Growing memory is never full.
         let _ = cells.reset(effort);
-        while let Some(more) = cells.next_round(effort) {
+        cells.light(world, (effort, walk, seed));
+        cells
+    }
+
+    /// Shoots what is due.
+    fn light<M: Medium + ?Sized, S: Scene + ?Sized>(
+        &mut self,
+        world: &World<'_, M, S>,
+        (effort, walk, seed): (&PhotonEffort, &crate::path::Settings, u64),
+    ) {
+        let mut deposits = List::default();
+        while let Some(more) = self.next_round(effort) {
             for _ in 0..more {
                 deposits.clear();
-                let flights = cells.shoot(cells.paths, world, (effort, walk, seed), &mut deposits).unwrap_or(0);
-                cells.accept(deposits.as_slice(), 1, u64::from(flights));
+                let flights = self.shoot(self.paths, world, (effort, walk, seed), &mut deposits).unwrap_or(0);
+                self.accept(deposits.as_slice(), 1, u64::from(flights));
             }
         }
-        for number in 0..cells.len() as u32 {
-            if cells.is_whole(number, world.scene) {
-                cells.mark(&[number]);
+        for number in 0..self.len() as u32 {
+            if self.is_whole(number, world.scene) {
+                self.mark(&[number]);
             }
         }
-        cells
     }
 }
 
@@ -201,6 +213,7 @@ impl<'s> PhotonGrid<'s> {
             moments,
             paths: 0,
             flights: 0,
+            counted: 0,
             lit: None,
             made_for: None,
         }
@@ -231,9 +244,24 @@ impl<'s> PhotonGrid<'s> {
         size_of_val(self.cells.as_slice()) + size_of_val(self.moments.as_slice())
     }
 
+    /// Cells for such an effort: those that there are, if more photons are all that they lack, or dark ones.
+    pub(super) fn prepare(&mut self, effort: &PhotonEffort, seed: u64) -> Result<(), Full> {
+        let PhotonEffort { paths, flights, enough, .. } = *effort;
+        let is_less = |(before, of): (PhotonEffort, u64)| {
+            let is_more = before.paths <= paths && before.flights <= flights && before.enough <= enough;
+            of == seed && is_more && PhotonEffort { paths, flights, enough, ..before } == *effort
+        };
+        if !self.made_for.is_some_and(is_less) {
+            return self.reset(effort);
+        }
+        (self.lit, self.made_for) = (None, None);
+        Ok(())
+    }
+
     /// Dark cells that fill the bounds.
     pub(super) fn reset(&mut self, effort: &PhotonEffort) -> Result<(), Full> {
-        (self.paths, self.flights, self.counts, self.lit, self.made_for) = (0, 0, [0; 3], None, None);
+        (self.paths, self.flights, self.counted, self.counts) = (0, 0, 0, [0; 3]);
+        (self.lit, self.made_for) = (None, None);
         self.cells.clear();
         self.moments.clear();
         let Some((side, counts)) = effort.division() else { return Ok(()) };
@@ -255,7 +283,7 @@ impl<'s> PhotonGrid<'s> {
     /// Photons of the next round, no more than all before it; `None` after the last. First they are counted, so long that they are about [`COUNTED`]
     /// of all, then they bring light: as many as it takes until [`PhotonEffort::enough`] pass nearly every cell that walks may end in.
     pub(super) fn next_round(&mut self, effort: &PhotonEffort) -> Option<u32> {
-        let paths = self.paths;
+        let (paths, counted) = (self.paths, self.counted);
         if paths == 0 {
             let first = f64::from(FIRST).min(COUNTED * f64::from(effort.paths)) as u32;
             return (effort.paths > 0 && effort.flights > 0).then_some(first.max(1));
@@ -264,14 +292,14 @@ impl<'s> PhotonGrid<'s> {
         let per_path = (self.flights as f64 / f64::from(paths)).max(1.0);
         let most = effort.paths.min((effort.flights as f64 / per_path) as u32);
         if self.lit.is_none() {
-            let wanted = f64::from(paths) * (1.0 + self.times(effort.enough));
-            let counted = (COUNTED * wanted.min(f64::from(most))) as u32;
-            if paths < counted {
-                return Some(paths.min(counted - paths));
+            let wanted = f64::from(counted) * (1.0 + self.times(effort.enough));
+            let due = (COUNTED * wanted.min(f64::from(most))) as u32;
+            if counted < due {
+                return Some(counted.min(due - counted));
             }
-            self.lit = Some([paths, most.min(wanted as u32)]);
+            self.lit = Some(most.min(wanted as u32));
         }
-        let end = self.lit.map_or(0, |[_, end]| end.min(most));
+        let end = self.lit.map_or(0, |end| end.min(most));
         (paths < end).then(|| paths.min(end - paths))
     }
 
@@ -357,6 +385,7 @@ impl<'s> PhotonGrid<'s> {
         let stride = self.stride();
         let (cells, moments) = (self.cells.as_mut_slice(), self.moments.as_mut_slice());
         if self.lit.is_none() {
+            self.counted += paths;
             for deposit in deposits {
                 let Some(cell) = cells.get_mut(deposit.cell as usize) else { continue };
                 if cell.paths == 0 {
@@ -445,7 +474,7 @@ impl<'s> PhotonGrid<'s> {
         let index = self.cell_of(point)?;
         let cell = self.trusted(index)?;
         let basis = TurningBasis::new(to_eye, self.degree);
-        let paths = self.lit.map_or(0, |[counted, _]| self.paths - counted);
+        let paths = self.paths - self.counted;
         if paths == 0 {
             return None;
         }
@@ -517,7 +546,7 @@ mod tests {
     use super::*;
     use crate::host::Hit;
     use crate::light::PointLight;
-    use crate::medium::Homogeneous;
+    use crate::medium::{Homogeneous, Placed, Region};
     use crate::path;
     use crate::phase::Lobe;
     use crate::surface::Surface;
@@ -582,5 +611,33 @@ mod tests {
         let change = at(0.0, turned).0.radiance[0] - ahead.radiance[0];
         let told = at(0.0, (away + turned).normalize()).1.channel(0).dot(turned - away);
         assert!((change / told - 1.0).abs() < 0.01, "{change} {told}");
+    }
+
+    /// A finer level goes on where a coarser one has ended; with another division or other random numbers all begins anew.
+    #[test]
+    fn more_photons_come_to_those_that_there_are() {
+        let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::ONE, Phase::ISOTROPIC).unwrap();
+        let ball = Placed::new(fog, Region::sphere(Vec3::ZERO, 1.0).unwrap());
+        let sky = [Light::Constant(Spectrum::ONE)];
+        let world = World { medium: &ball, scene: &crate::host::Empty, lights: (&sky).into() };
+        let walk = path::Settings::default();
+        let mut cells = PhotonGrid::lit(&world, &effort(2_000), &walk, 1);
+        cells.finish(&effort(2_000), 1);
+        assert_eq!(cells.paths(), 2_000);
+        cells.prepare(&effort(100_000), 1).unwrap();
+        assert_eq!((cells.paths(), cells.is_made()), (2_000, false));
+        cells.light(&world, (&effort(100_000), &walk, 1));
+        assert_eq!(cells.paths(), 100_000);
+        let counted = f64::from(cells.counted) / 100_000.0;
+        assert!((counted - COUNTED).abs() < 0.01, "{counted}");
+        let (light, _) = cells.scattered(Vec3::splat(0.1), Vec3::Z, &ball.properties(Vec3::ZERO)).unwrap();
+        assert!((light.radiance[0] - 1.0).abs() < 0.05, "{light:?}");
+        for (other, seed) in [(PhotonEffort { cells: 6, ..effort(200_000) }, 1), (effort(200_000), 2), (effort(10), 1)]
+        {
+            cells.finish(&effort(100_000), 1);
+            cells.prepare(&other, seed).unwrap();
+            assert_eq!(cells.paths(), 0);
+            cells.light(&world, (&effort(1), &walk, 1));
+        }
     }
 }

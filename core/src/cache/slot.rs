@@ -181,12 +181,12 @@ impl<'s> Slot<'s> {
         }
     }
 
-    /// Makes all radii smaller: see [`Cache::shrink`]. Whether the indices have room for them.
-    pub(super) fn shrink(&mut self, factor: f32, least: f32) -> bool {
+    /// Makes radii smaller: see [`Cache::shrink`]. Whether the indices have room for them.
+    pub(super) fn shrink(&mut self, radius: impl Fn(&Record) -> f32) -> bool {
         match self {
             Self::Off => true,
-            Self::Volume(cache) => cache.shrink(factor, least).is_ok(),
-            Self::Surface(cache) => cache.shrink(factor, least).is_ok(),
+            Self::Volume(cache) => cache.shrink(radius).is_ok(),
+            Self::Surface(cache) => cache.shrink(radius).is_ok(),
         }
     }
 

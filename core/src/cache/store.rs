@@ -417,10 +417,10 @@ impl<'s, E: Attachment> Cache<'s, E> {
         Ok(())
     }
 
-    /// Makes all radii `factor` times as large (at most 1), but none smaller than `least` (m) unless it is already.
-    pub(super) fn shrink(&mut self, factor: f32, least: f32) -> Result<(), Full> {
+    /// Gives each record the radius (m) that is wanted for it, where that is smaller.
+    pub(super) fn shrink(&mut self, radius: impl Fn(&Record) -> f32) -> Result<(), Full> {
         for record in self.records.as_mut_slice() {
-            record.radius = (record.radius * factor).max(least.min(record.radius));
+            record.radius = radius(record).min(record.radius);
         }
         self.finish()
     }

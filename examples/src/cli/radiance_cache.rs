@@ -7,7 +7,7 @@ use clap::{Arg, Args, ValueEnum};
 use fogbow::bytes::Crc;
 use fogbow::cache::{
     self, Asked, Audit, BiasMap, CachedRadiance, CachesError, Extrapolation, Filling, Findings, RadianceCaches,
-    RaySettings, Refinement,
+    RaySettings,
 };
 use fogbow::covariance::image_sampling::Plan;
 use fogbow::host::Medium;
@@ -37,6 +37,8 @@ use crate::camera::{Camera, Eye};
 use crate::error::SceneError;
 use crate::filter::FilterTable;
 use crate::world::{WithMedium, World};
+
+mod levels;
 
 /// Of `--method radiance-cache`.
 #[derive(Debug, Clone, Args)]
@@ -369,9 +371,8 @@ impl CacheJob<'_> {
     }
 }
 
-/// A picture and what it is made for, where time is limited.
-struct Level {
-    error: f32,
+/// A picture, and the caches that it was made from.
+struct Done {
     film: Film,
     filled: Filled,
     render: Outcome,
@@ -396,49 +397,67 @@ impl<M: Medium + Sync> Stages<'_, '_, M> {
         move |at| camera.ray(Vec2::from(at))
     }
 
-    /// Fills caches until nothing is missing, or `time` is up; audits them, and, where time is not limited, makes anew what is wrong.
-    fn fill(
+    /// What the picture asks caches for.
+    fn asked(&self) -> Asked<impl Fn([f32; 2]) -> Ray + Copy + use<M>> {
+        let (ray, width) = (self.rays(), self.job.film.width() as f32);
+        let pixel = ray([0.5, 0.5]).direction.angle_between(ray([0.5 + 1.0 / width, 0.5]).direction);
+        Asked::View { ray, pixel }
+    }
+
+    /// Fills caches until nothing is missing, or `time` is up.
+    fn run<F: Fn([f32; 2]) -> Ray + Sync>(
         &self,
-        mut caches: RadianceCaches<'static>,
-        error: f32,
+        filling: &mut Filling<'static, F>,
         time: Option<Duration>,
         spent: &mut Spent,
-    ) -> Filled {
+    ) -> Ending {
         let (job, world) = (self.job, self.world());
-        let ray = self.rays();
-        let width = job.film.width() as f32;
-        let apart = ray([0.5, 0.5]).direction.angle_between(ray([0.5 + 1.0 / width, 0.5]).direction);
-        let tell = |filling: &Filling<'_, _>| {
+        let ran = threads::run(filling, &world, &self.pool, job.control, time, |filling| {
             let jobs = Rounds::<LitWorld<'_, M, World<'_>>>::jobs(filling);
             (job.tell)(
                 Rounds::<LitWorld<'_, M, World<'_>>>::stage(filling),
                 jobs.start as f32 / jobs.end.max(1) as f32,
             );
-        };
+        });
+        add_times(&mut spent.filled, ran.stages);
+        spent.computed += cache::Kind::ALL.into_iter().map(|kind| filling.computed(kind)).sum::<u64>();
+        spent.record_noise = filling.record_noise().or(spent.record_noise);
+        ran.ending
+    }
+
+    /// Compares caches with path tracing, along so many rays if time allows; `None` if that was stopped.
+    fn audit(
+        &self,
+        caches: &RadianceCaches<'static>,
+        rays: u32,
+        time: Option<Duration>,
+        spent: &mut Spent,
+    ) -> Option<(Findings, Box<BiasMap>)> {
+        let mut audit = Audit::new(caches, self.rays(), rays);
+        let tell = |_: &Audit<'_, '_, _>| (self.job.tell)("audit", 0.0);
+        let ran = threads::run(&mut audit, &self.world(), &self.pool, self.job.control, time, tell);
+        add_times(&mut spent.filled, ran.stages);
+        (ran.ending != Ending::Cancelled).then(|| (audit.findings(), Box::new(audit.map())))
+    }
+
+    /// Fills caches until nothing is missing; audits them, and makes anew what is wrong.
+    fn fill(&self, mut caches: RadianceCaches<'static>, error: f32, spent: &mut Spent) -> Filled {
+        let (job, world) = (self.job, self.world());
         let (mut repaired, mut noise) = (Vec::new(), error);
         loop {
-            let clock = Stopwatch::start();
-            let mut filling = caches.fill(Asked::View { ray, pixel: apart });
-            let ran = threads::run(&mut filling, &world, &self.pool, job.control, time, tell);
-            add_times(&mut spent.filled, ran.stages);
-            spent.computed += cache::Kind::ALL.into_iter().map(|kind| filling.computed(kind)).sum::<u64>();
+            let mut filling = caches.fill(self.asked());
+            let ending = self.run(&mut filling, None, spent);
             let audit_rays = job.arguments.audit.unwrap_or_else(|| filling.audit_rays());
-            spent.record_noise = filling.record_noise().or(spent.record_noise);
             noise = noise.min(filling.noise_goal(error, job.film.width() * job.film.height()));
             let measured = Measured { noise, audit_rays };
             caches = filling.finish();
-            if ran.ending != Ending::Done || audit_rays == 0 || job.paths.max_scatterings == 0 {
-                return Filled::new(caches, (ran.ending, measured), None);
+            if ending != Ending::Done || audit_rays == 0 || job.paths.max_scatterings == 0 {
+                return Filled::new(caches, (ending, measured), None);
             }
-            let mut audit = Audit::new(&caches, ray, audit_rays);
-            let share = time.map(|_| Refinement::audit_time(Duration::from_secs_f64(clock.elapsed().wall)));
-            let ran = threads::run(&mut audit, &world, &self.pool, job.control, share, |_| {});
-            add_times(&mut spent.filled, ran.stages);
-            if ran.ending == Ending::Cancelled {
-                return Filled::new(caches, (ran.ending, measured), None);
-            }
-            let (findings, map) = (audit.findings(), Box::new(audit.map()));
-            let is_over = time.is_some() || repaired.len() as u32 >= cache::MOST_REPAIRS;
+            let Some((findings, map)) = self.audit(&caches, audit_rays, None, spent) else {
+                return Filled::new(caches, (Ending::Cancelled, measured), None);
+            };
+            let (ray, is_over) = (self.rays(), repaired.len() as u32 >= cache::MOST_REPAIRS);
             if is_over || !caches.drop_wrong((&findings, &map), error, ray, &world) {
                 return Filled::new(caches, (Ending::Done, measured), Some(Audited { error, findings, map, repaired }));
             }
@@ -448,18 +467,15 @@ impl<M: Medium + Sync> Stages<'_, '_, M> {
 
     /// Caches that were filled before, and audited anew: only what is said of them depends on that.
     fn taken_up(&self, bytes: &[u8], measured: Measured, error: f32, spent: &mut Spent) -> Result<Filled, Failure> {
-        let (job, world) = (self.job, self.world());
+        let job = self.job;
         let mut caches = RadianceCaches::new(job.settings(&self.outline, error));
         caches.read(bytes, KEPT).map_err(|error| format!("the caches that were kept: {error}"))?;
         if job.is_part || measured.audit_rays == 0 || job.paths.max_scatterings == 0 {
             return Ok(Filled::new(caches, (Ending::Done, measured), None));
         }
-        let mut audit = Audit::new(&caches, self.rays(), measured.audit_rays);
-        let ran = threads::run(&mut audit, &world, &self.pool, job.control, None, |_| (job.tell)("audit", 0.0));
-        add_times(&mut spent.filled, ran.stages);
-        let (findings, map) = (audit.findings(), Box::new(audit.map()));
-        let audited = Audited { error, findings, map, repaired: Vec::new() };
-        Ok(Filled::new(caches, (Ending::Done, measured), (ran.ending == Ending::Done).then_some(audited)))
+        let found = self.audit(&caches, measured.audit_rays, None, spent);
+        let audited = found.map(|(findings, map)| Audited { error, findings, map, repaired: Vec::new() });
+        Ok(Filled::new(caches, (Ending::Done, measured), audited))
     }
 
     /// Adds samples to a film.
@@ -493,7 +509,9 @@ impl<M: Medium + Sync> Stages<'_, '_, M> {
                 caches.radiance_beyond(&ray, &world, rng)
             };
             sample.tally.look_up(seen.lookups, seen.misses);
-            if has_layers {
+            if layers.len() == levels::LAYERS.len() {
+                layers.copy_from_slice(&[seen.total(), levels::cached(&seen, &caches.reader())]);
+            } else if has_layers {
                 let parts = [
                     seen.total(),
                     seen.emitted,
@@ -510,50 +528,6 @@ impl<M: Medium + Sync> Stages<'_, '_, M> {
             weigh(layers, weight);
         })?)
     }
-
-    /// Pictures of falling error, until the time granted is up or the error asked for is reached: the last that is complete. All time counts.
-    fn timed(&self, time: Duration, spent: &mut Spent) -> Result<Level, Failure> {
-        let (job, clock) = (self.job, Stopwatch::start());
-        let left = || time.saturating_sub(Duration::from_secs_f64(clock.elapsed().wall));
-        let finest = job.arguments.error.unwrap_or(cache::ERROR_BOUNDS[0]);
-        let mut refinement = Refinement::new(finest);
-        let mut best: Option<Level> = None;
-        let mut level = loop {
-            let (began, error) = (left(), refinement.error());
-            let caches = RadianceCaches::new(job.settings(&self.outline, error));
-            let filled = self.fill(caches, error, Some(refinement.granted(began)), spent);
-            if filled.ending != Ending::Done {
-                break best.ok_or(Stopped("caches"))?;
-            }
-            let mut film = Film::new(job.film.width(), job.film.height(), job.film.layers())?;
-            // Of a picture that a better one may replace, one sample of each pixel will do.
-            let settings = tiles::Settings { samples: 1, goal: None, time: Some(left()), ..*job.settings };
-            let render = self.picture(&mut film, &filled.caches, &settings)?;
-            let level = Level { error, film, filled, render };
-            if render.reason == tiles::Reason::Cancelled || !refinement.advance(began.saturating_sub(left()), left()) {
-                break level;
-            }
-            best = Some(level);
-        };
-        if job.control.is_cancelled() {
-            level.render.reason = tiles::Reason::Cancelled;
-            return Ok(level);
-        }
-        if left().is_zero() {
-            level.render.reason = tiles::Reason::TimeUp;
-            return Ok(level);
-        }
-        // Nothing is as good a use of the rest as less noise; down to the error asked for, if that is what caches are filled for.
-        let is_due = job.arguments.error.is_some_and(|due| level.error <= due);
-        let usual = is_due.then(|| level.filled.usual_goal());
-        let samples = job.settings.samples.min(if is_due { cache::MOST_SAMPLES } else { u32::MAX });
-        let goal = job.settings.goal.or(usual);
-        let settings = tiles::Settings { samples, goal, time: Some(left()), ..*job.settings };
-        let more = self.picture(&mut level.film, &level.filled.caches, &settings)?;
-        let (counters, seconds) = (level.render.counters + more.counters, level.render.seconds + more.seconds);
-        level.render = Outcome { counters, seconds, ..more };
-        Ok(level)
-    }
 }
 
 impl WithMedium for CacheJob<'_> {
@@ -566,7 +540,7 @@ impl WithMedium for CacheJob<'_> {
         let mut spent = Spent::default();
         let clock = Stopwatch::start();
         let (mut loaded, asked) = (clock.elapsed(), self.arguments.error());
-        let level = match self.settings.time {
+        let done = match self.settings.time {
             Some(time) if !self.arguments.has_files() => stages.timed(time, &mut spent)?,
             _ => {
                 let filled = if let Some((bytes, measured)) = self.keeper.and_then(Keeper::caches) {
@@ -576,7 +550,7 @@ impl WithMedium for CacheJob<'_> {
                 } else {
                     let caches = self.arguments.load(self.settings(&outline, asked), self.tag)?;
                     loaded = clock.elapsed();
-                    stages.fill(caches, asked, None, &mut spent)
+                    stages.fill(caches, asked, &mut spent)
                 };
                 let mut film = Film::new(self.film.width(), self.film.height(), self.film.layers())?;
                 if filled.ending == Ending::Cancelled {
@@ -594,14 +568,14 @@ impl WithMedium for CacheJob<'_> {
                 } else {
                     stages.picture(&mut film, &filled.caches, &settings)?
                 };
-                Level { error: asked, film, filled, render }
+                Done { film, filled, render }
             }
         };
         drop(stages);
         let clock = Stopwatch::start();
-        self.save(&level.filled.caches)?;
+        self.save(&done.filled.caches)?;
         let files = [loaded, clock.elapsed()];
-        let Level { film, filled: Filled { caches, audited, .. }, render, .. } = level;
+        let Done { film, filled: Filled { caches, audited, .. }, render } = done;
         *self.film = film;
         let Spent { filled, computed, record_noise } = spent;
         Ok(Cached { caches, filled, computed, record_noise, files, render, audited })

@@ -71,7 +71,7 @@ impl<F> Filling<'_, F> {
         if let Some(effort) = self.caches.settings.effort_mut(step.kind) {
             *effort = effort.nearer(factor);
         }
-        self.is_cut |= !self.caches.slots[step.kind].shrink(factor, effort.limits.min);
+        self.is_cut |= !self.caches.slots[step.kind].shrink(|record| (record.radius * factor).max(effort.limits.min));
         self.batch = [0, 0];
         self.next_batch();
     }

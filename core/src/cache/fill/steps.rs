@@ -34,6 +34,8 @@ impl<F> Filling<'_, F> {
             }
             match step.pass {
                 Pass::Make => {
+                    self.tighten((step, effort));
+                    let slot = &self.caches.slots[step.kind];
                     // Records added later must not share the random numbers of the first.
                     (self.computed, self.first) = (0, if slot.len() == 0 { 0 } else { mix(slot.len() as u64) });
                     (self.batch, self.shrunk) = ([0, 0], 0);
@@ -188,14 +190,19 @@ impl<F> Filling<'_, F> {
         let stride = slot.stride();
         for (i, estimate) in self.memory.estimates.as_slice().iter().enumerate() {
             self.all_computed[step.kind] += 1;
-            // More of an estimate that took more samples; of one that takes no more than those before it, its part of all.
-            let share = match step.pass {
-                Pass::Again { share, .. } => 1.0 - (1.0 - share) / estimate.effort,
-                _ => 1.0 / (self.again as f32 + 1.0 + (1.0 - SECOND) / estimate.effort),
-            };
-            let attached = attached(step.kind, estimate, self.memory.higher.as_slice(), i, stride);
             // Where memory was too small some jobs have left none.
             let offset = estimate.number as usize;
+            // More of an estimate that took more samples; of one that takes no more than those before it, its part of all.
+            let held = self.held[step.kind].over(from + offset, effort.samples);
+            let share = match (step.pass, held) {
+                (Pass::Again { share, .. }, None) => 1.0 - (1.0 - share) / estimate.effort,
+                // Where nothing stays of a first estimate, nothing stays of a coarser one.
+                (Pass::Again { share: 1.0, .. }, _) => 1.0,
+                (Pass::Again { .. }, Some(before)) => 1.0 / (1.0 + before),
+                (_, None) => 1.0 / (self.again as f32 + 1.0 + (1.0 - SECOND) / estimate.effort),
+                (_, Some(before)) => 1.0 / (self.again as f32 + 1.0 + before),
+            };
+            let attached = attached(step.kind, estimate, self.memory.higher.as_slice(), i, stride);
             if let Pass::Again { .. } = step.pass {
                 let effort = f64::from(estimate.effort);
                 let [sum, count] = &mut self.efforts[step.kind];
