@@ -55,7 +55,7 @@ def truth(scenes, arguments):
     cases, held = 0, 0
     for scene in scenes or common.every_scene() + matrix(os.path.join(arguments.store, "matrix")):
         image, statistics = render(scene, *CACHED, "--error", arguments.error, "--seed", arguments.seed, "--spp", arguments.spp)
-        if "audit" not in statistics:
+        if statistics.get("audit", {}).get("cached", {}).get("error") is None:
             print(f"{os.path.basename(scene):24s} --    {statistics['method']}: nothing is cached", flush=True)
             continue
         stated = statistics["audit"]["cached"]
@@ -70,10 +70,10 @@ def truth(scenes, arguments):
         bias = image.sum() / mean.sum() - 1
         # Light that is not cached has noise of its own: as of as many path traced samples at most.
         noise = spread(image - compare.smooth(image) + image.mean())
-        known = np.sqrt(error**2 + noise**2 + (stated["error"] or np.inf) ** 2)
+        known = np.sqrt(error**2 + noise**2 + stated["error"] ** 2)
         passes = abs(stated["bias"] - bias) <= 3 * known
         cases, held = cases + 1, held + passes
-        print(f"{os.path.basename(scene):24s} {verdict(passes)} stated {100 * stated['bias']:+.2f} ± {100 * (stated['error'] or np.inf):.2f} %  true {100 * bias:+.2f} "
+        print(f"{os.path.basename(scene):24s} {verdict(passes)} stated {100 * stated['bias']:+.2f} ± {100 * stated['error']:.2f} %  true {100 * bias:+.2f} "
               f"± {100 * np.hypot(error, noise):.2f} %  ({abs(stated['bias'] - bias) / known:.1f} s.e.)  repaired {len(statistics['audit']['repaired'])}", flush=True)
     print(f"{held} of {cases} within three standard errors ({100 * held / max(cases, 1):.0f} %)")
     return held < 0.97 * cases

@@ -4,10 +4,11 @@
     python3 tests/acceptance/covariance.py steps [--spp N] [--paths N]
     python3 tests/acceptance/covariance.py image [--spp N] [--paths N]
     python3 tests/acceptance/covariance.py beams [SCENE...] [--passes N]
+    python3 tests/acceptance/covariance.py equal [SCENE...] [--size N]
     python3 tests/acceptance/covariance.py bias [SCENE...]
     python3 tests/acceptance/covariance.py determinism
 
-Needs target/release/fogbow, numpy and OpenEXR; scenes are those of examples/scenes at 128x128. Errors are measured against
+Needs target/release/fogbow (or what FOGBOW_PROGRAM names), numpy and OpenEXR; scenes are those of examples/scenes at 128x128. Errors are measured against
 two independent converged renders A and B: the squared error of an image I is the mean of (I - A)(I - B), over squared
 light plus a twentieth of the picture's mean, so that the converged renders' own noise drops out.
 
@@ -19,6 +20,8 @@ beams        lantern, caustic, nave: relMSE of --kernel covariance over that of 
              the picture where the predicted density of samples is below its median (at most 0.5), in the other and in the tenth
              where it is highest, which holds the borders of shafts (at most 1.1), and at equal CPU time (below 1), where progressive
              beams' error is taken to fall with time as measured from half as many passes.
+equal        lantern, caustic, nave, two smoke boxes: relMSE of --kernel covariance over that of progressive beams in the CPU time that these take for
+             16, 64 and 256 passes, the grid included: at most 1.0, in the lantern 0.6; and the mean of the longest, beside path tracing's.
 bias         caustic: mean |relative difference| of blocks of 8x8 pixels in the smooth half of a mean of 8 seeds of --kernel covariance, whose
              pass radius does not narrow, to progressive beams of the same radius, at bounds of 0.32, 0.08, 0.02, 0.005: within the bound and
              two standard errors, and falling with it.
@@ -31,14 +34,14 @@ import numpy as np
 import OpenEXR
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-PROGRAM = pathlib.Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target")) / "release/fogbow"
+PROGRAM = os.environ.get("FOGBOW_PROGRAM") or pathlib.Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target")) / "release/fogbow"
 FOLDER = pathlib.Path(tempfile.mkdtemp(prefix="fogbow-covariance-"))
 MEDIUM = ("medium_single", "medium_multiple")
 
 
-def render(scene, name, *arguments):
+def render(scene, name, *arguments, size=128):
     image, statistics = FOLDER / f"{name}.exr", FOLDER / f"{name}.json"
-    subprocess.run([PROGRAM, "render", ROOT / f"examples/scenes/{scene}.xml", "--size", "128x128", "--aov", "-q", "-o", image,
+    subprocess.run([PROGRAM, "render", ROOT / f"examples/scenes/{scene}.xml", "--size", f"{size}x{size}", "--aov", "-q", "-o", image,
                     "--stats", statistics, *map(str, arguments)], check=True)
     channels = OpenEXR.File(str(image)).channels()
 
@@ -153,6 +156,31 @@ def beams(options):
     return failures
 
 
+def equal(options):
+    failures, method, size = 0, ("--method", "photon-beams"), options.size
+    for scene in options.scenes or ("lantern", "caustic", "nave", "smoke-box-homogeneous-anisotropic", "smoke-box-heterogeneous-isotropic"):
+        shot = lambda name, *ways: render(scene, f"{scene}-{name}", *ways, size=size)
+        truth = (*method, "--spp", 2048, "--radius", {"nave": 0.1}.get(scene, 0.008))
+        halves = [light(shot(f"truth-{s}", *truth, "--seed", s)[0]) for s in (101, 102)]
+        covariance = (*method, "--kernel", "covariance", "--seed", 7)
+        trial = shot("trial", *covariance, "--spp", 64)[1]
+        grid, each = trial["fill grid"], trial["render"] / 8
+        for passes in (16, 64, 256):
+            old = shot("old", *method, "--spp", 8 * passes, "--seed", 6)
+            time = sum(old[1].values())
+            new = shot("new", *covariance, "--spp", 8 * max(round((time - grid) / each), 1))
+            found = [max(squared(light(rendered[0]), halves), 1e-9) for rendered in (new, old)]
+            ratio, bound = found[0] / found[1], 0.6 if scene == "lantern" else 1.0
+            failures += report(f"{scene} {passes} passes", ratio <= bound, f"relMSE {found[0]:.5f} instead of {found[1]:.5f}: {ratio:.2f} "
+                               f"({sum(new[1].values()):.1f} s, {time:.1f} s)")
+        paths = [light(shot(f"paths-{s}", "--method", "path", "--spp", 512, "--seed", s)[0]).mean() for s in (201, 202)]
+        known = np.mean(paths)
+        means = light(new[0]).mean(), light(old[0]).mean(), np.mean(halves)
+        print(f"  {scene}: off path tracing's mean by " + ", ".join(f"{100 * (mean / known - 1):+.2f} %" for mean in means) +
+              f" (covariance, progressive, truth; halves of path tracing differ by {100 * abs(paths[0] / paths[1] - 1):.2f} %)", flush=True)
+    return failures
+
+
 def bias(options):
     failures = 0
     for scene in options.scenes or ("caustic",):
@@ -198,11 +226,12 @@ def determinism(_):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("what", choices=("steps", "image", "beams", "bias", "determinism"))
+    parser.add_argument("what", choices=("steps", "image", "beams", "equal", "bias", "determinism"))
     parser.add_argument("scenes", nargs="*")
     parser.add_argument("--spp", type=int, help="samples per pixel [default: steps 4, image 16]")
     parser.add_argument("--paths", type=int, help="photons of the grid [default: steps 1000000, image what the program takes]")
     parser.add_argument("--passes", type=int, default=8)
+    parser.add_argument("--size", type=int, default=64, help="of equal [default: 64]")
     options = parser.parse_args()
     return 1 if globals()[options.what](options) else 0
 

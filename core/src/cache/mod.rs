@@ -42,7 +42,7 @@
 //! | `evidence` | how far gradients can be believed; edges of the sky |
 //! | `eye` | [`places`] and [`radiance`] of eye rays |
 //! | `audit`, `bias_map` | [`Audit`]: how far pictures from caches are off; [`BiasMap`]: where |
-//! | `refine` | pictures of falling error, where time is limited |
+//! | `refine` | levels of falling error, where time is limited |
 //! | `room` | [`Slots`] and [`room_for`]: lent memory, and how much of it is needed |
 //! | [`bytes`] | caches as bytes, to be saved |
 

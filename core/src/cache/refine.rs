@@ -15,7 +15,7 @@ const POWER: f64 = 0.7;
 const STEEPER: f64 = 1.0;
 
 /// Bounds of it: noise goes with the root of time, and smaller radii make more records.
-const POWERS: [f64; 2] = [0.5, 3.0];
+const POWERS: [f64; 2] = [1.5, 3.0];
 
 /// Levels that are considered, from one to the next by the fourth root of a half.
 const LEVELS: i32 = 12;

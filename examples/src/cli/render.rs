@@ -223,7 +223,7 @@ pub(crate) fn render(arguments: &RenderArguments) -> Result<Rendered, Failure> {
         .for_film(arguments.wants_film());
     if keeper.is_asked() && arguments.time.is_some() && method == Method::RadianceCache {
         return Err(
-            "--checkpoint: radiance caching with --time makes several pictures, of which none can be gone on with; \
+            "--checkpoint: radiance caching with --time refines caches by the clock, and cannot be gone on with; \
                     leave --time out"
                 .into(),
         );

@@ -19,7 +19,7 @@ const COARSER: f32 = 0.5;
 pub(super) struct Held {
     /// How many they are.
     count: usize,
-    /// Samples of each, as multiples of those of a usual one.
+    /// Samples of a usual one, those of coarser levels by what they count.
     samples: f32,
     /// What is done to their radii before new ones are made.
     tighter: Option<Tighter>,

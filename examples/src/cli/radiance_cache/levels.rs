@@ -82,35 +82,15 @@ impl Growing {
 
     /// The picture.
     fn picture(&self, like: &Film) -> Result<Film, Failure> {
-        let (width, height) = (like.width(), like.height());
-        let means = |film: &Film| (0..film.layers().len()).filter_map(|layer| film.mean(layer)).collect::<Vec<_>>();
-        let (all, before) = (means(&self.film), means(&self.before));
-        let mut picture = Film::new(width, height, like.layers())?;
+        let layers: Vec<_> = (0..self.film.layers().len()).filter_map(|layer| self.layer(layer)).collect();
+        let mut picture = Film::new(like.width(), like.height(), like.layers())?;
         let mut colours = vec![Spectrum::ZERO; like.layers().len()];
-        for (at, y, x) in
-            (0..height).flat_map(|y| (0..width).map(move |x| (y, x))).zip(0_usize..).map(|((y, x), at)| (at, y, x))
-        {
-            let [count, earlier] = [&self.film, &self.before].map(|film| film.count(x, y));
-            if count == 0 {
-                continue;
-            }
-            // Of a layer the mean of those samples that count.
-            let mean = |layer: usize| {
-                let all = all[layer].pixels[at];
-                if !self.cached[layer] || count == earlier {
-                    return all;
-                }
-                let [count, earlier] = [f64::from(count), f64::from(earlier)];
-                let (kept, gone) = ((count / (count - earlier)) as f32, (earlier / (count - earlier)) as f32);
-                all * kept - before[layer].pixels[at] * gone
-            };
-            let mut total = all[0].pixels[at];
-            for layer in 1..self.cached.len() {
-                let light = mean(layer);
-                total += light - all[layer].pixels[at];
-                if let Some(colour) = colours.get_mut(layer) {
-                    *colour = light;
-                }
+        let pixels = (0..like.height()).flat_map(|y| (0..like.width()).map(move |x| (x, y)));
+        for (at, (x, y)) in pixels.enumerate().filter(|&(_, (x, y))| self.film.count(x, y) > 0) {
+            let moved = |(all, counted): &(Image, Image)| counted.pixels[at] - all.pixels[at];
+            let total = layers[0].0.pixels[at] + layers[1..].iter().map(moved).sum::<Spectrum>();
+            for (colour, (_, counted)) in colours.iter_mut().zip(&layers) {
+                *colour = counted.pixels[at];
             }
             // Differences may round to less than nothing.
             colours[0] = total.max(Spectrum::ZERO);
@@ -118,19 +98,56 @@ impl Growing {
         }
         Ok(picture)
     }
+
+    /// Means of a layer: of all samples, and of those that count.
+    fn layer(&self, layer: usize) -> Option<(Image, Image)> {
+        let all = self.film.mean(layer)?;
+        let mut counted = all.clone();
+        if self.cached[layer] {
+            let before = self.before.mean(layer)?;
+            for (at, (pixel, before)) in (0..).zip(counted.pixels.iter_mut().zip(&before.pixels)) {
+                let (x, y) = (at % all.width, at / all.width);
+                let [count, earlier] = [&self.film, &self.before].map(|film| f64::from(film.count(x, y)));
+                if count > earlier {
+                    let [kept, gone] = [count, earlier].map(|count_of| (count_of / (count - earlier)) as f32);
+                    *pixel = *pixel * kept - *before * gone;
+                }
+            }
+        }
+        Some((all, counted))
+    }
+
+    /// The light of all samples that does not come from caches, and all light.
+    fn sampled(&self) -> Option<(Vec<f64>, Vec<f64>)> {
+        let light = |layer| Some(self.film.mean(layer)?.pixels.iter().map(|pixel| f64::from(pixel.mean())).collect());
+        let all: Vec<f64> = light(0)?;
+        let mut sampled = all.clone();
+        for layer in (0..self.cached.len()).filter(|&layer| self.cached[layer]) {
+            sampled.iter_mut().zip(light(layer)?).for_each(|(sum, cached): (&mut f64, f64)| *sum -= cached);
+        }
+        Some((sampled, all))
+    }
 }
 
-/// Relative noise of one sample of a pixel, of the mean of one and that of two.
-fn noise_between(one: &Image, two: &Image) -> f32 {
-    let mean = two.pixels.iter().map(|pixel| f64::from(pixel.mean())).sum::<f64>() / two.pixels.len() as f64;
-    // Fireflies say nothing of the others.
-    let square = |(one, two): (&Spectrum, &Spectrum)| {
-        let [one, two] = [one, two].map(|pixel| f64::from(pixel.mean()));
-        let light = two * two + 0.01 * mean * mean;
-        if light > 0.0 { (2.0 * (two - one) * (two - one) / light).min(4.0) } else { 0.0 }
+/// Relative noise of one sample of a pixel, of what was sampled by one and by two, and all light.
+fn noise_between(one: &[f64], two: &[f64], light: &[f64], width: usize) -> f32 {
+    /// Pixels to either side over which light is averaged.
+    const AROUND: usize = 2;
+    let (height, mean) = (light.len() / width, light.iter().sum::<f64>() / light.len() as f64);
+    let around = |at: usize| {
+        let (x, y) = (at % width, at / width);
+        let rows = y.saturating_sub(AROUND)..(y + AROUND + 1).min(height);
+        let columns = x.saturating_sub(AROUND)..(x + AROUND + 1).min(width);
+        let count = (rows.len() * columns.len()) as f64;
+        rows.flat_map(|y| &light[y * width + columns.start..y * width + columns.end]).sum::<f64>() / count
     };
-    let sum: f64 = one.pixels.iter().zip(&two.pixels).map(square).sum();
-    (sum / two.pixels.len() as f64).sqrt() as f32
+    let square = |at: usize| {
+        let (apart, light) = (two[at] - one[at], around(at));
+        let light = light * light + 0.01 * mean * mean;
+        // Fireflies say nothing of the others.
+        if light > 0.0 { (2.0 * apart * apart / light).min(1.0) } else { 0.0 }
+    };
+    ((0..light.len()).map(square).sum::<f64>() / light.len() as f64).sqrt() as f32
 }
 
 impl<M: Medium + Sync> Stages<'_, '_, M> {
@@ -154,11 +171,12 @@ impl<M: Medium + Sync> Stages<'_, '_, M> {
         samples: u32,
         time: Duration,
     ) -> Result<Reason, Failure> {
-        let one = (growing.film.min_count() == 1).then(|| growing.film.mean(0)).flatten();
+        let one = (growing.film.min_count() == 1).then(|| growing.sampled()).flatten();
         let settings = tiles::Settings { samples, goal: None, time: Some(time), ..*self.job.settings };
         let more = self.picture(&mut growing.film, caches, &settings)?;
-        if let (Some(one), Some(two)) = (one, growing.film.mean(0).filter(|_| growing.film.min_count() == 2)) {
-            growing.noise = Some(noise_between(&one, &two));
+        let two = (growing.film.min_count() == 2).then(|| growing.sampled()).flatten();
+        if let Some(((one, _), (two, light))) = one.zip(two) {
+            growing.noise = Some(noise_between(&one, &two, &light, growing.film.width() as usize));
         }
         Ok(growing.add(more))
     }
@@ -234,5 +252,40 @@ impl<M: Medium + Sync> Stages<'_, '_, M> {
         }
         let render = render.ok_or(Stopped("caches"))?;
         Ok(Done { film: growing.picture(job.film)?, filled, render })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn grey(light: &[f32]) -> Vec<Spectrum> {
+        light.iter().map(|&light| Spectrum::splat(light)).collect()
+    }
+
+    #[test]
+    fn what_is_sampled_is_of_all_samples_and_what_is_cached_of_the_last_caches() {
+        let none = Caches { single: None, surface: None, multiple: None, irradiance: None };
+        let film = Film::new(2, 1, &["total"]).unwrap();
+        let mut growing = Growing::new(&film, &none).unwrap();
+        growing.film.add(0, 0, &grey(&[10.0, 4.0]));
+        growing.film.add(1, 0, &grey(&[10.0, 4.0]));
+        growing.before = growing.film.clone();
+        growing.film.add(0, 0, &grey(&[9.0, 1.0]));
+        // Of 6 and 8 sampled the mean, and of 4 and 1 cached the last; where there is no other, the first.
+        assert_eq!(growing.picture(&film).unwrap().mean(0).unwrap().pixels, grey(&[8.0, 10.0]));
+        let (sampled, all) = growing.sampled().unwrap();
+        assert_eq!((sampled, all), (vec![7.0, 6.0], vec![9.5, 10.0]));
+    }
+
+    #[test]
+    fn noise_of_a_sample_is_that_between_two() {
+        // Means of two samples that differ by 0.2 either way lie 0.1 from the first.
+        let apart = |at: usize| if at % 2 == 0 { 0.1 } else { -0.1 };
+        let light = vec![1.0; 12];
+        let one: Vec<f64> = (0..12).map(|at| 1.0 + apart(at)).collect();
+        let noise = noise_between(&one, &light, &light, 4);
+        assert!((f64::from(noise) - (0.02_f64 / 1.01).sqrt()).abs() < 1e-6, "{noise}");
+        assert_eq!(noise_between(&[0.0; 4], &[0.0; 4], &[0.0; 4], 2), 0.0);
     }
 }
