@@ -7,6 +7,7 @@
     FOGBOW_REFERENCE=FOLDER python3 tests/acceptance/cache.py reuse       [--size WxH] [--noise E]
     FOGBOW_REFERENCE=FOLDER python3 tests/acceptance/cache.py determinism [SCENE...]
     FOGBOW_REFERENCE=FOLDER python3 tests/acceptance/cache.py cost        [SCENE...]
+    FOGBOW_REFERENCE=FOLDER python3 tests/acceptance/cache.py levels      [SCENE...]
 
 FOLDER and what must be built and installed: see ground.py. SCENE is a name in public/. CPU seconds are those of all
 phases of filling and of the rendering, without reading, building the tree and writing. --store keeps long renders.
@@ -31,6 +32,8 @@ cost         CPU time of a record and of a look-up, their ratio (100 to 1000 in 
              the same points and connects the same lights, divided by the number of look-ups.
 
 Exit status 1 when a line fails.
+levels       error after --time 0.5 to 64 on one thread: it falls, and is 15 % at most after 2 s. On a machine that others use the clock is not
+             processor time.
 """
 import argparse, os, subprocess, sys, tempfile
 import numpy as np
@@ -222,6 +225,23 @@ def determinism(scenes, _):
     return failures
 
 
+def levels(scenes, _):
+    failures = 0
+    for scene in scenes or CORNELL:
+        truth, last = Stored(scene), np.inf
+        for time in (0.5, 1, 2, 4, 8, 16, 32, 64):
+            image, statistics = render(scene, *CACHED, "--time", time, "--threads", 1)
+            error, audit = 100 * np.sqrt(max(truth.relative_square(image), 0)), statistics.get("audit")
+            made_for = "" if audit is None else f"made for {100 * audit['made_for']:.1f} %, "
+            # The first picture is always finished, so short times may give the same.
+            passes = error <= 1.02 * last and (time < 2 or error <= 15)
+            failures += not passes
+            print(f"{scene:24s} {verdict(passes)} --time {time:4g}: {error:6.2f} % in {cpu(statistics, ['fill', 'audit', 'render']):.1f} CPU s, {made_for}"
+                  f"{statistics['samples_per_pixel']:g} samples", flush=True)
+            last = error
+    return failures
+
+
 def cost(scenes, _):
     for scene in scenes or CORNELL + ["spot-shafts", "room-plume", "nave-shafts"]:
         # As many samples for both: by default there are more where nothing is cached.
@@ -239,7 +259,7 @@ def cost(scenes, _):
 
 
 if __name__ == "__main__":
-    what = {f.__name__: f for f in (accuracy, speed, flicker, reuse, determinism, cost)}
+    what = {f.__name__: f for f in (accuracy, speed, flicker, reuse, determinism, cost, levels)}
     parser = argparse.ArgumentParser(usage=__doc__)
     parser.add_argument("what", choices=what)
     parser.add_argument("scenes", nargs="*", metavar="SCENE")

@@ -281,7 +281,7 @@ mod tests {
     #[test]
     fn noise_of_a_sample_is_that_between_two() {
         // Means of two samples that differ by 0.2 either way lie 0.1 from the first.
-        let apart = |at: usize| if at % 2 == 0 { 0.1 } else { -0.1 };
+        let apart = |at: usize| if at.is_multiple_of(2) { 0.1 } else { -0.1 };
         let light = vec![1.0; 12];
         let one: Vec<f64> = (0..12).map(|at| 1.0 + apart(at)).collect();
         let noise = noise_between(&one, &light, &light, 4);
