@@ -45,16 +45,8 @@ pub struct Settings {
 
 impl Default for Settings {
     fn default() -> Self {
-        Self {
-            samples: 16,
-            goal: None,
-            time: None,
-            threads: 0,
-            seed: 0,
-            sequence: Sequence::default(),
-            tile: 8,
-            share: Share::Whole,
-        }
+        let share = Share::Whole;
+        Self { samples: 16, goal: None, time: None, threads: 0, seed: 0, sequence: Sequence::default(), tile: 8, share }
     }
 }
 
@@ -313,7 +305,9 @@ impl<'a> Render<'a> {
         if done >= self.samples || self.tiles.as_ref().is_none_or(Tiles::is_done) {
             return Reason::Done;
         }
-        let mut until = done.saturating_add(1).min(self.samples);
+        // A part is no picture to look at on the way, and samples of one pixel in a row find more in the processor's caches.
+        let is_whole = self.settings.share == Share::Whole;
+        let mut until = if is_whole { done.saturating_add(1).min(self.samples) } else { self.samples };
         let mut is_begun = false;
         if let (Some(_), Some(tiles)) = (self.control.resume, &self.tiles) {
             // A goal is judged where passes end: so that which was left is taken to its end.

@@ -137,6 +137,8 @@ pub(crate) struct GridJob<'a> {
     pub(crate) statistics: &'a mut Statistics,
     /// What keeps the grid, and may have one.
     pub(crate) keeper: Option<&'a Keeper<'a>>,
+    /// Whether the grid is all that is wanted.
+    pub(crate) is_fill: bool,
 }
 
 impl WithMedium for GridJob<'_> {
@@ -180,7 +182,7 @@ impl WithMedium for GridJob<'_> {
         if let Some(file) = &arguments.grid_out {
             statistics.time("write grid", || write(file, &grid.to_bytes(tag)))?;
         }
-        if let Some(keeper) = self.keeper {
+        if let Some(keeper) = self.keeper.filter(|keeper| keeper.wants_filled(self.is_fill)) {
             keeper.keep_grid(grid.to_bytes(KEPT));
         }
         statistics.bytes.push(("covariance grid".to_owned(), grid.bytes() as u64));

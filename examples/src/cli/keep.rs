@@ -178,6 +178,11 @@ impl<'a> Keeper<'a> {
         self.arguments.checkpoint.is_some()
     }
 
+    /// Whether caches and grids are kept: not those that lie in another file already. `is_fill` if they are all that is wanted.
+    pub(super) fn wants_filled(&self, is_fill: bool) -> bool {
+        is_fill || self.is_asked() && self.filled.is_none()
+    }
+
     /// Caches are filled: from now on they belong to what is kept.
     pub(super) fn keep_caches(&self, bytes: Vec<u8>, measured: Measured) {
         *self.caches.borrow_mut() = (bytes, measured);

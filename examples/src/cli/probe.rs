@@ -140,6 +140,7 @@ fn hessian(arguments: &HessianArguments) -> Result<Ending, Failure> {
         control: &Control::default(),
         statistics: &mut statistics,
         keeper: None,
+        is_fill: false,
     })?;
     let grid = filled.view();
     let points = points(arguments, &grid)?;

@@ -557,7 +557,7 @@ impl WithMedium for CacheJob<'_> {
                     self.save(&filled.caches)?;
                     return Err(Stopped("caches").into());
                 }
-                if let Some(keeper) = self.keeper.filter(|keeper| self.is_fill || keeper.is_asked()) {
+                if let Some(keeper) = self.keeper.filter(|keeper| keeper.wants_filled(self.is_fill)) {
                     keeper.keep_caches(filled.caches.to_bytes(KEPT), filled.measured);
                 }
                 let goal = self.settings.goal.or_else(|| self.has_usual_goal.then(|| filled.usual_goal()));

@@ -258,6 +258,7 @@ pub(crate) fn render(arguments: &RenderArguments) -> Result<Rendered, Failure> {
             control: &control,
             statistics: &mut statistics,
             keeper: Some(&keeper),
+            is_fill: arguments.is_fill,
         })?)
     } else {
         None

@@ -65,6 +65,7 @@ fn fill(plan: &Plan, edge: u32, paths: u64, seed: u64) -> Result<Filled, Failure
         control: &Control::default(),
         statistics: &mut statistics,
         keeper: None,
+        is_fill: false,
     })?;
     let cpu = statistics.phases.iter().map(|(_, s)| s.cpu.unwrap_or(s.wall)).sum();
     Ok(Filled { grid, cpu })
