@@ -53,6 +53,9 @@ impl RenderArguments {
             let is_idle = self.parts.split.is_some();
             return if is_idle { Err("--split has no effect without --part".into()) } else { Ok(()) };
         }
+        if self.is_fill {
+            return Err("--part: a fill is made once, and all parts read it; leave --part out".into());
+        }
         if self.output.is_empty() || !self.output.iter().all(|file| is_film(file)) {
             return Err("--part: a part is no picture; -o PART.fogbow takes it, for fogbow merge".into());
         }

@@ -175,5 +175,7 @@ fn parts_that_would_not_add_up_are_refused() {
         assert_eq!(output.status.code(), Some(2), "{options:?}");
         assert!(said(&output).contains(words), "{options:?}: {}", said(&output));
     }
+    let fill = folder.run(&["fill", SCENE, "-q", "--part", "1/2", "-o", "a.fogbow"]);
+    assert!(said(&fill).contains("a fill is made once"), "{}", said(&fill));
     assert!(std::fs::read_dir(&folder.0).unwrap().next().is_none());
 }
