@@ -107,6 +107,15 @@ impl<Q, C> Tiles<'_, Q, C> {
     }
 
     /// Index of the first sample of a pixel that is taken: 0 but for parts of samples.
+    ///
+    /// ```
+    /// # #[cfg(feature = "alloc")] {
+    /// # use fogbow::{picture::{Settings, Share, Tiles}, sampling::Independent};
+    /// # let settings = Settings { size: [16, 8], layers: 1, samples: 64, goal: None, seed: 0, tile: 8 };
+    /// let tiles = Tiles::<'_, _, ()>::new(settings, Independent).of_share(Share::Samples { part: 1, of: 4 }, 1);
+    /// assert_eq!(tiles.first(), 16);
+    /// # }
+    /// ```
     #[must_use]
     pub fn first(&self) -> u32 {
         self.first
@@ -148,6 +157,15 @@ impl<Q, C> Tiles<'_, Q, C> {
     }
 
     /// How many pixels are to have samples.
+    ///
+    /// ```
+    /// # #[cfg(feature = "alloc")] {
+    /// # use fogbow::{picture::{Settings, Share, Tiles}, sampling::Independent};
+    /// # let settings = Settings { size: [16, 8], layers: 1, samples: 64, goal: None, seed: 0, tile: 8 };
+    /// let tiles = Tiles::<'_, _, ()>::new(settings, Independent).of_share(Share::Tiles { part: 1, of: 2 }, 1);
+    /// assert_eq!(tiles.pixel_count(), 64);
+    /// # }
+    /// ```
     #[must_use]
     pub fn pixel_count(&self) -> u32 {
         (0..self.settings.pixels()).filter(|&pixel| self.has(self.place(pixel))).count() as u32
