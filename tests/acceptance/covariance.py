@@ -173,6 +173,8 @@ def equal(options):
             ratio, bound = found[0] / found[1], 0.6 if scene == "lantern" else 1.0
             failures += report(f"{scene} {passes} passes", ratio <= bound, f"relMSE {found[0]:.5f} instead of {found[1]:.5f}: {ratio:.2f} "
                                f"({sum(new[1].values()):.1f} s, {time:.1f} s)")
+        if scene == "caustic":
+            continue  # Paths from the eye never meet its lamp, which is a point behind glass.
         paths = [light(shot(f"paths-{s}", "--method", "path", "--spp", 512, "--seed", s)[0]).mean() for s in (201, 202)]
         known = np.mean(paths)
         means = light(new[0]).mean(), light(old[0]).mean(), np.mean(halves)
