@@ -25,7 +25,7 @@
 //! | | 24 n | of pixels, with a goal: sum as `f64` and samples before a pass, and after it |
 //!
 //! A sum is an integer of 16 bytes, of which most are zeros or the sign again: a byte tells how many follow, times 16, and how many zeros come before
-//! them; 0 is zero, and 1 all 16. Pixels of which other parts have the samples take little room that way.
+//! them; 0 is zero, and 1 all 16. A part of tiles has sums and samples of its own pixels alone.
 
 use alloc::vec::Vec;
 use core::fmt;
@@ -42,7 +42,7 @@ use crate::storage::{Full, List};
 pub const MAGIC: [u8; 8] = *b"\x89FOGPIC\n";
 
 /// Of the layout above.
-pub const VERSION: u32 = 2;
+pub const VERSION: u32 = 3;
 
 /// Length of the header (bytes).
 pub const HEADER_BYTES: usize = 120;
@@ -222,8 +222,13 @@ impl<Q, C> Tiles<'_, Q, C> {
         };
         share.iter().chain([&self.first]).for_each(|word| bytes.extend(word.to_le_bytes()));
         bytes.extend([0; 16]);
-        self.sums.as_slice().iter().flat_map(|sum| sum.0).for_each(|sum| put(sum, &mut bytes));
-        self.counts.as_slice().iter().for_each(|count| bytes.extend(count.to_le_bytes()));
+        let layers = settings.layers as usize;
+        let own = || (0..settings.pixels()).filter(|&pixel| self.has(self.place(pixel))).map(|pixel| pixel as usize);
+        for pixel in own() {
+            let sums = &self.sums.as_slice()[pixel * layers..][..layers];
+            sums.iter().flat_map(|sum| sum.0).for_each(|sum| put(sum, &mut bytes));
+        }
+        own().for_each(|pixel| bytes.extend(self.counts.as_slice()[pixel].to_le_bytes()));
         if let Some(noise) = &self.noise {
             noise.write(&mut bytes);
         }
@@ -312,8 +317,10 @@ pub fn described(bytes: &[u8]) -> Result<Described, PictureBytesError> {
         2 => Share::Samples { part, of },
         _ => return Err(PictureBytesError::Content),
     };
-    // Before anybody asks for the memory.
-    if least_bytes(&settings).is_none_or(|least| least > bytes.len() - HEADER_BYTES) {
+    // Before anybody asks for the memory. A part of tiles has a tile at least, which at a corner may be a pixel.
+    let parts = if kind == 1 { u64::from(of.max(1)).saturating_mul(u64::from(tile) * u64::from(tile)) } else { 1 };
+    let least = least_bytes(&settings).map(|least| least as u64 / parts.max(1));
+    if least.is_none_or(|least| least > (bytes.len() - HEADER_BYTES) as u64) {
         return Err(PictureBytesError::Content);
     }
     let counts = Counts { samples: all, non_finite };
@@ -357,8 +364,13 @@ impl<Q, C: Default> Tiles<'static, Q, C> {
         }
         let room = settings.room();
         let mut body = Reader(&bytes[HEADER_BYTES..]);
-        let sums: Vec<PixelSum> = (0..room.sums).map(|_| PixelSum([(); 3].map(|()| body.integer()))).collect();
-        let counts: Vec<u32> = (0..room.counts).map(|_| body.word()).collect();
+        let (mut sums, mut counts) = (alloc::vec![PixelSum::ZERO; room.sums], alloc::vec![0; room.counts]);
+        let own = || (0..settings.pixels()).filter(|&pixel| share.has(settings.tile_of(pixel))).map(|p| p as usize);
+        let layers = settings.layers as usize;
+        for pixel in own() {
+            sums[pixel * layers..][..layers].fill_with(|| PixelSum([(); 3].map(|()| body.integer())));
+        }
+        own().for_each(|pixel| counts[pixel] = body.word());
         let noise = settings.goal.map(|goal| Noise::new(goal, List::default(), List::default()));
         let mut tiles = Self::start(settings, source, (sums.into(), counts.into()), noise)
             .map_err(|Full| PictureBytesError::Content)?;
@@ -436,14 +448,14 @@ mod tests {
         }
     }
 
-    /// Two machines, each left in the middle and gone on with; of tiles, and of samples that begin in the middle.
+    /// Fifteen machines, each left again and again and gone on with; of as many tiles, some of them cut by the border, and of samples that begin in the middle.
     #[test]
     fn parts_left_anywhere_merge_to_the_bits_of_the_whole() {
         let mut whole: Tiles<'_, _, ()> = Tiles::new(SETTINGS, Independent);
         work::finish(&mut whole, &ramp, &mut TileOutput::default());
-        for share in [|part| Share::Tiles { part, of: 2 }, |part| Share::Samples { part, of: 2 }] {
+        for share in [|part| Share::Tiles { part, of: 15 }, |part| Share::Samples { part, of: 15 }] {
             let mut merged: Tiles<'_, _, ()> = Tiles::new(SETTINGS, Independent);
-            for part in [1, 0] {
+            for part in (0..15).rev() {
                 let mut tiles: Tiles<'_, _, ()> = Tiles::new(SETTINGS, Independent).of_share(share(part), 1);
                 while !tiles.is_done() {
                     for _ in 0..5 {

@@ -147,9 +147,15 @@ impl<Q, C> Tiles<'_, Q, C> {
         if !is_same {
             return;
         }
-        self.sums.as_mut_slice().iter_mut().zip(other.sums.as_slice()).for_each(|(sum, more)| sum.merge(more));
-        let counts = self.counts.as_mut_slice().iter_mut().zip(other.counts.as_slice());
-        counts.for_each(|(count, more)| *count = count.saturating_add(*more));
+        let layers = self.settings.layers as usize;
+        let own = (0..other.settings.pixels()).filter(|&pixel| other.share.has(other.settings.tile_of(pixel)));
+        for pixel in own.map(|pixel| pixel as usize) {
+            let all = pixel * layers..(pixel + 1) * layers;
+            let sums = self.sums.as_mut_slice()[all.clone()].iter_mut();
+            sums.zip(&other.sums.as_slice()[all]).for_each(|(sum, more)| sum.merge(more));
+            let count = &mut self.counts.as_mut_slice()[pixel];
+            *count = count.saturating_add(other.counts.as_slice()[pixel]);
+        }
         self.taken_samples.samples += other.taken_samples.samples;
         self.taken_samples.non_finite += other.taken_samples.non_finite;
         self.taken = 0;

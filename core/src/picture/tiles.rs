@@ -347,6 +347,12 @@ impl Settings {
         [span(tile % columns, self.size[0]), span(tile / columns, self.size[1])]
     }
 
+    /// Column and row of the tile of a pixel.
+    pub(super) fn tile_of(&self, pixel: u32) -> [u32; 2] {
+        let side = self.tile.max(1);
+        [pixel % self.size[0] / side, pixel / self.size[0] / side]
+    }
+
     pub(super) fn pixels(&self) -> u32 {
         self.size[0] * self.size[1]
     }
