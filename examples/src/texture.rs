@@ -165,6 +165,21 @@ impl Texture {
         }
     }
 
+    /// The value at a place where a number is due, not a colour: the same but for checkerboards, whose two parts Mitsuba 3.9.1
+    /// then has the other way round.
+    #[must_use]
+    pub fn number_at(&self, place: &Place<'_>) -> Spectrum {
+        match self {
+            Self::Checkerboard { parts, to_uv } => {
+                let is_high = |c: f32| c - c.floor() > 0.5;
+                let uv = to_uv.apply(place.uv);
+                parts[usize::from(is_high(uv.x) == is_high(uv.y))].number_at(place)
+            }
+            Self::Scaled(inner, factor) => inner.number_at(place) * *factor,
+            _ => self.at(place),
+        }
+    }
+
     /// A typical value: the mean over its picture, where it has one.
     #[must_use]
     pub fn mean(&self) -> Spectrum {

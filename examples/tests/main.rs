@@ -5,6 +5,7 @@ mod caches;
 mod gltf;
 mod pbrt;
 mod program;
+mod reads;
 mod shaders;
 mod shapes;
 mod shown;

@@ -2,7 +2,14 @@
 
 use std::path::Path;
 
+use fogbow::host::{Empty, Medium, Properties};
+use fogbow::math::{Ray, Vec3};
+use fogbow::path::{self, Settings};
+use fogbow::sampling::Generator;
+use fogbow::spectrum::Spectrum;
+use fogbow::world::World as LitWorld;
 use fogbow_examples::scene_file::{Findings, NoteKind, ReadOptions, SceneFile};
+use fogbow_examples::world::{Storage, WithMedium, World};
 
 fn read(text: &str, is_lenient: bool) -> Findings {
     let options = ReadOptions { is_lenient, ..ReadOptions::default() };
@@ -111,12 +118,14 @@ fn a_room_is_the_same_scene_as_in_mitsubas_words() {
             assert!(((b - a).cross(c - a).normalize().y - up).abs() < 1e-6);
         }
     }
-    assert_eq!(meshes[1].radiance, Some(fogbow::spectrum::Spectrum::splat(4.0)));
+    assert_eq!(meshes[1].radiance, Some(Spectrum::splat(4.0)));
 }
 
 #[test]
 fn grids_clouds_and_objects_are_read() {
-    let text = r#"WorldBegin
+    let text = r#"LookAt 0 0 30 0 0 0 0 1 0
+        Camera "perspective"
+        WorldBegin
         MakeNamedMedium "smoke" "string type" "uniformgrid" "integer nx" 2 "integer ny" 1 "integer nz" 1
             "float density" [ 1 0.5 ] "point3 p0" [ -1 0 0 ] "point3 p1" [ 1 1 1 ] "rgb sigma_s" [ 1 2 3 ] "float scale" 2
         MakeNamedMedium "sky" "string type" "cloud" "float density" 2
@@ -149,6 +158,19 @@ fn grids_clouds_and_objects_are_read() {
     // As bright as white, and a little bluer than an even spectrum.
     let fogbow_examples::scene_file::Emitter::Constant { radiance } = scene.emitters[0] else { panic!() };
     assert!((0.9..1.1).contains(&radiance[0]) && (0.9..1.1).contains(&radiance[2]), "{radiance:?}");
+}
+
+/// The camera stands in the medium that is outside where it is named.
+#[test]
+fn a_camera_in_fog_says_so() {
+    let text = r#"MakeNamedMedium "fog" "string type" "homogeneous"
+        MediumInterface "" "fog"
+        Camera "perspective"
+        WorldBegin
+        LightSource "infinite""#;
+    let findings = read(text, false);
+    assert!(findings.errors.is_empty(), "{:?}", errors(&findings));
+    assert_eq!(findings.scene.unwrap().media.len(), 1);
 }
 
 #[test]
@@ -189,7 +211,7 @@ fn what_is_wrong_or_missing_is_told_with_its_line() {
 /// Pieces of a scene in any order, some of them damaged: errors, and no panic.
 #[test]
 fn damaged_scenes_are_errors() {
-    let mut rng = fogbow::sampling::Generator::new(11);
+    let mut rng = Generator::new(11);
     let mut number = |most: usize| (fogbow::sampling::uniform(&mut rng) * most as f32) as usize;
     for _ in 0..400 {
         let mut bytes = ROOM.as_bytes().to_vec();
@@ -207,5 +229,96 @@ fn damaged_scenes_are_errors() {
         }
         let findings = read(&String::from_utf8_lossy(&bytes), number(2) == 0);
         assert!(findings.scene.is_some() || !findings.errors.is_empty());
+    }
+}
+
+/// Absorption times the radiance of a black body, wherever there is fog; a ray through even fog sees `L (1 − e^{−τ})`.
+#[test]
+fn hot_media_glow_by_their_temperature() {
+    let file = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/volumes/cloud-94x32x73.nvdb");
+    let grid = |name: &str| {
+        format!(
+            "<volume name=\"{name}\" type=\"gridvolume\"><string name=\"filename\" value=\"{file}\"/><string name=\"grid\" value=\"density\"/>\
+             <boolean name=\"use_grid_bbox\" value=\"true\"/></volume>"
+        )
+    };
+    let text = format!(
+        "<scene version=\"3.0.0\"><sensor type=\"perspective\"><transform name=\"to_world\"><translate z=\"5000\"/></transform></sensor>\
+         <shape type=\"cube\"><transform name=\"to_world\"><scale value=\"1000\"/></transform><bsdf type=\"null\"/>\
+         <medium name=\"interior\" type=\"heterogeneous\"><rgb name=\"sigma_a\" value=\"1, 2, 3\"/><float name=\"sigma_s\" value=\"0.5\"/>\
+         <float name=\"temperature_offset\" value=\"0.1\"/><float name=\"temperature_scale\" value=\"6000\"/><float name=\"glow_scale\" value=\"2\"/>\
+         {}{}</medium></shape></scene>",
+        grid("density"),
+        grid("temperature")
+    );
+    let scene = SceneFile::parse(Path::new("hot.xml"), &text).unwrap();
+    let heat = scene.media[0].heat.clone().unwrap();
+    // Nothing below 100 K, red below 2000 K, white around 6000 K and as bright as twice an even spectrum of 1, at most.
+    assert_eq!(heat.radiance(0.1), Spectrum::ZERO);
+    let kelvin = |t: f32| heat.radiance(0.1 + t / 6000.0);
+    let (ember, noon) = (kelvin(1800.0), kelvin(4500.0));
+    assert!(ember[0] > 3.0 * ember[1] && ember[1] > 3.0 * ember[2].max(0.0), "{ember:?}");
+    assert!(noon[0] > noon[2] && (1.0..2.4).contains(&noon[1]), "{noon:?}");
+    let mut storage = Storage::new(&scene);
+    let world = World::new(&scene, &mut storage).unwrap();
+    let (mut glowing, mut cold) = (0, 0);
+    let bounds = heat.to_world;
+    for i in 0..4000_u32 {
+        let share = |k: u32| f64::from(i.wrapping_mul(2_654_435_761).rotate_left(7 * k) >> 8) / f64::from(1 << 24);
+        let point = bounds.point([share(0), share(1), share(2)]).map(|c| c as f32);
+        let properties = seen_at(&world, Vec3::from_array(point));
+        // The same grid is the density.
+        let expected = properties.absorption * heat.radiance(properties.scattering[0] / 0.5);
+        for c in 0..3 {
+            assert!(
+                (properties.emission[c] - expected[c]).abs() <= 1e-4 * expected[c] + 1e-6,
+                "{properties:?} {expected:?}"
+            );
+        }
+        *(if properties.emission.is_black() { &mut cold } else { &mut glowing }) += 1;
+    }
+    assert!(glowing > 100 && cold > 100 && world.media().glow(), "{glowing} {cold}");
+    // Fog of 0.5 m⁻¹ that absorbs only, two metres of it.
+    let text = "LookAt 0 0 9 0 0 0 0 1 0\nCamera \"perspective\"\nWorldBegin\nMakeNamedMedium \"ember\" \"string type\" \"homogeneous\" \"rgb sigma_a\" [ .25 .25 .25 ] \"rgb sigma_s\" [ 0 0 0 ]
+        \"float scale\" 2 \"rgb Le\" [ 3 2 1 ] \"float Lescale\" 2\nMediumInterface \"ember\" \"\"\nMaterial \"interface\"\nShape \"sphere\"";
+    let scene = read(text, false).scene.unwrap();
+    let mut storage = Storage::new(&scene);
+    let world = World::new(&scene, &mut storage).unwrap();
+    let found = world.media().with(Along(Ray::new(Vec3::new(0.0, 0.0, -3.0), Vec3::Z)));
+    let truth = 1.0 - (-1.0_f32).exp();
+    assert!((0..3).all(|c| (found[c] / ([6.0, 4.0, 2.0][c] * truth) - 1.0).abs() < 0.02), "{found:?}");
+    // Files without temperatures say so.
+    let text = format!("WorldBegin\nMakeNamedMedium \"fire\" \"string type\" \"nanovdb\" \"string filename\" \"{file}\" \"float Lescale\" 2
+        MediumInterface \"fire\" \"\"\nMaterial \"interface\"\nShape \"sphere\"");
+    let all = errors(&read(&text, false));
+    assert!(all.iter().any(|error| error.contains("temperature")), "{all:?}");
+}
+
+struct At(Vec3);
+
+impl WithMedium for At {
+    type Output = Properties;
+
+    fn with<M: Medium + Sync>(self, medium: &M) -> Properties {
+        medium.properties(self.0)
+    }
+}
+
+fn seen_at(world: &World<'_>, point: Vec3) -> Properties {
+    world.media().with(At(point))
+}
+
+/// Radiance that arrives along a ray of which nothing is behind: the mean of many paths.
+struct Along(Ray);
+
+impl WithMedium for Along {
+    type Output = Spectrum;
+
+    fn with<M: Medium + Sync>(self, medium: &M) -> Spectrum {
+        let world = LitWorld { medium, scene: &Empty, lights: (&[]).into() };
+        let (mut rng, count) = (Generator::new(3), 20_000);
+        let path = |_| path::radiance(&self.0, &world, &Settings::default(), &mut rng).total();
+        let sum: Spectrum = (0..count).map(path).sum();
+        sum * (1.0 / count as f32)
     }
 }

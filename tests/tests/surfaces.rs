@@ -309,3 +309,29 @@ fn thin_panes_are_passed_uncounted() {
     let seen = looked_through(&format!("{grey}{lamp}"), 0, 20_000);
     assert!((seen - 0.5 * through).abs() < 0.015, "{seen}");
 }
+
+/// A checkerboard that gives a number has its parts the other way round than one that gives a colour, as Mitsuba 3.9.1 has it.
+#[test]
+fn checkerboards_of_numbers_are_inverted() {
+    // One square in each quarter: the corner of the rectangle is in the first part.
+    let board = |name: &str| {
+        format!(
+            "<texture name=\"{name}\" type=\"checkerboard\"><float name=\"color0\" value=\"0\"/><float name=\"color1\" value=\"1\"/>\
+             </texture>"
+        )
+    };
+    let grey = |value: u32| format!("<bsdf type=\"diffuse\"><float name=\"reflectance\" value=\"{value}\"/></bsdf>");
+    let colour = format!("<bsdf type=\"diffuse\">{}</bsdf>", board("reflectance"));
+    let number = format!("<bsdf type=\"blendbsdf\">{}{}{}</bsdf>", board("weight"), grey(0), grey(1));
+    for (material, expected) in [(colour, [0.0, 1.0]), (number, [1.0, 0.0])] {
+        let text = format!("<scene version=\"3.0.0\">{REST}<shape type=\"rectangle\">{material}</shape></scene>");
+        let scene = SceneFile::parse(Path::new("board.xml"), &text).unwrap();
+        let mut storage = Storage::new(&scene);
+        let world = World::new(&scene, &mut storage).unwrap();
+        for (x, expected) in [-0.5, 0.5].into_iter().zip(expected) {
+            let hit =
+                fogbow::host::Scene::closest_hit(&world, &Ray::new(Vec3::new(x, -0.5, 2.0), Vec3::NEG_Z)).unwrap();
+            assert_eq!(hit.surface, Surface::Lambert { reflectance: Spectrum::splat(expected) }, "{material} at {x}");
+        }
+    }
+}

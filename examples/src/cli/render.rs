@@ -169,6 +169,7 @@ fn write_all(files: Vec<PathBuf>, film: &Film, exposure: f32) -> (Vec<PathBuf>, 
         name.push(format!("-{}.exr", std::process::id()));
         let rescue = std::env::temp_dir().join(name);
         if write_film(&rescue, film, exposure).is_ok() {
+            trouble.push((rescue.clone(), format!("the picture is in {}", rescue.display())));
             written.push(rescue);
         }
     }

@@ -4,19 +4,20 @@ use std::path::Path;
 
 use super::Mesh;
 use crate::error::DataError;
-use crate::transform::Transform;
+use crate::transform::{Transform, to_vec3};
 
 /// Pieces that a segment of a spline becomes.
 const PIECES: u32 = 8;
 
 /// Most points of all curves: beyond, their triangles fill the memory.
-const MOST_POINTS: usize = 1 << 20;
+const MOST_POINTS: usize = 1 << 17;
 
 /// A point and a radius (m).
 type Point = ([f64; 3], f64);
 
 pub(super) fn read(file: &Path, bytes: &[u8], is_smooth: bool, to_world: &Transform) -> Result<Mesh, DataError> {
     let (mut mesh, mut curve, mut count) = (Mesh::default(), Vec::new(), 0);
+    let bead = Mesh::bead();
     let lines = bytes.split(|b| *b == b'\n').chain([b"".as_slice()]);
     for (number, line) in lines.enumerate() {
         let fail = |reason: String| DataError::new(file, format!("line {}", number + 1), reason);
@@ -27,7 +28,11 @@ pub(super) fn read(file: &Path, bytes: &[u8], is_smooth: bool, to_world: &Transf
             if count > MOST_POINTS {
                 return Err(fail(format!("curves have more than {MOST_POINTS} points")));
             }
-            mesh.append(&Mesh::tube(&points));
+            if is_smooth {
+                mesh.append(&Mesh::tube(&points));
+            } else {
+                append_straight(&mut mesh, &points, &bead);
+            }
             curve.clear();
             continue;
         }
@@ -40,6 +45,25 @@ pub(super) fn read(file: &Path, bytes: &[u8], is_smooth: bool, to_world: &Transf
         }
     }
     Ok(mesh)
+}
+
+/// Straight pieces, round where they meet and end.
+fn append_straight(mesh: &mut Mesh, points: &[Point], bead: &Mesh) {
+    if points.len() < 2 {
+        return;
+    }
+    let last = (points.len() - 1) as f32;
+    for (k, pair) in points.windows(2).enumerate() {
+        let mut piece = Mesh::tube(pair);
+        piece.texcoords.iter_mut().for_each(|uv| uv.y = (k as f32 + uv.y) / last);
+        mesh.append(&piece);
+    }
+    for (k, (centre, radius)) in points.iter().enumerate() {
+        let mut ball = bead.clone();
+        ball.vertices.iter_mut().for_each(|v| *v = *v * *radius as f32 + to_vec3(*centre));
+        ball.texcoords.iter_mut().for_each(|uv| uv.y = k as f32 / last);
+        mesh.append(&ball);
+    }
 }
 
 /// Points along a uniform cubic B-spline.

@@ -66,7 +66,21 @@ impl Mesh {
         mesh.mirrored(to_world)
     }
 
-    /// A tube along points with radii.
+    /// The unit sphere of a few triangles, with as much area.
+    pub(super) fn bead() -> Self {
+        let down = AROUND_CURVE / 2;
+        let at = |i: u32, j: u32| {
+            let (theta, phi) = (PI * f64::from(j) / f64::from(down), 2.0 * PI * f64::from(i) / f64::from(AROUND_CURVE));
+            [theta.sin() * phi.cos(), theta.sin() * phi.sin(), theta.cos()]
+        };
+        let mut mesh = Self::patch(AROUND_CURVE, down, &Transform::IDENTITY, |i, j| (at(i, j), at(i, j), [0.0; 2]));
+        let area: f64 = 0.5 * mesh.triangles.iter().map(|t| twice_area(mesh.corners(*t))).sum::<f64>();
+        let grown = (4.0 * PI / area).sqrt() as f32;
+        mesh.vertices.iter_mut().for_each(|v| *v *= grown);
+        mesh
+    }
+
+    /// A tube along points with radii; its cross-sections are as long around as circles, so it is as wide in the mean.
     #[must_use]
     pub fn tube(points: &[([f64; 3], f64)]) -> Self {
         let mut mesh = Self::default();
@@ -74,6 +88,8 @@ impl Mesh {
             return mesh;
         }
         let mut side = [1.0, 0.0, 0.0];
+        let half = PI / f64::from(AROUND_CURVE);
+        let wide = half / half.sin();
         for (k, (point, radius)) in points.iter().enumerate() {
             let before = points[k.saturating_sub(1)];
             let after = points[(k + 1).min(points.len() - 1)];
@@ -87,7 +103,7 @@ impl Mesh {
             for i in 0..=AROUND_CURVE {
                 let (sin, cos) = (2.0 * PI * f64::from(i) / f64::from(AROUND_CURVE)).sin_cos();
                 let out = [0, 1, 2].map(|axis| side[axis] * cos + up[axis] * sin);
-                mesh.vertices.push(to_vec3([0, 1, 2].map(|axis| point[axis] + out[axis] * radius)));
+                mesh.vertices.push(to_vec3([0, 1, 2].map(|axis| point[axis] + out[axis] * radius * wide)));
                 mesh.normals.push(to_vec3(out));
                 let v = k as f32 / (points.len() - 1) as f32;
                 mesh.texcoords.push(Vec2::new(i as f32 / AROUND_CURVE as f32, v));

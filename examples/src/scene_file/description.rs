@@ -1,6 +1,6 @@
 //! What a scene file says, before anything is built from it.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use fogbow::phase::Phase;
@@ -141,6 +141,43 @@ pub struct MediumDescription {
     pub places: Vec<Place>,
     /// Both corners (m) of a box beyond which nothing of it is, wherever its places reach.
     pub limits: Option<[[f64; 3]; 2]>,
+    /// Radiance (W·m⁻²·sr⁻¹) with which it glows where nothing is seen through it: emission over absorption. Not of coloured matter.
+    pub glow: Spectrum,
+    /// What it glows with besides, by its temperature.
+    pub heat: Option<Heat>,
+}
+
+/// Temperatures, and how they glow.
+#[derive(Debug, Clone)]
+pub struct Heat {
+    /// Numbers on a grid.
+    pub bricks: Arc<BrickStorage>,
+    /// From the unit cube `[0, 1]³` of the bricks' box to the world.
+    pub to_world: Transform,
+    /// A number is `(number − offset) · scale` kelvin.
+    pub offset: f32,
+    /// Kelvin to a number.
+    pub scale: f32,
+    /// Radiance (W·m⁻²·sr⁻¹) at temperatures that are evenly spaced from 0 to `hottest`.
+    pub colours: Arc<[Spectrum]>,
+    /// Kelvin.
+    pub hottest: f32,
+}
+
+impl Heat {
+    /// Radiance (W·m⁻²·sr⁻¹) of a place with this number, between the colours; 0 below 100 K.
+    #[must_use]
+    pub fn radiance(&self, number: f32) -> Spectrum {
+        let kelvin = ((number - self.offset) * self.scale).min(self.hottest);
+        let last = self.colours.len().saturating_sub(1);
+        if !(kelvin > 100.0) || last == 0 {
+            return Spectrum::ZERO;
+        }
+        let at = kelvin / self.hottest * last as f32;
+        let low = (at as usize).min(last - 1);
+        let share = at - low as f32;
+        self.colours[low] * (1.0 - share) + self.colours[low + 1] * share
+    }
 }
 
 /// What a medium is made of.
@@ -341,6 +378,8 @@ pub struct Shape {
     pub radiance: Option<Spectrum>,
     /// What that varies by, where it does: a rectangle or a mesh; `radiance` is then its mean.
     pub glow: Option<Arc<Texture>>,
+    /// The file that names it, which may be an included one.
+    pub file: Arc<Path>,
     /// Line in the file.
     pub line: u32,
 }

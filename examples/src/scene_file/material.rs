@@ -92,6 +92,12 @@ pub enum Slot {
 }
 
 impl Slot {
+    /// Whether it is a colour, not a number.
+    #[must_use]
+    pub fn is_colour(self) -> bool {
+        matches!(self, Self::Diffuse | Self::Specular | Self::Transmitted)
+    }
+
     /// Sets the parameter; surfaces without it stay as they are.
     pub fn put(self, surface: &mut Surface, value: Spectrum) {
         let share = value.max(Spectrum::ZERO).min(Spectrum::ONE);
@@ -228,7 +234,8 @@ impl Material {
     pub fn surface_at(&self, place: &texture::Place<'_>) -> Surface {
         let mut surface = self.surface;
         for (slot, texture) in &self.textures {
-            slot.put(&mut surface, texture.at(place));
+            let value = if slot.is_colour() { texture.at(place) } else { texture.number_at(place) };
+            slot.put(&mut surface, value);
         }
         surface
     }
@@ -297,7 +304,7 @@ impl Material {
                     }
                 }
                 Mix::Blend { weight, parts: [first, second] } => {
-                    let weight = luminance(weight.at(place)).clamp(0.0, 1.0);
+                    let weight = luminance(weight.number_at(place)).clamp(0.0, 1.0);
                     if let Some(surface) = blended(first, second, weight, place) {
                         is_two_sided |= first.is_two_sided;
                         return Chosen { material: first, surface, is_two_sided, share };

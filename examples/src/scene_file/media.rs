@@ -6,9 +6,10 @@ use std::sync::Arc;
 use fogbow::phase::{Lobe, Phase};
 use fogbow::spectrum::Spectrum;
 
-use super::description::{Container, Field, Matter};
+use super::description::{Container, Field, Heat, Matter};
 use super::element::Element;
 use super::plugin::{Plugin, is_share};
+use super::spectra;
 use super::tree::Inline;
 use crate::error::SceneError;
 use crate::texture::Wrap;
@@ -19,8 +20,16 @@ use crate::volume::{self, Colours, Volume};
 /// Corners of a box (m).
 type Corners = [[f64; 3]; 2];
 
-/// The matter of a `<medium>`, and the box beyond which there is nothing of it.
-pub(super) fn read(element: &Element<'_>) -> Result<(Matter, Option<Corners>), SceneError> {
+/// What a `<medium>` says.
+pub(super) struct Read {
+    pub(super) matter: Matter,
+    /// The box beyond which there is nothing of it.
+    pub(super) limits: Option<Corners>,
+    pub(super) glow: Spectrum,
+    pub(super) heat: Option<Heat>,
+}
+
+pub(super) fn read(element: &Element<'_>) -> Result<Read, SceneError> {
     let plugin = Plugin::new(*element)?;
     if !matches!(plugin.kind.as_str(), "homogeneous" | "heterogeneous") {
         return Err(plugin.unknown_type("homogeneous, heterogeneous"));
@@ -32,9 +41,35 @@ pub(super) fn read(element: &Element<'_>) -> Result<(Matter, Option<Corners>), S
         Some(phase) => read_phase(&phase, 0)?,
         None => Phase::ISOTROPIC,
     };
-    let found = matter(&plugin, scale, phase)?;
+    // Of pbrt, as what follows.
+    let glow = plugin.colour("glow")?.map_or(Spectrum::ZERO, |(glow, _)| glow);
+    let heat = match plugin.get("temperature") {
+        Some(volume) if volume.tag() == "volume" => Some(heat(&plugin, &volume)?),
+        _ => None,
+    };
+    let (matter, limits) = matter(&plugin, scale, phase)?;
     plugin.finish()?;
-    Ok(found)
+    Ok(Read { matter, limits, glow, heat })
+}
+
+/// Colours of temperatures: between so many, black bodies are nearly linear.
+const COLOURS: usize = 512;
+
+/// A grid of temperatures, with `temperature_offset`, `temperature_scale` and `glow_scale`.
+fn heat(plugin: &Plugin<'_>, volume: &Element<'_>) -> Result<Heat, SceneError> {
+    let number = |name: &str, usual: f64| plugin.number_in(name, usual, -1e9..=1e9);
+    let (offset, scale) = (number("temperature_offset", 0.0)? as f32, number("temperature_scale", 1.0)? as f32);
+    let strength = plugin.number_in("glow_scale", 1.0, 0.0..=1e12)? as f32;
+    let Extinction::Sparse { bricks, to_world } = extinction(volume, true)?.0 else {
+        return Err(volume.error("temperatures are those of an OpenVDB or NanoVDB grid"));
+    };
+    let hottest = ((bricks.max() - offset) * scale).clamp(0.0, 1e6);
+    let colour = |i: usize| {
+        let kelvin = f64::from(hottest) * i as f64 / (COLOURS - 1) as f64;
+        // Colder than that nothing is seen.
+        if kelvin > 100.0 { spectra::of_normalized_black_body(kelvin) * strength } else { Spectrum::ZERO }
+    };
+    Ok(Heat { bricks, to_world, offset, scale, colours: (0..COLOURS).map(colour).collect(), hottest })
 }
 
 /// How extinction varies.

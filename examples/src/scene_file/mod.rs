@@ -1,4 +1,4 @@
-//! Reads the scene files of Mitsuba 3, a subset of version 3.0.0 with the same meaning; and glTF 2.0, see below the table.
+//! Reads the scene files of Mitsuba 3, a subset of version 3.0.0 with the same meaning; and glTF 2.0 and pbrt-v4, see below the table.
 //!
 //! | element | types |
 //! |---|---|
@@ -12,9 +12,9 @@
 //! | `phase` | `isotropic`, `hg`, `rayleigh`, `blendphase` |
 //! | `shape` | `rectangle`, `cube`, `sphere`, `disk`, `cylinder`, `ply`, `obj`, `serialized`, `linearcurve`, `bsplinecurve` (tubes of triangles), `shapegroup`, `instance`, `merge` |
 //! | `bsdf` | `diffuse`, `twosided`, `null`, `conductor`, `roughconductor`, `dielectric`, `roughdielectric`, `thindielectric`, `plastic`, `roughplastic`, `principled`, `principledthin`, `blendbsdf`, `mask`; and `phong`, which Mitsuba 3 does not know |
-//! | `texture` | `bitmap`, `checkerboard`, `mesh_attribute`, `volume`, `uniform`, `rawconstant`: on reflectances |
+//! | `texture` | `bitmap`, `checkerboard`, `mesh_attribute`, `volume`, `uniform`, `rawconstant`: on reflectances, `area` (of rectangles and meshes), `spot`, `projector` |
 //! | `spectrum` | a number, pairs of wavelength and value, `filename`; `uniform`, `d65`, `srgb`, `blackbody`, `regular`, `irregular` |
-//! | `emitter` | `point`, `spot`, `area`, `directional`, `constant`, `envmap` |
+//! | `emitter` | `point`, `spot`, `projector`, `area`, `directional`, `constant`, `envmap` |
 //!
 //! `<include>`, `<path>`, `<default>` with `$name`, `<alias>`, `<ref>` to anything, and all transforms are understood; files of
 //! version 0.6 are upgraded. A medium fills the closed shape whose `interior` it is. What has no effect here is a
@@ -24,6 +24,10 @@
 //! colour, alpha and emission (`KHR_materials_emissive_strength`), their textures (PNG, JPEG; `KHR_texture_transform`), metal, gloss and glass
 //! (`KHR_materials_transmission`, `volume`, `ior`), and points, spots and suns of `KHR_lights_punctual`. Fog stands in a TOML file
 //! beside the scene, `SCENE.fog.toml`: boxes, balls, height fog, grids, and a sky.
+//!
+//! Of pbrt-v4 are read: transforms, attributes, objects and their instances, included files; perspective, thin-lens and orthographic cameras;
+//! spheres, disks, cylinders, triangle and bilinear meshes, PLY; diffuse, coated (as plastic), metal, glass and mixed materials; image and
+//! checkerboard textures; point, spot, distant, infinite and area lights; media that are `homogeneous`, `uniformgrid`, `nanovdb` or a `cloud`.
 
 mod bsdfs;
 mod cie;
@@ -56,8 +60,8 @@ use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
 pub use description::{
-    Container, Emitter, Field, FovAxis, Geometry, Integrator, Matter, MediumDescription, Place, Projection, SceneFile,
-    Sensor, Shape,
+    Container, Emitter, Field, FovAxis, Geometry, Heat, Integrator, Matter, MediumDescription, Place, Projection,
+    SceneFile, Sensor, Shape,
 };
 pub use film::MAX_PIXELS;
 pub use fingerprint::{fingerprint, fingerprint_with};

@@ -169,10 +169,10 @@ impl<'a> Found<'a> {
         if let Some(index) = self.index.get(&element.node.id()) {
             return Ok(*index);
         }
-        let (matter, limits) = media::read(element)?;
+        let media::Read { matter, limits, glow, heat } = media::read(element)?;
         let id = element.optional("id").unwrap_or_else(|| format!("medium at line {}", element.line()));
         let index = self.media.len();
-        let description = MediumDescription { id, matter, places: Vec::new(), limits };
+        let description = MediumDescription { id, matter, places: Vec::new(), limits, glow, heat };
         self.media.push(Medium { description, element: *element });
         self.index.insert(element.node.id(), index);
         Ok(index)

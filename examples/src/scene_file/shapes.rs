@@ -103,8 +103,10 @@ fn read_one<'a>(plugin: &Plugin<'a>) -> Result<ShapeElement<'a>, SceneError> {
     } else {
         material
     };
+    let file = element.context.tree.file(element.node).into();
     let is_visible = material.surface != Surface::Null || material.mix.is_some();
-    let shape = is_visible.then(|| Shape { geometry, is_flipped, material, radiance, glow, line: element.line() });
+    let shape =
+        is_visible.then(|| Shape { geometry, is_flipped, material, radiance, glow, file, line: element.line() });
     Ok(ShapeElement { element: *element, shape, container, is_inside_out, interior, exterior })
 }
 

@@ -119,6 +119,13 @@ pub(super) fn of_black_body(kelvin: f64) -> Spectrum {
     colour(&samples.collect::<Vec<_>>(), Role::Light)
 }
 
+/// The same, over its greatest radiance at any wavelength: as bright as an even spectrum of 1 at most.
+pub(super) fn of_normalized_black_body(kelvin: f64) -> Spectrum {
+    /// Wien's displacement (nm·K).
+    const PEAK: f64 = 2.897_771_955e6;
+    of_black_body(kelvin) * (1.0 / planck(PEAK / kelvin, kelvin)) as f32
+}
+
 /// `wavelength:value` pairs.
 fn pairs(element: &Element<'_>, text: &str) -> Result<Vec<(f64, f64)>, SceneError> {
     let fail = |reason: String| element.attribute_error("value", reason);

@@ -38,7 +38,7 @@ fn scale(root: &Element<'_>, scene: &SceneFile, shapes: &[ShapeElement<'_>]) {
     if size > 0.0 && !(1e-3..=1e6).contains(&size) {
         root.suspicious(format!("the scene is {size:.2e} units wide: scale it to between 0.001 and 1000000"));
     }
-    if size.is_finite() && far > 1e4 * size {
+    if far.is_finite() && far > 1e4 * size {
         root.suspicious(format!("the scene is {size:.2e} wide and {far:.2e} away from the origin: move it there"));
     }
 }

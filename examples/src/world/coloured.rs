@@ -6,6 +6,7 @@ use fogbow::medium::AnyMedium;
 use fogbow::phase::Phase;
 use fogbow::spectrum::Spectrum;
 
+use super::glowing::Glowing;
 use crate::scene_file::Field;
 use crate::transform::Transform;
 
@@ -119,6 +120,8 @@ pub(super) enum Stuff<'a> {
     Core(AnyMedium<'a>),
     /// One that varies in colour.
     Coloured(Coloured<'a>),
+    /// One that is hot.
+    Glowing(Glowing<'a>),
 }
 
 impl Stuff<'_> {
@@ -126,10 +129,11 @@ impl Stuff<'_> {
         match self {
             Self::Core(medium) => medium.phase(),
             Self::Coloured(medium) => medium.phase(),
+            Self::Glowing(medium) => medium.phase(),
         }
     }
 }
 
 impl Medium for Stuff<'_> {
-    fogbow::host::delegate_medium!(self, [Core Coloured]);
+    fogbow::host::delegate_medium!(self, [Core Coloured Glowing]);
 }

@@ -145,7 +145,9 @@ fn of_mesh(texture: &Texture, mesh: &Mesh, is_flipped: bool) -> Vec<Glow> {
         let crossed = [b - a, c - a, c - b].map(|e| e.x.abs() * across + e.y.abs() * down);
         let most =
             if let Texture::Attribute { .. } = texture { across } else { crossed.into_iter().fold(0.0, f32::max) };
-        (most * if is_smooth { 2.0 } else { 1.0 }).ceil().clamp(1.0, MOST_OF_TRIANGLE)
+        // A square has an edge somewhere in a texel; pixels have theirs within one.
+        let fine = if let Texture::Checkerboard { .. } = texture { 32.0 } else { 4.0 };
+        (most * if is_smooth { 2.0 } else { fine }).ceil().clamp(1.0, MOST_OF_TRIANGLE)
     };
     let all = || mesh.triangles.iter().enumerate().filter(|(_, t)| has_area(mesh.corners(**t)));
     let total: f32 = all().map(|(_, triangle)| side(*triangle).powi(2)).sum();

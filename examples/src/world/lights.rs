@@ -1,5 +1,7 @@
 //! Emitters, and the tables they borrow.
 
+use std::path::Path;
+
 use fogbow::light::{
     EnvironmentMap, Light, LightError, LightTree, MeshLight, PictureLight, PointLight, Projector, QuadLight,
     SphereLight, SpotLight, Sun, Triangle,
@@ -136,9 +138,9 @@ enum Kept<'a> {
 
 impl<'a> Lights<'a> {
     pub(super) fn new(scene: &SceneFile, tables: &'a mut LightTables) -> Result<Self, SceneError> {
-        let fail = |line: Option<u32>, element: &str, error: LightError| SceneError {
-            file: scene.file.clone(),
-            line,
+        let fail = |place: Option<(&Path, u32)>, element: &str, error: LightError| SceneError {
+            file: place.map_or_else(|| scene.file.clone(), |(file, _)| file.to_owned()),
+            line: place.map(|(_, line)| line).filter(|line| *line > 0),
             element: element.to_owned(),
             attribute: None,
             reason: error.to_string(),
@@ -148,7 +150,7 @@ impl<'a> Lights<'a> {
         let mut projectors = tables.projectors.iter_mut();
         for shape in &scene.shapes {
             let Some(radiance) = shape.radiance else { continue };
-            let failed = |e| fail(Some(shape.line), "<emitter type=\"area\">", e);
+            let failed = |e| fail(Some((&shape.file, shape.line)), "<emitter type=\"area\">", e);
             if shape.glow.is_some() {
                 for glow in glows.next().into_iter().flatten() {
                     lights.push(Kept::Picture(glow.light().map_err(failed)?));

@@ -13,6 +13,7 @@ use fogbow::spectrum::Spectrum;
 
 use super::coloured::{Coloured, Stuff};
 use super::contained::{Contained, Solid};
+use super::glowing::Glowing;
 use super::rotated::{Padded, shows_border};
 use crate::error::SceneError;
 use crate::scene_file::{Container, Matter, MediumDescription, Place, SceneFile};
@@ -26,13 +27,17 @@ pub(super) struct MediumTable {
     blocks: Vec<MinMax>,
     /// The grid with its border repeated, where that shows.
     padded: Option<Padded>,
+    /// The same for a grid of temperatures.
+    heat: Vec<MinMax>,
     /// For each place of the medium, its holes.
     holes: Vec<Vec<Region>>,
 }
 
 impl MediumTable {
     pub(super) fn bytes(&self) -> usize {
-        size_of_val(&*self.blocks) + self.padded.as_ref().map_or(0, |padded| padded.volume.bytes())
+        size_of_val(&*self.blocks)
+            + size_of_val(&*self.heat)
+            + self.padded.as_ref().map_or(0, |padded| padded.volume.bytes())
     }
 }
 
@@ -47,10 +52,18 @@ pub(super) fn tables(scene: &SceneFile) -> Vec<MediumTable> {
                 .then(|| Padded::new(volume, to_world, &medium.places))
                 .flatten();
             let size = padded.as_ref().map_or(volume.size, |padded| padded.volume.size);
-            MediumTable { blocks: vec![MinMax::default(); DensityGrid::block_count(size)], padded, holes: Vec::new() }
+            MediumTable {
+                blocks: vec![MinMax::default(); DensityGrid::block_count(size)],
+                padded,
+                ..MediumTable::default()
+            }
         }
     };
-    scene.media.iter().map(table).collect()
+    let heated = |medium: &MediumDescription| {
+        let blocks = medium.heat.as_ref().map_or(0, |heat| heat.bricks.bricks().slots.len());
+        MediumTable { heat: vec![MinMax::default(); blocks], ..table(medium) }
+    };
+    scene.media.iter().map(heated).collect()
 }
 
 /// The media of a scene, in the simplest form that holds them all: tracking is compiled for each.
@@ -94,8 +107,9 @@ impl<'a> Media<'a> {
             let is_refused = |padded: &Padded| medium.places.iter().any(|p| padded.region(&p.container).is_err());
             table.padded.as_ref().is_some_and(is_refused)
         };
-        let is_limited =
-            |medium: &MediumDescription| medium.limits.is_some() || matches!(medium.matter, Matter::Coloured { .. });
+        let is_limited = |medium: &MediumDescription| {
+            medium.limits.is_some() || medium.heat.is_some() || matches!(medium.matter, Matter::Coloured { .. })
+        };
         let has_cuts = scene.media.iter().zip(&*tables).any(is_cut) || scene.media.iter().any(is_limited);
         if has_cuts || scene.media.iter().flat_map(|m| &m.places).any(needs_solids) {
             return Self::contained(scene, tables);
@@ -144,14 +158,20 @@ impl<'a> Media<'a> {
         let mut media = Vec::new();
         for (description, table) in scene.media.iter().zip(tables) {
             let refused = |e: Refusal| fail(format!("<medium id=\"{}\">", description.id), e.to_string());
-            let MediumTable { blocks, padded, .. } = table;
+            let MediumTable { blocks, padded, heat, .. } = table;
             let padded = padded.as_ref();
             let medium = match &description.matter {
                 Matter::Coloured { extinction, albedo, scale, phase } => {
                     let coloured = Coloured::new(extinction, albedo, *scale, *phase);
                     Stuff::Coloured(coloured.ok_or_else(|| refused(MediumError::Coefficients.into()))?)
                 }
-                _ => Stuff::Core(matter(description, padded, blocks).map_err(refused)?),
+                _ => {
+                    let medium = matter(description, padded, blocks).map_err(refused)?;
+                    match &description.heat {
+                        Some(hot) => Stuff::Glowing(Glowing::new(medium, hot, heat).map_err(|e| refused(e.into()))?),
+                        None => Stuff::Core(medium),
+                    }
+                }
             };
             for place in &description.places {
                 let solids = |containers: &[Container]| containers.iter().map(solid).collect::<Result<Vec<_>, _>>();
@@ -228,7 +248,7 @@ fn moved<'a, N>(place: &Placed<'_, AnyMedium<'_>>, holes: &'a [Region], medium: 
 type PlacedHoles<'a> = (Placed<'a, AnyMedium<'a>>, &'a [Region]);
 
 fn place<'a>(medium: &'a MediumDescription, table: &'a mut MediumTable) -> Result<Vec<PlacedHoles<'a>>, Refusal> {
-    let MediumTable { blocks, padded, holes } = table;
+    let MediumTable { blocks, padded, holes, .. } = table;
     let padded = padded.as_ref();
     let any = matter(medium, padded, blocks)?;
     for place in &medium.places {
@@ -274,7 +294,9 @@ fn matter<'a>(
         // Of the host: see `Media::contained`.
         Matter::Coloured { .. } => AnyMedium::from(Homogeneous::new(Spectrum::ZERO, Spectrum::ZERO, Phase::ISOTROPIC)?),
         Matter::Homogeneous { absorption, scattering, phase } => {
-            AnyMedium::from(Homogeneous::new(*absorption, *scattering, *phase)?)
+            let fog = Homogeneous::new(*absorption, *scattering, *phase)?;
+            let glow = *absorption * medium.glow;
+            AnyMedium::from(if glow.is_black() { fog } else { fog.with_emission(glow)? })
         }
         Matter::Grid { volume, to_world, absorption, scattering, phase } => {
             if padded.is_none() && shows_border(volume, to_world, &medium.places) {
@@ -287,12 +309,12 @@ fn matter<'a>(
             };
             let placement = to_world.to_affine();
             let (absorption, scattering, phase) = (*absorption, *scattering, *phase);
-            let properties = Properties { absorption, scattering, phase, ..Properties::VACUUM };
+            let properties = Properties { absorption, scattering, phase, emission: absorption * medium.glow };
             AnyMedium::from(DensityGrid::new(volume.size, density, &properties, placement, blocks)?)
         }
         Matter::Sparse { bricks, to_world, absorption, scattering, phase } => {
             let (absorption, scattering, phase) = (*absorption, *scattering, *phase);
-            let properties = Properties { absorption, scattering, phase, ..Properties::VACUUM };
+            let properties = Properties { absorption, scattering, phase, emission: absorption * medium.glow };
             AnyMedium::from(SparseGrid::new(bricks.bricks(), &properties, to_world.to_affine(), blocks)?)
         }
     })

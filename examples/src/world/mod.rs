@@ -9,7 +9,7 @@
 //! | `triangles` | meshes in a tree |
 //! | `lights`, `glow` | emitters and lent tables; pictures that lights show |
 //! | `media` | media and where they are |
-//! | `body`, `contained`, `coloured` | closed meshes, and media in them; media whose colour varies |
+//! | `body`, `contained`, `coloured`, `glowing` | closed meshes, and media in them; media whose colour varies, or that glow by temperature |
 //! | `places` | texture coordinates and interpolated normals |
 //! | `rotated` | rotated grids, whose border reaches as far as Mitsuba's |
 
@@ -19,6 +19,7 @@ mod build;
 mod coloured;
 mod contained;
 mod glow;
+mod glowing;
 mod lights;
 mod many;
 mod media;

@@ -238,7 +238,14 @@ mod tests {
             <film type=\"hdrfilm\"><rfilter type=\"box\"/></film></sensor></scene>";
         let mut scene = SceneFile::parse("test.xml".as_ref(), text).unwrap();
         let places = vec![Place { container: container.clone(), holes: Vec::new() }];
-        scene.media.push(MediumDescription { id: "smoke".to_owned(), matter, places, limits: None });
+        scene.media.push(MediumDescription {
+            id: "smoke".to_owned(),
+            matter,
+            places,
+            limits: None,
+            glow: Spectrum::ZERO,
+            heat: None,
+        });
         let mut tables = tables(&scene);
         Ok(Media::new(&scene, &mut tables).map_err(|e| e.to_string())?.with(Differences(&container)))
     }

@@ -111,7 +111,7 @@ fn what_is_missing_is_replaced_by_leave_alone() {
     let folder = Folder::new("lenient");
     let text = format!(
         r#"{HEAD}<integrator type="oracle"/><emitter type="constant"><float name="warmth" value="3"/></emitter>
-        <emitter type="projector"/></scene>"#
+        <emitter type="sunsky"/></scene>"#
     );
     let strict = read(&folder, &text, &ReadOptions::default());
     assert_eq!(strict.errors.len(), 3, "{}", reasons(&strict));

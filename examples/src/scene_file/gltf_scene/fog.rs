@@ -135,7 +135,14 @@ pub(super) fn read(file: &Path, scene: &mut SceneFile) -> Result<(), SceneError>
         };
         let (matter, container) = medium(file, one.get_ref()).map_err(error)?;
         let places = vec![Place { container, holes: Vec::new() }];
-        scene.media.push(MediumDescription { id: format!("fog {}", number + 1), matter, places, limits: None });
+        scene.media.push(MediumDescription {
+            id: format!("fog {}", number + 1),
+            matter,
+            places,
+            limits: None,
+            glow: Spectrum::ZERO,
+            heat: None,
+        });
     }
     Ok(())
 }

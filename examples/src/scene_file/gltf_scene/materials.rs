@@ -23,6 +23,8 @@ use crate::texture::{Texture, ToUv, Wrap};
 pub(super) struct Ready {
     pub(super) surface: Material,
     pub(super) radiance: Option<Spectrum>,
+    /// What that varies by, where it does.
+    pub(super) glow: Option<Arc<Texture>>,
     /// What absorbs light within (m⁻¹).
     pub(super) attenuation: Option<Spectrum>,
     /// Which of the texture coordinates of a mesh its textures are looked up with.
@@ -49,6 +51,7 @@ impl Materials {
                 ..Material::plain(Surface::Lambert { reflectance: Spectrum::ONE })
             },
             radiance: None,
+            glow: None,
             attenuation: None,
             texcoords: None,
         })
@@ -141,10 +144,22 @@ impl Reader<'_> {
             note(NoteKind::Replaced, "half a metal: what it is mostly");
         }
         let emitted = Spectrum(material.emissive_factor()) * material.emissive_strength().unwrap_or(1.0);
-        let emitted = match material.emissive_texture().and_then(|info| self.texture(&info, Channel::Colour)) {
-            Some(texture) => {
-                note(NoteKind::Replaced, "emissiveTexture: its mean, everywhere");
-                emitted * texture.mean().max(Spectrum::ZERO)
+        let shown = material
+            .emissive_texture()
+            .and_then(|info| Some((info.tex_coord(), self.texture(&info, Channel::Colour)?)));
+        let mut glow = None;
+        let emitted = match shown {
+            Some((set, texture)) => {
+                let mean = emitted * texture.mean().max(Spectrum::ZERO);
+                if *texcoords.get_or_insert(set) == set {
+                    glow = Some(Arc::new(Texture::Scaled(texture, emitted)));
+                } else {
+                    note(
+                        NoteKind::Replaced,
+                        "emissiveTexture by other coordinates than the base colour: its mean, everywhere",
+                    );
+                }
+                mean
             }
             None => emitted,
         };
@@ -168,6 +183,7 @@ impl Reader<'_> {
         Ready {
             surface,
             radiance,
+            glow: glow.filter(|_| radiance.is_some()),
             attenuation: material.volume().filter(|_| is_glass).and_then(|volume| attenuation(&volume)),
             texcoords,
         }

@@ -90,6 +90,8 @@ pub(super) fn read(
                     id: format!("glass of {element}"),
                     matter: Matter::Homogeneous { absorption, scattering: Spectrum::ZERO, phase: Phase::ISOTROPIC },
                     limits: None,
+                    glow: Spectrum::ZERO,
+                    heat: None,
                     places: vec![Place { container: Container::Body(Arc::new(body)), holes: Vec::new() }],
                 }),
                 Err(reason) => {
@@ -102,7 +104,8 @@ pub(super) fn read(
             is_flipped: false,
             material: material.surface.clone(),
             radiance: material.radiance,
-            glow: None,
+            glow: material.glow.clone(),
+            file: source.file.into(),
             line: 0,
         });
     }

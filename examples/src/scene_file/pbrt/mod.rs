@@ -69,7 +69,7 @@ struct Reader<'s> {
     scene: Vec<NodeId>,
     /// The object that shapes go to: its name and they.
     object: Option<(String, Vec<NodeId>)>,
-    camera: Option<(String, Parameters, Transform)>,
+    camera: Option<(String, Parameters, State)>,
     film: Option<Parameters>,
     filter: Option<(String, Parameters)>,
     samples: f64,
@@ -298,7 +298,7 @@ impl Reader<'_> {
         match directive {
             "Camera" => {
                 self.systems.insert("camera".to_owned(), self.state.ctm.inverse().unwrap_or_default());
-                self.camera = Some((kind.to_owned(), parameters, self.state.ctm));
+                self.camera = Some((kind.to_owned(), parameters, self.state.clone()));
             }
             "Film" => self.film = Some(parameters),
             "PixelFilter" | "Filter" => self.filter = Some((kind.to_owned(), parameters)),
@@ -377,17 +377,18 @@ impl Reader<'_> {
         let film = self.nodes.thing("film", "hdrfilm", children);
         let samples = vec![self.nodes.integer("sample_count", self.samples.clamp(1.0, 1e9) as i64)];
         let sampler = self.nodes.thing("sampler", "independent", samples);
-        let (kind, parameters, ctm) = self
-            .camera
-            .take()
-            .unwrap_or_else(|| ("perspective".to_owned(), Parameters::default(), Transform::IDENTITY));
-        let Some(to_world) = ctm.inverse() else {
+        let (kind, parameters, state) =
+            self.camera.take().unwrap_or_else(|| ("perspective".to_owned(), Parameters::default(), State::default()));
+        let Some(to_world) = state.ctm.inverse() else {
             self.error("Camera", "its transform cannot be undone");
             return;
         };
         // +x is on the right.
         let mut to_world = Transform::scaling([-1.0, 1.0, 1.0]).then(&to_world);
         let mut children = vec![film, sampler];
+        if !state.outside.is_empty() {
+            children.push(self.nodes.reference(Some("medium"), &state.outside));
+        }
         let kind = match kind.as_str() {
             "perspective" => {
                 children.push(self.nodes.float("fov", parameters.number("fov").unwrap_or(90.0)));

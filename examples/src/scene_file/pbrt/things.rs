@@ -365,12 +365,6 @@ impl Reader<'_> {
                 "as if it were not given",
             );
         }
-        let glows =
-            ["Le", "LeScale", "Lescale", "temperature", "temperaturescale", "temperaturecutoff", "temperatureoffset"]
-                .map(|name| parameters.get(name).is_some());
-        if glows.contains(&true) {
-            self.instead("MakeNamedMedium", "media that glow are not supported in scene files", "it does not glow");
-        }
         let phase = vec![self.nodes.float("g", parameters.number("g").unwrap_or(0.0))];
         let mut children = vec![
             self.nodes.thing("phase", "hg", phase),
@@ -379,6 +373,14 @@ impl Reader<'_> {
         let coefficient = |reader: &mut Self, name: &str, usual: [f64; 3]| {
             reader.colour(parameters, name, name, None).unwrap_or_else(|| reader.nodes.rgb(name, usual))
         };
+        let strength = parameters.number("Lescale").or_else(|| parameters.number("LeScale"));
+        if parameters.get("Le").is_some() {
+            let glow = self.emission(parameters, "Le");
+            // `scale` is that of the coefficients.
+            let own = strength.unwrap_or(1.0) / parameters.number("scale").unwrap_or(1.0);
+            let own = if own.is_finite() { own } else { 0.0 };
+            children.push(self.nodes.rgb("glow", glow.map(|c| c * own)));
+        }
         // Of skim milk per millimetre, as pbrt has them where nothing is said.
         let usual = if kind == "homogeneous" { [[0.0011, 0.0024, 0.014], [2.55, 3.21, 3.77]] } else { [[1.0; 3]; 2] };
         children.push(coefficient(self, "sigma_a", usual[0]));
@@ -434,6 +436,29 @@ impl Reader<'_> {
                 return None;
             }
         };
+        let names = ["temperature", "temperaturescale", "temperatureoffset", "temperaturecutoff"];
+        let is_hot = names.map(|name| parameters.get(name).is_some()).contains(&true);
+        if kind == "nanovdb" && (is_hot || strength.is_some()) {
+            let offset = parameters.number("temperatureoffset").or_else(|| parameters.number("temperaturecutoff"));
+            let numbers = [
+                ("temperature_offset", offset.unwrap_or(0.0)),
+                ("temperature_scale", parameters.number("temperaturescale").unwrap_or(1.0)),
+                ("glow_scale", strength.unwrap_or(1.0)),
+            ];
+            children.extend(numbers.map(|(name, value)| self.nodes.float(name, value)));
+            let ctm = self.state.ctm;
+            let grid = vec![
+                self.nodes.string("filename", parameters.text("filename").unwrap_or_default()),
+                self.nodes.string("grid", "temperature"),
+                self.nodes.boolean("use_grid_bbox", true),
+                self.nodes.transform("to_world", &ctm),
+            ];
+            let grid = self.nodes.thing("volume", "gridvolume", grid);
+            self.nodes.tree.node_mut(grid).set("name", "temperature".to_owned());
+            children.push(grid);
+        } else if is_hot {
+            self.instead("MakeNamedMedium", "temperatures are read of NanoVDB files only", "it does not glow");
+        }
         let volume = self.nodes.thing("volume", "gridvolume", volume);
         self.nodes.tree.node_mut(volume).set("name", "density".to_owned());
         children.push(volume);
