@@ -138,7 +138,14 @@ impl Eye<'_> {
     #[inline]
     #[must_use]
     pub fn ray(&self, pixel: [u32; 2], size: [u32; 2], rng: &mut (impl Rng + ?Sized)) -> (Ray, f32) {
-        let (at, weight) = self.filter.sample(pixel, size, uniform2(rng));
+        self.ray_at(pixel, size, uniform2(rng), rng)
+    }
+
+    /// The same for given random numbers in [0, 1), which decide where in the pixel's filter it is.
+    #[inline]
+    #[must_use]
+    pub fn ray_at(&self, pixel: [u32; 2], size: [u32; 2], u: Vec2, rng: &mut (impl Rng + ?Sized)) -> (Ray, f32) {
+        let (at, weight) = self.filter.sample(pixel, size, u);
         (self.camera.ray_through_lens(at / Vec2::new(size[0] as f32, size[1] as f32), rng), weight)
     }
 }

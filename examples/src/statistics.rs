@@ -15,6 +15,8 @@ pub struct Statistics {
     pub records: Vec<(String, u64)>,
     /// The relative noise that records leave in the picture, where it was measured.
     pub record_noise: Option<f32>,
+    /// How many times the error asked for kinds of caches may have of their own light.
+    pub coarser: Vec<(String, f32)>,
 }
 
 impl Statistics {

@@ -3,7 +3,7 @@
 use super::asked::Asked;
 use super::audit::{Deviation, Findings};
 use super::bias_map::{Apart, BiasMap};
-use super::eye::{CachedRadiance, Caches, Reader, radiance, radiance_beyond};
+use super::eye::{CachedRadiance, Caches, Reader, radiance, radiance_beyond, straight};
 use super::kind::Kind;
 use super::photons::{PhotonEffort, PhotonGrid};
 use super::presets::{BLAMED, finer_by};
@@ -14,7 +14,10 @@ use super::slot::{ByKind, Slot};
 use super::{Estimator, SurfaceCache, VolumeCache};
 use crate::host::{Medium, Rng, Scene};
 use crate::math::Ray;
+use crate::sampling::uniform;
+use crate::spectrum::Spectrum;
 use crate::storage::{Chunk, List, most_within};
+use crate::transmittance::thickness::Marching;
 use crate::world::World;
 
 /// The caches of a world, by kind. They may be filled again for another view ([`RadianceCaches::fill`]), and then gain
@@ -240,6 +243,38 @@ impl RadianceCaches<'_> {
         rng: &mut (impl Rng + ?Sized),
     ) -> CachedRadiance {
         radiance_beyond(ray, &self.estimator(world), &self.reader(), &self.settings.eye, rng)
+    }
+
+    /// Of [`RadianceCaches::radiance`] what comes straight from lights ([`CachedRadiance::straight`]): edges of lamps are most of the noise of their pixels, and this is a
+    /// small part of the work of a sample, so that pictures take the mean of several.
+    ///
+    /// ```
+    /// # #[cfg(feature = "alloc")] {
+    /// # use fogbow::cache::{RadianceCaches, Settings};
+    /// # use fogbow::{host::Empty, light::Light, math::{Ray, Vec3}, medium::{Homogeneous, Placed, Region}, phase::Phase};
+    /// # use fogbow::{sampling::Generator, spectrum::Spectrum, world::World};
+    /// // A sky of 1, seen through a ball of fog two metres wide that absorbs.
+    /// let fog = Homogeneous::new(Spectrum::ONE, Spectrum::ZERO, Phase::ISOTROPIC)?;
+    /// let (ball, sky) = (Placed::new(fog, Region::sphere(Vec3::ZERO, 1.0)?), [Light::Constant(Spectrum::ONE)]);
+    /// let world = World { medium: &ball, scene: &Empty, lights: (&sky).into() };
+    /// let (caches, ray, rng) = (RadianceCaches::new(Settings::default()), Ray::new(-5.0 * Vec3::X, Vec3::X), &mut Generator::new(1));
+    /// let (seen, straight) = (caches.radiance(&ray, &world, rng), caches.straight(&ray, &world, rng));
+    /// assert!((straight[0] - (-2.0_f32).exp()).abs() < 1e-6 && (seen.straight[0] - straight[0]).abs() < 1e-6);
+    /// # }
+    /// # Ok::<(), fogbow::medium::MediumError>(())
+    /// ```
+    #[must_use]
+    pub fn straight<M: Medium + ?Sized, S: Scene + ?Sized>(
+        &self,
+        ray: &Ray,
+        world: &World<'_, M, S>,
+        rng: &mut (impl Rng + ?Sized),
+    ) -> Spectrum {
+        let Settings { eye, walk, .. } = &self.settings;
+        if !eye.lights_visible {
+            return Spectrum::ZERO;
+        }
+        straight(ray, world, Marching { steps: walk.steps, offset: uniform(rng) })
     }
 
     /// Drops the records that an [`Audit`](super::Audit) has found off by certainly more than `error`, to be made anew by the next fill: finer by

@@ -6,7 +6,7 @@ use super::estimate::Estimator;
 use super::lookup::{Basis, Reading};
 use super::store::{SurfaceCache, VolumeCache};
 use crate::host::{Hit, Medium, Properties, Rng, Scene};
-use crate::light::{Except, FromPoint, FromRay, Light, LightSample, Lights, Survey};
+use crate::light::{Except, FromPoint, FromRay, Light, LightSample, Lights, Survey, scattered};
 use crate::march::scattering_points;
 use crate::math::{Frame, Ray};
 use crate::path::connection_pdf;
@@ -78,6 +78,8 @@ pub struct Caches<'a> {
 pub struct CachedRadiance {
     /// Lights, the environment and glowing media.
     pub emitted: Spectrum,
+    /// Of what is emitted, what comes straight from lights, past no mirror: [`RadianceCaches::straight`](super::RadianceCaches::straight).
+    pub straight: Spectrum,
     /// Surfaces lit by the lights; diffuse ones but for a sky ([`Light::is_sky`](crate::light::Light::is_sky)), whose light is indirect.
     pub surface_direct: Spectrum,
     /// Surfaces lit by anything else.
@@ -132,6 +134,8 @@ trait Sight {
     fn surface(&mut self, ray: &Ray, hit: &Hit, weight: Spectrum);
     /// Light seen directly.
     fn emitted(&mut self, _light: Spectrum) {}
+    /// The same, from lights past no mirror.
+    fn straight(&mut self, _light: Spectrum) {}
 }
 
 /// How an eye ray came to go where it goes: what of the light that it runs into is not in a connection.
@@ -218,7 +222,8 @@ fn look<M: Medium + ?Sized, S: Scene + ?Sized>(
                     }
                     last.share(radiance, &world.lights, index, ray.direction, (f32::INFINITY, Vec3::ZERO))
                 };
-                sight.emitted(throughput * world.lights.distant().map(of).sum::<Spectrum>());
+                let light = throughput * world.lights.distant().map(of).sum::<Spectrum>();
+                if bounces == 0 { sight.straight(light) } else { sight.emitted(light) }
             }
             return;
         };
@@ -230,7 +235,8 @@ fn look<M: Medium + ?Sized, S: Scene + ?Sized>(
         {
             let radiance = light.radiance(point, hit.normal, to_eye);
             let at = (last.distance(point), hit.normal);
-            sight.emitted(throughput * last.share(radiance, &world.lights, index, ray.direction, at));
+            let light = throughput * last.share(radiance, &world.lights, index, ray.direction, at);
+            if bounces == 0 { sight.straight(light) } else { sight.emitted(light) }
         }
         if hidden || hit.surface == Surface::Null {
             ray = beyond(&ray, &hit);
@@ -431,6 +437,35 @@ pub fn radiance_beyond<M: Medium + ?Sized, S: Scene + ?Sized>(
     gathered(ray, estimator, caches, settings, false, rng)
 }
 
+/// Light that comes straight along a ray from lights and a sky, through the medium and past null interfaces.
+pub(super) fn straight<M: Medium + ?Sized, S: Scene + ?Sized>(
+    ray: &Ray,
+    world: &World<'_, M, S>,
+    marching: Marching,
+) -> Spectrum {
+    let (mut rest, mut sum) = (*ray, Spectrum::ZERO);
+    for _ in 0..=MAX_INTERFACES {
+        let hit = world.scene.closest_hit(&rest);
+        let light = match &hit {
+            None => world.lights.distant().map(|(_, light)| light.background(ray.direction)).sum(),
+            Some(hit) => {
+                let light = hit.light.and_then(|index| world.lights.get(index as usize));
+                light.map_or(Spectrum::ZERO, |light| light.radiance(hit.normal, -ray.direction))
+            }
+        };
+        if !light.is_black() {
+            // Most rays meet no light, and need none of this.
+            let end = hit.as_ref().map_or(rest.length, |hit| rest.at(hit.distance).distance(ray.origin));
+            sum += light * transmittance(&ray.with_length(end), world.medium, marching);
+        }
+        match &hit {
+            Some(hit) if hit.surface == Surface::Null => rest = beyond(&rest, hit),
+            _ => break,
+        }
+    }
+    sum
+}
+
 fn gathered<M: Medium + ?Sized, S: Scene + ?Sized>(
     ray: &Ray,
     estimator: &Estimator<'_, M, S>,
@@ -484,9 +519,10 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Gather<'_, M, S> {
             let x = self.light[i] + STEPS[i] * k as f32;
             (x - libm::floorf(x)).min(1.0 - f32::EPSILON)
         });
-        let weight = FromPoint { point, except: Except::Steep, sky: !self.settings.indirect };
-        let value = |to_light: Vec3, _| properties.phase.value(deflection(to_light, to_eye));
-        self.estimator.connected(&weight, |_| point, value, (choice, Vec2::new(u, v)), &mut self.rng)
+        let (to, phase) = (FromPoint { point, except: Except::Steep, sky: !self.settings.indirect }, &properties.phase);
+        let value = |to_light: Vec3, _| phase.value(deflection(to_light, to_eye));
+        let weight = scattered(to, to_eye, phase);
+        self.estimator.connected((&weight, point), |_| point, value, (choice, Vec2::new(u, v)), &mut self.rng)
     }
 
     /// Single scattering along a segment of one light within its near field.
@@ -511,6 +547,23 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Gather<'_, M, S> {
         let pdf = joint.pdf * chosen.probability;
         let light = properties.scattering * value * through * incident.irradiance / pdf;
         light.is_finite().then_some(light)
+    }
+
+    /// The mean of some connections from a surface: of one where there is one light, for which of several was chosen is the most part of the noise.
+    fn several(
+        &mut self,
+        connection: impl Fn(&Estimator<'_, M, S>, (f32, Vec2), &mut Generator) -> Spectrum,
+    ) -> Spectrum {
+        let (choice, at) = self.surface;
+        let count = if self.estimator.world.lights.len() > 1 { self.settings.connections.max(1) } else { 1 };
+        let mut sum = Spectrum::ZERO;
+        for k in 0..count {
+            let wrapped = |x: f32| (x - libm::floorf(x)).min(1.0 - f32::EPSILON);
+            let choice = wrapped(choice + k as f32 / count as f32);
+            let at = Vec2::new(wrapped(at.x + STEPS[1] * k as f32), wrapped(at.y + STEPS[2] * k as f32));
+            sum += connection(self.estimator, (choice, at), &mut self.rng);
+        }
+        sum / count as f32
     }
 
     /// Looks up one cache; where it has nothing, one sample.
@@ -594,12 +647,13 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Sight for Gather<'_, M, S> {
                 lambert::value(reflectance)
             }
             _ => {
-                let light = self.estimator.reflected(point, hit, to_eye, self.surface, &mut self.rng);
+                let light = self.several(|estimator, random, rng| estimator.reflected(point, hit, to_eye, random, rng));
                 self.seen.surface_direct += weight * light;
                 return;
             }
         };
-        let direct = self.estimator.direct_at(point, hit, !self.settings.indirect, self.surface, &mut self.rng);
+        let with_sky = !self.settings.indirect;
+        let direct = self.several(|estimator, random, rng| estimator.direct_at(point, hit, with_sky, random, rng));
         self.seen.surface_direct += weight * value * direct;
         if !self.settings.indirect {
             return;
@@ -619,5 +673,10 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Sight for Gather<'_, M, S> {
 
     fn emitted(&mut self, light: Spectrum) {
         self.seen.emitted += light;
+    }
+
+    fn straight(&mut self, light: Spectrum) {
+        self.seen.emitted += light;
+        self.seen.straight += light;
     }
 }

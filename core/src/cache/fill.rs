@@ -38,6 +38,7 @@ mod pilot;
 mod shoot;
 mod smooth;
 mod steps;
+mod weigh;
 
 pub(super) use estimates::MOST_PARTS;
 
@@ -65,6 +66,8 @@ enum Round {
     Shoot,
     /// Which cells do surfaces cut?
     Divide,
+    /// Sample all light along some eye rays: how much does each kind bring?
+    Weigh,
     /// Look which places of a batch have no record.
     Look,
     /// Estimates for new records.
@@ -424,7 +427,7 @@ impl<'s, F> Filling<'s, F> {
                     self.is_cut |= self.memory.photons.prepare(&effort, seed).is_err();
                     self.shoot_more();
                 } else {
-                    self.begin(0);
+                    self.begin_weighing();
                 }
             }
             Round::Shoot => self.shoot_more(),
@@ -432,6 +435,10 @@ impl<'s, F> Filling<'s, F> {
                 if let Some((effort, seed)) = self.caches.photon_effort() {
                     self.memory.photons.finish(&effort, seed);
                 }
+                self.begin_weighing();
+            }
+            Round::Weigh => {
+                self.take_shares();
                 self.begin(0);
             }
             Round::Look => {
@@ -508,6 +515,7 @@ where
             Round::Search => self.search(job, world, output),
             Round::Shoot => self.shoot(job, world, output),
             Round::Divide => self.divide(job, world, output),
+            Round::Weigh => self.weigh(job, world, output),
             Round::Look => self.look(job, output),
             Round::Make => self.make(job, world, output),
             Round::Pilot => self.pilot(job, world, output),
@@ -532,6 +540,9 @@ where
         if self.round == Round::Look {
             kept = kept.and(memory.still_open.extend_from_slice(output.open.as_slice()));
         }
+        if self.round == Round::Weigh {
+            kept = kept.and(memory.glances.extend_from_slice(&output.glances));
+        }
         if let Round::Glance { is_second } = self.round {
             self.take_glances(&output.glances, is_second);
         }
@@ -550,7 +561,7 @@ where
             Round::Search => "fill search",
             Round::Shoot | Round::Divide => "fill photons",
             Round::Done => "",
-            Round::Glance { .. } => "fill glances",
+            Round::Weigh | Round::Glance { .. } => "fill glances",
             Round::Look | Round::Make | Round::Pilot | Round::Again { .. } | Round::Smooth { .. } => {
                 match self.at_hand().map_or(Kind::Multiple, |(step, _)| step.kind) {
                     Kind::Single => "fill single",

@@ -167,9 +167,9 @@ pub(super) const TURNS: [Turn; 16] = {
         again(Multiple, 100, SECOND),
         again(Irradiance, 101, SECOND),
         Turn::Glances { is_second: true },
-        more(Surface, 200),
-        more(Multiple, 300),
-        more(Irradiance, 400),
+        more(Surface, 1000),
+        more(Multiple, 2000),
+        more(Irradiance, 3000),
         smooth(Irradiance),
     ]
 };

@@ -23,6 +23,7 @@
 //! | `fill` | [`Filling`]: which places get records, rounds of new ones, better estimates for old ones |
 //! | `memory` | [`FillingMemory`], [`FilledRecords`]: what a fill remembers, and what its jobs leave |
 //! | `pilots` | whether records reach too far, measured in this world |
+//! | `shares` | what part of a picture each kind brings, and how coarse it may be for that |
 //! | `noise` | [`Glance`]: how much noise of records a picture would show, and how often it makes kinds be estimated anew |
 //! | `photons` | [`PhotonEffort`]: light in cells, brought by photons, at which walks end |
 //! | `slot` | a cache of either sort, as filling needs it |
@@ -76,6 +77,7 @@ mod refine;
 mod room;
 mod set_bytes;
 mod settings;
+mod shares;
 mod slot;
 mod smooth;
 mod store;

@@ -8,6 +8,7 @@ use super::eye::CachedRadiance;
 use super::kind::{Kind, SECOND};
 use super::presets;
 use crate::sent::packed;
+use crate::spectrum::Spectrum;
 
 /// Eye rays that are read. Fewer: single dark pixels decide; more: time.
 pub(super) const RAYS: u32 = 1024;
@@ -33,6 +34,16 @@ impl Glance {
         let kinds = seen.by_kind().map(|light| light.mean());
         let all = seen.total().mean();
         if all.is_finite() { Self { kinds, all } } else { Self::default() }
+    }
+
+    /// As [`Glance::new`], without lights and what else glows.
+    pub(super) fn scattered(seen: &CachedRadiance) -> Self {
+        Self::new(&CachedRadiance { emitted: Spectrum::ZERO, ..*seen })
+    }
+
+    /// Light of each kind, and all light.
+    pub(super) fn light(&self) -> ([f32; KINDS], f32) {
+        (self.kinds, self.all)
     }
 }
 
@@ -111,13 +122,20 @@ pub(super) fn variance_after(left: &[Left; KINDS], rounds: [u32; KINDS]) -> f64 
 }
 
 /// How often each kind should be estimated once more, so that variances sum to `most`: always the one whose noise falls by most for its
-/// cost, as long as noise falls faster than the work that was `spent` grows.
-pub(super) fn rounds_for(left: &[Left; KINDS], costs: [f64; KINDS], most: f64, spent: f64) -> [u32; KINDS] {
+/// cost, as long as noise falls faster than the work that was `spent` grows. Of kinds that are made coarsely (`coarser`) a round is as much cheaper, and
+/// there may be as many more.
+pub(super) fn rounds_for(
+    left: &[Left; KINDS],
+    (costs, coarser): ([f64; KINDS], [f32; KINDS]),
+    most: f64,
+    spent: f64,
+) -> [u32; KINDS] {
+    let limits = coarser.map(|factor| (presets::MOST_ROUNDS as f32 * factor * factor) as u32);
     let (mut rounds, mut work) = ([0; KINDS], spent);
     loop {
         let sum = variance_after(left, rounds);
         let gain = |k: usize| (left[k].after(rounds[k]) - left[k].after(rounds[k] + 1)) / costs[k];
-        let is_open = |&k: &usize| rounds[k] < presets::MOST_ROUNDS && costs[k] > 0.0;
+        let is_open = |&k: &usize| rounds[k] < limits[k] && costs[k] > 0.0;
         let best = (0..KINDS).filter(is_open).max_by(|&a, &b| gain(a).total_cmp(&gain(b)));
         match best {
             Some(k) if sum > most && gain(k) / (sum + most) > presets::PAYS / work => {
@@ -132,7 +150,6 @@ pub(super) fn rounds_for(left: &[Left; KINDS], costs: [f64; KINDS], most: f64, s
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::spectrum::Spectrum;
 
     fn glance(multiple: f32, indirect: f32) -> Glance {
         let light = |value| Spectrum::splat(value);
@@ -177,7 +194,7 @@ mod tests {
     #[test]
     fn what_is_noisy_and_cheap_is_estimated_more_often() {
         let of = |variances: [f64; KINDS]| variances.map(|variance| Left { variance, estimates: 1.5 });
-        let rounds = |variances, costs| rounds_for(&of(variances), costs, 1.0, 10.0);
+        let rounds = |variances, costs| rounds_for(&of(variances), (costs, [1.0; KINDS]), 1.0, 10.0);
         assert_eq!(rounds([0.0, 0.3, 0.3, 0.3], [1.0; 4]), [0; 4], "little noise");
         assert_eq!(rounds([0.0, 0.1, 0.1, 2.0], [1.0; 4]), [0, 0, 0, 3], "as much as it takes");
         let shared = rounds([0.0, 2.0, 2.0, 2.0], [1.0, 1.0, 4.0, 1.0]);

@@ -28,7 +28,7 @@ pub(super) const SAMPLES: u32 = 64;
 /// Places of one job.
 pub(super) const PLACES_PER_JOB: u32 = 2;
 
-/// One over the part of the samples of a kind that pilots take.
+/// One over half of the part of the samples of a kind that pilots take, as each makes two estimates.
 const PART: u64 = 10;
 
 /// Jobs at least and at most. Fewer do not tell what is wrong from chance; more take time and tell no more.

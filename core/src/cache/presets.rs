@@ -66,6 +66,13 @@ const EVEN: f32 = 2.0;
 /// Most vertices of a walk. More: nothing, as roulette ends walks long before; fewer: dense fog that hardly absorbs turns out too dark.
 const VERTICES: u32 = 4096;
 
+/// Parts of a picture's light (`shares`) for which the efforts of the kinds that pictures are read from are made. Larger: noise and blur in pictures to which a
+/// kind brings much; smaller: time for what nobody sees.
+pub(super) const USUAL_SHARES: [f64; 4] = [0.4, 0.15, 0.4, 0.2];
+
+/// How many times the error asked for a kind may have of its own light at most. More: hardly less time; less: time for what nobody sees.
+pub(super) const MOST_COARSER: f64 = 8.0;
+
 /// Changes of light over less than this share of the size of the bounds are noise of single samples. Larger: light near walls and lamps
 /// is flattened; smaller: their noise makes radii tiny.
 const FINEST: f32 = 0.01;

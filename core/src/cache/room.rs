@@ -90,7 +90,7 @@ pub fn room_for(settings: &Settings, places: usize, records: usize) -> Room {
 
 /// Attachments of each record of a kind; `None` if the settings do not use it.
 pub(super) fn stride_of(settings: &Settings, kind: Kind) -> Option<usize> {
-    let effort = settings.effort(kind)?;
+    let effort = settings.asked(kind)?;
     Some(if kind.is_on_surfaces() { 1 } else { (coefficient_count(effort.degree) - 1).min(MAX_STRIDE) })
 }
 

@@ -150,7 +150,7 @@ impl RadianceCaches<'_> {
                 Slot::Volume(cache) => bytes::byte_count(cache),
                 Slot::Surface(cache) => bytes::byte_count(cache),
             };
-            Some((kind, self.settings.effort(kind)?, length))
+            Some((kind, self.settings.asked(kind)?, length))
         })
     }
 
@@ -243,7 +243,7 @@ impl RadianceCaches<'_> {
         }
         let (rows, views) = rows(bytes, tag)?;
         for (part, row) in Kind::ALL.into_iter().zip(&rows) {
-            let (found, due) = match (row, self.settings.effort(part)) {
+            let (found, due) = match (row, self.settings.asked(part)) {
                 (Some(row), Some(effort)) => (row.effort, effort),
                 (None, None) => continue,
                 (_, effort) => return Err(CachesError::Absent { part, is_asked_for: effort.is_some() }),

@@ -6,6 +6,7 @@ use super::kind::Kind;
 use super::lookup::Reading;
 use super::photons::PhotonEffort;
 use super::radius::Limits;
+use crate::math::float;
 use crate::multiple_scatter;
 use crate::path;
 use crate::transmittance::thickness::Steps;
@@ -36,6 +37,16 @@ impl Effort {
     fn coarser(self, tolerance: f32, fewer: u32) -> Self {
         Self { tolerance: tolerance * self.tolerance, samples: (self.samples / fewer).max(16), ..self }
     }
+
+    /// For records that may be off by `factor` times as much: noise falls with the root of samples, what extrapolation gets wrong with the square of radii.
+    fn rougher(self, factor: f32) -> Self {
+        if factor > 1.0 {
+            let samples = (self.samples as f32 / (factor * factor)) as u32;
+            Self { tolerance: self.tolerance * float::sqrt(factor), samples: samples.max(16).min(self.samples), ..self }
+        } else {
+            self
+        }
+    }
 }
 
 /// How caches are filled and read.
@@ -59,6 +70,9 @@ impl Effort {
 pub struct Settings {
     /// The relative error that pictures may have: pilots shrink radii until extrapolation leaves less than its part of it; 0 for no pilots.
     pub error: f32,
+    /// How many times that error each kind may have of its own light, at least 1, in the order of [`Kind::ALL`]: a fill for a view finds what part of
+    /// the picture a kind brings, and makes it for an error of its own.
+    pub coarser: [f32; Kind::COUNT],
     /// Light of the lights, scattered once; `None` to leave it to connections.
     pub single: Option<Effort>,
     /// Light of surfaces, scattered once.
@@ -98,6 +112,7 @@ impl Default for Settings {
     fn default() -> Self {
         Self {
             error: 0.0,
+            coarser: [1.0; Kind::COUNT],
             single: None,
             surface: None,
             multiple: None,
@@ -129,9 +144,14 @@ pub(super) const LEAST_RAYS: u32 = 16384;
 pub(super) const MOST_RAYS: u32 = 131_072;
 
 impl Settings {
-    /// The effort of a kind; `None` if it is not cached.
+    /// The effort of a kind, for the error that it may have; `None` if it is not cached.
     #[must_use]
     pub fn effort(&self, kind: Kind) -> Option<Effort> {
+        self.asked(kind).map(|effort| effort.rougher(self.coarser[kind as usize]))
+    }
+
+    /// The effort of a kind as it is asked for, whatever part of a picture it brings.
+    pub(super) fn asked(&self, kind: Kind) -> Option<Effort> {
         match kind {
             Kind::Single => self.single,
             Kind::Surface => self.surface,
@@ -150,7 +170,8 @@ impl Settings {
     /// ```
     #[must_use]
     pub fn reading(&self, kind: Kind) -> Option<Reading> {
-        let tolerance = self.effort(kind)?.tolerance;
+        // As asked for: caches that come from a file are read as those that were filled.
+        let tolerance = self.asked(kind)?.tolerance;
         Some(Reading { extrapolation: self.extrapolation, ..Reading::new(tolerance) })
     }
 }

@@ -98,6 +98,15 @@ impl<'s> Slot<'s> {
         }
     }
 
+    /// What a record tells of its own place, in the direction of `basis`.
+    pub(super) fn told_by(&self, number: usize, basis: &Basis) -> Option<Spectrum> {
+        let value = self.records().get(number)?.value;
+        Some(match self {
+            Self::Volume(cache) => basis.expanded(value, cache.attached(number as u32)),
+            Self::Off | Self::Surface(_) => value,
+        })
+    }
+
     /// About how large the radius of a record at a point would be.
     pub(super) fn radius_near(&self, point: Vec3) -> Option<f32> {
         match self {

@@ -347,8 +347,9 @@ mod tests {
 
     use super::*;
     use crate::light::question::{Except, FromRay, Guess};
-    use crate::light::{PointLight, QuadLight, SphereLight, SpotLight, Sun};
+    use crate::light::{PointLight, QuadLight, SphereLight, SpotLight, Sun, scattered};
     use crate::math::Ray;
+    use crate::phase::{Lobe, Phase, deflection};
     use crate::sampling::{Generator, uniform2, warp};
 
     fn at(rng: &mut Generator) -> Vec3 {
@@ -424,8 +425,45 @@ mod tests {
                 check_choices(&lights, &points[0], is_whole);
                 points[1..].iter().for_each(|question| check_choices(&lights, question, false));
                 rays.iter().for_each(|question| check_choices(&lights, question, is_whole));
+                for g in [0.6, -0.9] {
+                    let phase = Phase::from(Lobe::HenyeyGreenstein { g });
+                    let to_eye = warp::uniform_sphere(uniform2(rng));
+                    check_choices(&lights, &scattered(points[0], to_eye, &phase), is_whole);
+                    check_choices(&lights, &scattered(points[2], to_eye, &phase), false);
+                }
             }
         }
+    }
+
+    /// What an estimate of light that is scattered has as its mean square, over its squared mean, where a question chooses the lamp.
+    fn spread_of_scattered(lights: &Lights<'_>, question: &impl Question, (to_eye, phase): (Vec3, &Phase)) -> f64 {
+        let point = at(&mut Generator::new(8));
+        let sent = |(i, light): (usize, &Light<'_>)| {
+            let to_light = (light.near_field().unwrap().centre() - point).normalize();
+            let light = light.importance(point) * phase.value(deflection(to_light, to_eye)).mean();
+            let share = lights.share(question, i);
+            [f64::from(light), f64::from(light * light / share)]
+        };
+        let [sum, squares] = lights.iter().enumerate().map(sent).fold([0.0; 2], |a, b| [a[0] + b[0], a[1] + b[1]]);
+        squares / (sum * sum)
+    }
+
+    #[test]
+    fn lamps_are_chosen_by_what_is_scattered_to_the_eye() {
+        let all = lamps(100);
+        let tree = LightTree::new(&all, Vec::new()).unwrap();
+        let (lights, point) = (Lights::with_tree(&all, &tree), at(&mut Generator::new(8)));
+        let mut worst = [0.0_f64; 2];
+        for i in 0..8 {
+            let phase = Phase::from(Lobe::HenyeyGreenstein { g: 0.6 });
+            let to_eye = warp::uniform_sphere(uniform2(&mut Generator::new(i)));
+            let to = FromPoint::all(point);
+            let by_distance = spread_of_scattered(&lights, &to, (to_eye, &phase));
+            let by_lobe = spread_of_scattered(&lights, &scattered(to, to_eye, &phase), (to_eye, &phase));
+            worst = [worst[0].max(by_distance), worst[1].max(by_lobe)];
+            assert!(by_lobe < by_distance && by_lobe < 1.6, "{by_lobe} {by_distance}");
+        }
+        assert!(worst[0] > 2.0 * worst[1], "{worst:?}");
     }
 
     /// What an estimate by one choice has as its mean square, over its squared mean: 1 where probabilities follow the lights.

@@ -36,7 +36,7 @@ pub use lights::Lights;
 pub(crate) use lights::{Strong, Survey};
 pub use picture::{LightImage, PictureLight, Projector, Throw};
 pub use point::{PhongLight, PointLight, SpotLight};
-pub(crate) use question::{Except, FromPoint, FromRay, Guess, Question};
+pub(crate) use question::{Except, FromPoint, FromRay, Guess, Question, scattered};
 pub(crate) use tree::Kind;
 pub use tree::{LightNode, LightTree};
 

@@ -6,6 +6,7 @@ use super::cut::{CHOICE, WALKS};
 use super::tree::{Kind, LightNode};
 use super::{Light, NearField};
 use crate::math::{Ray, float};
+use crate::phase::{Deflection, Phase};
 
 /// What the lights of a node send, together.
 #[derive(Debug, Clone, Copy, Default)]
@@ -127,6 +128,86 @@ impl Question for FromPoint {
         // Lamps on one another have no radius.
         let inverse2 = 1.0 / distance2.max(INSIDE * radius2).max(1e-12);
         Guess::new((node.strength * inverse2).min(1e30), radius2 * inverse2)
+    }
+}
+
+/// What is sent to a point and from there on by a lobe, about.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Lobed<F> {
+    /// What is sent to the point.
+    pub to: FromPoint,
+    /// Around which direction (unit).
+    pub axis: Vec3,
+    /// Where light comes from at such a cosine from the axis, how much of it leaves in the direction in question, over the mean of all directions. Never 0
+    /// where any may: lamps are wider than their middle.
+    pub value: F,
+}
+
+/// Lights are chosen by the light that is scattered from them, over that of isotropic scattering, but by this at least: lamps are wider than their middle,
+/// and lobes may be narrower. Larger: lights are chosen that hardly matter; smaller: bright dots.
+const DIMMEST: f32 = 0.1;
+
+/// What lights send to a point of a medium that scatters it `to_eye`, about.
+pub(crate) fn scattered<'p>(to: FromPoint, to_eye: Vec3, phase: &'p Phase) -> Lobed<impl Fn(f32) -> f32 + 'p> {
+    let is_even = phase.is_isotropic();
+    let value = move |cosine| {
+        if is_even { 1.0 } else { (4.0 * float::PI * phase.value(Deflection::from_cos(cosine)).mean()).max(DIMMEST) }
+    };
+    Lobed { to, axis: -to_eye, value }
+}
+
+impl<F: Fn(f32) -> f32> Lobed<F> {
+    /// In the middle of a ball at an offset from the point with a squared radius, and by how much more there may be at its rim.
+    #[inline]
+    fn weight(&self, offset: Vec3, radius2: f32) -> [f32; 2] {
+        let distance2 = offset.length_squared();
+        if !(distance2 > radius2) {
+            return [1.0, 1.0];
+        }
+        let cosine = self.axis.dot(offset) / float::sqrt(distance2);
+        let middle = (self.value)(cosine);
+        if radius2 <= 0.0 {
+            return [middle, 0.0];
+        }
+        let sine2 = radius2 / distance2;
+        let (sine, rest) = (float::sqrt(sine2), float::sqrt(1.0 - sine2));
+        let nearest = if cosine >= rest { 1.0 } else { cosine * rest + float::safe_sqrt(1.0 - cosine * cosine) * sine };
+        let nearest = (self.value)(nearest);
+        [0.5 * (middle + nearest), (nearest - middle).abs()]
+    }
+}
+
+impl<F: Fn(f32) -> f32> Question for Lobed<F> {
+    fn asks(&self, kind: Kind) -> bool {
+        self.to.asks(kind)
+    }
+
+    #[inline]
+    fn light(&self, light: &Light<'_>) -> f32 {
+        let sent = self.to.light(light);
+        match light.near_field() {
+            Some(field) if sent > 0.0 => (sent * self.weight(field.centre() - self.to.point, 0.0)[0]).min(1e30),
+            _ => sent,
+        }
+    }
+
+    #[inline]
+    fn leaf(&self, node: &LightNode, light: &Light<'_>) -> f32 {
+        let sent = self.to.leaf(node, light);
+        if node.reach == 0.0 || sent <= 0.0 {
+            return sent;
+        }
+        (sent * self.weight(node.centre - self.to.point, 0.0)[0]).min(1e30)
+    }
+
+    #[inline]
+    fn node(&self, node: &LightNode) -> Guess {
+        let guess = self.to.node(node);
+        if node.reach == 0.0 || guess.weight <= 0.0 {
+            return guess;
+        }
+        let [weight, more] = self.weight(node.centre - self.to.point, node.radius2);
+        Guess { weight: (guess.weight * weight).min(1e30), doubt: guess.doubt * weight + guess.weight * more }
     }
 }
 

@@ -6,7 +6,7 @@ use super::flight::{Collision, Flown, Flying, Lengths, fly, own};
 use super::lamps;
 use super::weight::{Shift, Weight};
 use crate::host::{Hit, Medium, Properties, Rng, Scene};
-use crate::light::{Except, Falloff, FromPoint, FromRay, Light, Question};
+use crate::light::{Except, Falloff, FromPoint, FromRay, Light, Question, scattered};
 use crate::math::{Ray, float};
 use crate::phase::{Phase, deflection};
 use crate::sampling::{Generator, mis, uniform, uniform2, warp};
@@ -247,7 +247,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Walk<'_, M, S> {
                 None => lights.sky(ray.direction),
             };
             if meets_lights && let Some(hit) = &end {
-                radiance += self.met(&ray, hit, properties.phase.pdf(deflection(ray.direction, to_eye)));
+                radiance += self.met(&ray, hit, (to_eye, &properties.phase));
             }
             if radiance.is_black() && end.is_none() && known.is_none() {
                 continue;
@@ -295,7 +295,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Walk<'_, M, S> {
         rng: &mut Generator,
     ) {
         let World { medium, scene, .. } = self.world;
-        self.each(&at_vertex(at), rng, |light, share, rng| {
+        self.each(&at_vertex(at, towards), rng, |light, share, rng| {
             let mut sample = light.sample(at, uniform2(rng))?;
             sample.source.weight = sample.source.weight / share;
             if is_shared && sample.pdf > 0.0 {
@@ -311,9 +311,9 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Walk<'_, M, S> {
     }
 
     /// What a light that a ray from a vertex meets sends back along it, with its share of what [`Walk::lights_at`] connects to: directions
-    /// at the vertex have the density `pdf` (sr⁻¹). A phase function that is sharper than the light is large makes
+    /// at the vertex are those of the phase function. A phase function that is sharper than the light is large makes
     /// connections vary without a useful bound.
-    fn met(&self, ray: &Ray, hit: &Hit, pdf: f32) -> Spectrum {
+    fn met(&self, ray: &Ray, hit: &Hit, towards: (Vec3, &Phase)) -> Spectrum {
         let lights = &self.world.lights;
         let met = hit.light.and_then(|index| Some((index as usize, lights.get(index as usize)?)));
         let Some((index, light)) = met else { return Spectrum::ZERO };
@@ -321,7 +321,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Walk<'_, M, S> {
         if radiance.is_black() {
             return Spectrum::ZERO;
         }
-        let question = at_vertex(ray.origin);
+        let question = at_vertex(ray.origin, towards);
         let share = match self.settings.one_light {
             true => lights.share(&question, index),
             false => f32::from(question.light(light) > 0.0),
@@ -329,6 +329,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Walk<'_, M, S> {
         if share <= 0.0 {
             return Spectrum::ZERO;
         }
+        let pdf = towards.1.pdf(deflection(ray.direction, towards.0));
         radiance * mis::power(pdf, share * light.pdf(ray.origin, ray.direction, hit.distance, hit.normal))
     }
 
@@ -383,9 +384,9 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Walk<'_, M, S> {
     }
 }
 
-/// What lights send to a vertex but those around which it lies.
-fn at_vertex(point: Vec3) -> FromPoint {
-    FromPoint { point, except: Except::Steep, sky: false }
+/// What lights but those around which it lies send to a vertex, which scatters it on.
+fn at_vertex<'p>(point: Vec3, (to_eye, phase): (Vec3, &'p Phase)) -> impl Question + use<'p> {
+    scattered(FromPoint { point, except: Except::Steep, sky: false }, to_eye, phase)
 }
 
 /// Whether walks may meet lights as they are scattered by a phase function: elsewhere connections do better, and spare a ray.

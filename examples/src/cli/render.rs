@@ -359,6 +359,10 @@ pub(crate) fn render(arguments: &RenderArguments) -> Result<Rendered, Failure> {
         for kind in Kind::ALL {
             statistics.bytes.push((format!("cache {}", kind.name()), cached.caches.bytes(kind) as u64));
             statistics.records.push((kind.name().to_owned(), cached.caches.records(kind).len() as u64));
+            if cached.caches.settings().effort(kind).is_some() {
+                let coarser = cached.caches.settings().coarser[kind as usize];
+                statistics.coarser.push((kind.name().to_owned(), coarser));
+            }
         }
         statistics.records.push(("computed".to_owned(), cached.computed));
         statistics.record_noise = cached.record_noise;

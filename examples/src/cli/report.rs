@@ -310,6 +310,9 @@ impl Report<'_> {
         let (bytes, records) = (listed(&self.statistics.bytes), listed(&self.statistics.records));
         let noise =
             self.statistics.record_noise.map_or_else(String::new, |noise| format!("\"record_noise\": {noise},\n  "));
+        let coarser = self.statistics.coarser.iter().map(|(kind, factor)| format!("{}: {factor}", quoted(kind)));
+        let coarser = coarser.collect::<Vec<_>>().join(", ");
+        let noise = if coarser.is_empty() { noise } else { format!("{noise}\"coarser\": {{{coarser}}},\n  ") };
         let instead = self.choice.instead.as_ref();
         let instead = instead.map_or_else(String::new, |reason| format!("\"why_path\": {},\n  ", quoted(reason)));
         format!(

@@ -89,7 +89,8 @@ impl<F> Filling<'_, F> {
         let settings = self.settings();
         let limits = match &self.asked {
             Asked::View { pixel, .. } => {
-                effort.limits.on_screen(settings.pixels[0], settings.pixels[1], *pixel, distance)
+                let [least, most] = settings.pixels.map(|p| p * float::sqrt(settings.coarser[step.kind as usize]));
+                effort.limits.on_screen(least, most, *pixel, distance)
             }
             Asked::Box(_) => effort.limits,
         };

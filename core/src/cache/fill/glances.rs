@@ -24,6 +24,9 @@ impl<F> Filling<'_, F> {
         if is_second && self.memory.glances.is_empty() {
             return false;
         }
+        if !is_second {
+            self.memory.glances.clear();
+        }
         let jobs = noise::RAYS.min(self.settings().rays).div_ceil(RAYS_PER_JOB);
         self.enter(Round::Glance { is_second }, jobs);
         true
@@ -70,7 +73,8 @@ impl<F> Filling<'_, F> {
         let left = self.noise.left(efforts);
         // Blind estimates, and second ones with all their samples; about, for nothing hangs on it but where it stops to pay.
         let spent = self.walks() as f64 + costs.iter().sum::<f64>();
-        let rounds = rounds_for(&left, costs, most * most, spent);
+        let coarser = Kind::FINAL.map(|kind| self.settings().coarser[kind as usize]);
+        let rounds = rounds_for(&left, (costs, coarser), most * most, spent);
         Kind::FINAL.into_iter().zip(rounds).for_each(|(kind, rounds)| self.more[kind] = rounds);
         self.left = Some(libm::sqrt(noise::variance_after(&left, rounds)) as f32);
     }

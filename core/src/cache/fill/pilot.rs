@@ -52,9 +52,30 @@ impl<F> Filling<'_, F> {
             let guides = self.memory.guides[step.kind].as_slice();
             let guide = Guided::new(&learnt_near(slot, guides, self.before[step.kind], place.point));
             let looks = Looks { count: pilots::SAMPLES, guide: guide.as_ref(), learnt: None, to_eye: place.to_eye };
+            // Both estimates draw the same random numbers, so that what differs between them is hardly noise.
+            let mut same = rng.clone();
             let mut estimate = Estimate { place, ..Estimate::default() };
-            if self.estimate(step, world, looks, &mut estimate, &mut rng, output) {
-                output.pilots.add(told, basis.expanded(estimate.sums.value, output.higher.as_slice()));
+            if !self.estimate(step, world, looks, &mut estimate, &mut rng, output) {
+                continue;
+            }
+            let own = basis.expanded(estimate.sums.value, output.higher.as_slice());
+            output.higher.clear();
+            // Records have been estimated once by now: one that is too bright by chance reaches less far, so that what is read is too dark
+            // whatever the radii. By how much is told by one of those that are read, estimated anew where it is.
+            let (mut sum, mut chosen) = (0.0, None);
+            slot.visit(place.point, |number, weight| {
+                sum += weight;
+                if uniform(&mut rng) * sum < weight {
+                    chosen = Some(number);
+                }
+            });
+            let found = chosen.and_then(|number| Some((slot.place(number)?, slot.told_by(number, &basis)?)));
+            let Some((there, before)) = found else { continue };
+            let looks = Looks { count: pilots::SAMPLES, guide: guide.as_ref(), learnt: None, to_eye: place.to_eye };
+            let mut anew = Estimate { place: there, ..Estimate::default() };
+            if self.estimate(step, world, looks, &mut anew, &mut same, output) {
+                let anew = basis.expanded(anew.sums.value, output.higher.as_slice());
+                output.pilots.add(told + anew - before, own);
             }
             output.higher.clear();
         }
@@ -62,7 +83,10 @@ impl<F> Filling<'_, F> {
 
     /// Shrinks radii if pilots say so, and makes records where then none reach.
     pub(super) fn shrink(&mut self) {
-        let found = self.at_hand().zip(self.pilots.factor(self.settings().error));
+        let found = self.at_hand().and_then(|at_hand| {
+            let error = self.settings().error * self.settings().coarser[at_hand.0.kind as usize];
+            Some((at_hand, self.pilots.factor(error)?))
+        });
         let Some(((step, effort), factor)) = found else {
             self.begin(self.step + 1);
             return;
