@@ -450,7 +450,7 @@ pub(super) fn straight<M: Medium + ?Sized, S: Scene + ?Sized>(
             None => world.lights.distant().map(|(_, light)| light.background(ray.direction)).sum(),
             Some(hit) => {
                 let light = hit.light.and_then(|index| world.lights.get(index as usize));
-                light.map_or(Spectrum::ZERO, |light| light.radiance(hit.normal, -ray.direction))
+                light.map_or(Spectrum::ZERO, |light| light.radiance(rest.at(hit.distance), hit.normal, -ray.direction))
             }
         };
         if !light.is_black() {

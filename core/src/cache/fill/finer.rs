@@ -8,7 +8,7 @@ use crate::cache::noise::Noise;
 use crate::cache::radius::Limits;
 use crate::cache::settings::{Effort, Settings};
 use crate::cache::slot::ByKind;
-use crate::math::{Ray, Vec3};
+use crate::math::{Ray, Vec3, float};
 
 /// Samples of a coarser level over as many of a finer one, by what they count. Their walks have ended in cells that fewer photons lit, and at surfaces
 /// that were known less well. More: what those had wrong stays for longer; less: samples are thrown away.
@@ -97,6 +97,7 @@ impl<'s, F: Fn([f32; 2]) -> Ray> Filling<'s, F> {
             multiple: finer(before.multiple, settings.multiple),
             irradiance: finer(before.irradiance, settings.irradiance),
             photons: settings.photons.or(before.photons),
+            coarser: before.coarser,
             seed: before.seed,
             ..settings
         };
@@ -159,9 +160,11 @@ impl<F> Filling<'_, F> {
     /// Shrinks the radii of a kind to what this level allows, just before what then is missing is made: caches can be read at any time.
     pub(super) fn tighten(&mut self, (Step { kind, .. }, effort): (Step, Effort)) {
         let Some(Tighter { factor, limits, pixels, eye }) = self.held[kind].tighter.take() else { return };
-        let now = self.settings().pixels;
+        let (now, coarser) = (self.settings().pixels, float::sqrt(self.settings().coarser[kind as usize]));
         let on_screen = |limits: Limits, pixels: [f32; 2], point: Vec3| match eye {
-            Some((eye, pixel)) => limits.on_screen(pixels[0], pixels[1], pixel, eye.distance(point)),
+            Some((eye, pixel)) => {
+                limits.on_screen(pixels[0] * coarser, pixels[1] * coarser, pixel, eye.distance(point))
+            }
             None => limits,
         };
         let is_room = self.caches.slots[kind].shrink(|record| {

@@ -19,8 +19,8 @@ impl<F> Filling<'_, F> {
     /// Begins what follows photons: a round that weighs kinds, or records where that is not known or of no use.
     pub(super) fn begin_weighing(&mut self) {
         let is_asked = matches!(self.asked, Asked::View { .. }) && self.settings().error > 0.0;
-        // What is made in place of what an audit has found wrong is weighed already.
-        if !is_asked || self.caches.dropped > 0 {
+        // What is made in place of what an audit has found wrong is weighed already, and so is what finer levels go on with.
+        if !is_asked || self.caches.dropped > 0 || self.level > 0 {
             return self.begin(0);
         }
         self.memory.glances.clear();
