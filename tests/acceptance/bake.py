@@ -1,10 +1,11 @@
 #!/usr/bin/env python3
-"""Baked light against what must hold of it: python3 tests/acceptance/bake.py [leaks | truth | pictures | speed | kill | schema] …
+"""Baked light against what must hold of it: python3 tests/acceptance/bake.py [leaks | truth | pictures | speed | flicker | kill | schema] …
 
     leaks       behind the thin wall: what look-ups find, with planes of surfaces and as hardware mixes, of the light before it
     truth       probes against path tracing of the same probes with many more samples: four boxes and the atrium
     pictures    the atrium and a smoke box marched from 32³, 64³, 128³ probes against path tracing; a plot
     speed       32³ probes of degree 2 in the atrium: processor seconds, beside path tracing the same probes
+    flicker     frames of a plume with one seed: how much probes jump from frame to frame beside what light does
     kill        killed with -9 at any time and gone on with: the same bytes
     schema      descriptions against examples/shaders/bake.schema.json (needs Python's jsonschema)
 
@@ -172,6 +173,29 @@ def speed(folder):
     return ratio >= 50
 
 
+def flicker(folder):
+    """Frames of a plume, 1/12 s apart, baked with one seed and with a seed each: how much more probes jump from frame to frame than the light itself, as far better bakes have it."""
+    run("plume", "--frames", 4, "--resolution", 32, "-o", folder / "plume", "-q")
+    frames = [folder / f"plume/plume-{i:02}.xml" for i in range(4)]
+
+    def light(frame, error, seed, passes=1024):
+        asked = ["--counts", "16x16x16", "--method", "photons", "--error", error, "--passes", passes, "--seed", seed, "-q"]
+        run("bake", frame, *asked, "-o", folder / "frame.json")
+        probes = Probes(folder / "frame.json")
+        return probes.numbers()[probes.valid][:, 0].mean(-1)
+
+    due = [light(frame, 0.004, 1000 + i) for i, frame in enumerate(frames)]
+    level = np.mean(due)
+    jumps = {}
+    for name, seeds in (("one seed", [0] * 4), ("a seed each", range(4))):
+        found = [light(frame, 0.02, seed) for frame, seed in zip(frames, seeds)]
+        extra = [(b - a) - (d - c) for a, b, c, d in zip(found, found[1:], due, due[1:])]
+        jumps[name] = 100 * np.sqrt(np.mean(np.square(extra))) / level
+    moved = 100 * np.sqrt(np.mean([np.square(b - a).mean() for a, b in zip(due, due[1:])])) / level
+    print(f"plume: light changes by {moved:.2f} % of the mean from frame to frame; beside that probes jump by {jumps['one seed']:.2f} % with one seed, {jumps['a seed each']:.2f} % with a seed each")
+    return jumps["one seed"] < jumps["a seed each"]
+
+
 def kill(folder):
     """Ended without a word at ten times, and gone on with; by paths and by photons."""
     held = True
@@ -267,7 +291,7 @@ def medium(file):
 
 
 def main():
-    tasks = {"leaks": leaks, "truth": truth, "pictures": pictures, "speed": speed, "kill": kill, "schema": schema}
+    tasks = {"leaks": leaks, "truth": truth, "pictures": pictures, "speed": speed, "flicker": flicker, "kill": kill, "schema": schema}
     asked = sys.argv[1:] or list(tasks)
     with tempfile.TemporaryDirectory() as folder:
         folder = pathlib.Path(os.environ.get("FOLDER", folder))

@@ -60,14 +60,14 @@ impl Sampler<'_, '_> {
         let phase = phase_at(point, world, self.settings);
         let projection = Projection::new(basis, quantity, &phase);
         let mut due = Parts::from(orders);
+        if self.has_photons {
+            (due.surfaces, due.medium) = (false, false);
+        }
         // Records of a medium do not know irradiance.
         if quantity == Quantity::InScattered || basis == ProbeBasis::Fluence {
             due.lights = due.lights && !self.read(Kind::Single, point, held);
             due.surfaces = due.surfaces && !self.read(Kind::Surface, point, held);
             due.medium = due.medium && !self.read(Kind::Multiple, point, held);
-        }
-        if self.has_photons {
-            (due.surfaces, due.medium) = (false, false);
         }
         let mut add = |to_light: Vec3, irradiance: Spectrum| projection.add(to_light, irradiance, held);
         let connections = if is_even(&world.lights) { 1 } else { CONNECTIONS };

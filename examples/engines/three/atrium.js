@@ -101,7 +101,6 @@ function draw() {
   target.setSize(width, height);
   camera.aspect = width / height;
   camera.updateProjectionMatrix();
-  controls.update();
   camera.updateMatrixWorld();
   pass.uniforms.back.value.multiplyMatrices(camera.matrixWorld, camera.projectionMatrixInverse);
   renderer.setRenderTarget(target);
@@ -110,6 +109,7 @@ function draw() {
   renderer.render(screen, camera);
   document.title = "Baked fog in three.js: drawn";
 }
+controls.update();
 controls.addEventListener("change", draw);
 addEventListener("resize", draw);
 draw();
