@@ -392,6 +392,33 @@ fn fog_comes_in_all_forms() {
 }
 
 #[test]
+fn fog_without_a_place_fills_the_scene_and_the_sun_stands_where_it_is_said_to() {
+    let folder = Folder::new("everywhere");
+    let fog =
+        folder.write("my.toml", "sun = { from = [0, 2, 0], irradiance = [3, 2, 1] }\n[[fog]]\nvisibility = 39.12\n");
+    let options = ReadOptions { fog: Some(fog), ..ReadOptions::default() };
+    let findings = SceneFile::from_gltf(&folder.0.join("box.glb"), &binary_box(), &options);
+    let scene = findings.into_scene().unwrap();
+    let sun = scene.emitters.iter().find_map(|e| match e {
+        Emitter::Directional { direction, irradiance } => Some((*direction, *irradiance)),
+        _ => None,
+    });
+    assert_eq!(sun, Some(([-0.0, -1.0, -0.0], Spectrum::new(3.0, 2.0, 1.0))));
+    let surfaces = scene.shapes.iter().map(|shape| fogbow_examples::world::bounds_of(&shape.geometry));
+    let all = surfaces.fold(fogbow::math::Bounds::EMPTY, fogbow::math::Bounds::union);
+    let [low, high] = scene.media[0].bounds();
+    for axis in 0..3 {
+        let (least, most) = (f64::from(all.min[axis]), f64::from(all.max[axis]));
+        assert!(
+            low[axis] < least && high[axis] > most && high[axis] - low[axis] < 1.01 * (most - least),
+            "{low:?}, {high:?}"
+        );
+    }
+    let due = 0.1 * (0..3).map(|i| high[i] - low[i]).fold(0.0, f64::max);
+    assert!((scene.media[0].thickness() - due).abs() < 1e-6 * due);
+}
+
+#[test]
 fn fog_that_cannot_be_is_said() {
     let cases: &[(&str, &[&str])] = &[
         ("[[fog]]\nshape = \"cone\"\n", &["my.toml:2", "cone"]),
@@ -406,6 +433,8 @@ fn fog_that_cannot_be_is_said() {
         ("[[fog]]\nshape = \"grid\"\nfile = \"none.vdb\"\n", &["none.vdb", "cannot be read"]),
         ("[[fog]]\nshape = \"grid\"\nfile = \"cloud.nvdb\"\ngrid = \"smoke\"\n", &["there is no grid \"smoke\""]),
         ("[sky]\n", &["[sky]", "radiance"]),
+        ("[sun]\nfrom = [0, 0, 0]\nirradiance = 1\n", &["[sun]", "no direction"]),
+        ("[sun]\nfrom = [0, 1, 0]\nirradiance = -1\n", &["[sun]", "negative"]),
         ("fog = 3\n", &["my.toml:1"]),
         ("[[fog]\n", &["my.toml:1"]),
     ];

@@ -21,7 +21,7 @@ use super::vpl::VplArguments;
 use super::{Failure, output};
 use crate::scene_file::SceneFile;
 
-/// Renders a Mitsuba 3 scene.
+/// Renders a scene of Mitsuba (.xml), glTF (.glb, .gltf) or pbrt (.pbrt).
 #[derive(Debug, Args)]
 #[command(mut_args(told))]
 pub struct RenderArguments {

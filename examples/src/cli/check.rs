@@ -1,13 +1,15 @@
 //! `fogbow check`.
 
 use clap::Args;
+use fogbow::math::Bounds;
 
 use super::scene::{SceneArguments, said};
 use super::{Ending, Failure};
-use crate::scene_file::{Findings, NoteKind};
-use crate::world::{Storage, World};
+use crate::scene_file::{Findings, NoteKind, SceneFile};
+use crate::transform::to_array;
+use crate::world::{Storage, World, bounds_of};
 
-/// Says all at once what of a scene cannot be rendered, has no effect, or looks like a mistake.
+/// Says all at once what of a scene cannot be rendered, has no effect, or looks like a mistake, and how large and thick its media are.
 ///
 /// A line each, with file, line and what to do; the last line is the verdict. Exit code 2 if `fogbow render` would refuse the scene.
 #[derive(Debug, Args)]
@@ -23,6 +25,7 @@ pub(super) fn run(arguments: &CheckArguments) -> Result<Ending, Failure> {
         let mut storage = Storage::new(scene);
         errors.extend(World::new(scene, &mut storage).err());
     }
+    scene.iter().flat_map(inventory).for_each(|line| println!("{line}"));
     errors.iter().for_each(|error| println!("error: {error}"));
     said(&notes).iter().for_each(|line| println!("{line}"));
     let file = arguments.scene.file.display();
@@ -35,6 +38,29 @@ pub(super) fn run(arguments: &CheckArguments) -> Result<Ending, Failure> {
         _ => println!("{file}: can be rendered with --lenient; {} replaced", counted(replaced, "thing")),
     }
     Ok(Ending::Done)
+}
+
+/// Where surfaces and media are, and how thick.
+fn inventory(scene: &SceneFile) -> Vec<String> {
+    let shapes = scene.shapes.iter().map(|shape| bounds_of(&shape.geometry)).fold(Bounds::EMPTY, Bounds::union);
+    let surfaces =
+        (!scene.shapes.is_empty()).then(|| format!("surfaces: {}", extent([shapes.min, shapes.max].map(to_array))));
+    let media = scene.media.iter().map(|medium| {
+        let (most, across) = (medium.matter.densest(), medium.thickness());
+        let place = extent(medium.bounds());
+        format!("medium \"{}\": {place}; extinction up to {most:.3} per m: {across:.2} free paths across", medium.id)
+    });
+    surfaces.into_iter().chain(media).collect()
+}
+
+/// A box in words.
+fn extent([low, high]: [[f64; 3]; 2]) -> String {
+    if !low.iter().chain(&high).all(|c| c.is_finite()) {
+        return "without end".to_owned();
+    }
+    let [x, y, z] = [0, 1, 2].map(|i| high[i] - low[i]);
+    let point = |[x, y, z]: [f64; 3]| format!("({x:.2}, {y:.2}, {z:.2})");
+    format!("{x:.2} x {y:.2} x {z:.2} m, from {} to {}", point(low), point(high))
 }
 
 fn counted(count: usize, what: &str) -> String {

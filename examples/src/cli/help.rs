@@ -9,7 +9,8 @@ use clap::{Args, Command, CommandFactory, FromArgMatches};
 use super::{Arguments, Ending, Failure, Method, RenderArguments};
 
 /// Topics of `fogbow render --help TOPIC`, and the heading of their options.
-const TOPICS: [(&str, &str); 8] = [
+const TOPICS: [(&str, &str); 9] = [
+    ("scene", "Scenes"),
     ("radiance-cache", "Radiance caching"),
     ("photon-beams", "Photon beams"),
     ("vpl", "Virtual lights"),
@@ -42,10 +43,11 @@ const EXAMPLES: &str = "Examples:
   fogbow render box.xml                          box.png and box.exr, by radiance caching
   fogbow render box.xml --error 0.01 -o box.exr  finer
   fogbow render box.xml --method path --time 60  what a minute of path tracing gives
+  fogbow render room.glb --fog mist.toml         a glTF scene, with fog from a file
   fogbow check box.xml                           what of a scene cannot be rendered, and why
 
 --help TOPIC tells of one method or subject, --help all of everything:
-  radiance-cache, photon-beams, vpl, march, grids, sampling, long, parts, all";
+  scene (fog of glTF files, cameras), radiance-cache, photon-beams, vpl, march, grids, sampling, long, parts, all";
 
 /// What is said instead of doing something.
 #[derive(Debug)]

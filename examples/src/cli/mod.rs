@@ -68,7 +68,7 @@ pub struct Arguments {
 /// What to do.
 #[derive(Debug, Subcommand)]
 pub enum Command {
-    /// Renders a Mitsuba 3 scene.
+    /// Renders a scene of Mitsuba, glTF or pbrt.
     Render(Box<RenderArguments>),
     /// Computes what parts of a picture share: caches, or a covariance grid.
     Fill(Box<RenderArguments>),

@@ -191,8 +191,14 @@ impl Report<'_> {
             Reason::Cancelled => " (stopped early; the image so far is kept)",
         };
         eprintln!("{width} x {height} pixels, {} samples per pixel{ending}", self.samples_per_pixel());
-        let cpu = cpu.map_or_else(String::new, |c| format!(", {} of processor time", clock(c)));
-        eprintln!("{}{cpu}, {:.2} million rays per second", clock(wall), self.rays_per_second() * 1e-6);
+        let cpu = cpu.map_or_else(String::new, |c| format!(" and {} of processor time", clock(c)));
+        let all: f64 = self.statistics.phases.iter().map(|(_, seconds)| seconds.wall).sum();
+        let rays = self.rays_per_second() * 1e-6;
+        eprintln!(
+            "{} in all; {}{cpu} for samples, {rays:.2} million rays per second",
+            clock(all.max(wall)),
+            clock(wall)
+        );
         if let Some(Audited { error: most, findings, map, repaired }) = self.audited {
             let most = *most;
             let per_cent = (1e4 * most).round() / 100.0;

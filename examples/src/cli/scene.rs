@@ -21,6 +21,7 @@ pub struct SceneArguments {
 
 /// How a scene file is read.
 #[derive(Debug, Clone, Args)]
+#[command(next_help_heading = "Scenes")]
 pub struct ReadArguments {
     /// Value of a parameter ($NAME) of the scene, before the one the scene has for it; may be repeated.
     #[arg(short = 'D', long = "define", value_name = "NAME=VALUE", value_parser = definition)]

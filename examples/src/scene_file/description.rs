@@ -231,6 +231,43 @@ pub enum Matter {
     },
 }
 
+impl Matter {
+    /// The largest extinction (m⁻¹) of any channel, anywhere.
+    #[must_use]
+    pub fn densest(&self) -> f32 {
+        let (extinction, density) = match self {
+            Self::Homogeneous { absorption, scattering, .. } => (*absorption + *scattering, 1.0),
+            Self::Grid { volume, absorption, scattering, .. } => (*absorption + *scattering, volume.max()),
+            Self::Sparse { bricks, absorption, scattering, .. } => (*absorption + *scattering, bricks.max()),
+            Self::Coloured { extinction: Field::Constant(extinction), scale, .. } => (*extinction, *scale),
+            Self::Coloured { extinction: Field::Grid { colours, .. }, scale, .. } => (Spectrum(colours.most()), *scale),
+        };
+        extinction.max_element() * density
+    }
+}
+
+impl MediumDescription {
+    /// The box (m) around it: both corners.
+    #[must_use]
+    pub fn bounds(&self) -> [[f64; 3]; 2] {
+        let mut all = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
+        for [low, high] in self.places.iter().map(|place| place.container.bounds()) {
+            for axis in 0..3 {
+                all[0][axis] = all[0][axis].min(low[axis]);
+                all[1][axis] = all[1][axis].max(high[axis]);
+            }
+        }
+        all
+    }
+
+    /// Free paths along the longest edge of its box, where it is densest: no ray meets many more.
+    #[must_use]
+    pub fn thickness(&self) -> f64 {
+        let [low, high] = self.bounds();
+        (0..3).map(|i| high[i] - low[i]).fold(0.0, f64::max) * f64::from(self.matter.densest())
+    }
+}
+
 /// A colour that may vary in space.
 #[derive(Debug, Clone)]
 pub enum Field {

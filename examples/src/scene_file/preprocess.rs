@@ -39,6 +39,14 @@ pub(super) fn read(file: &Path, text: &str, parameters: &[(String, String)], sin
 /// The text of a scene file.
 pub(super) fn text_of(file: &Path) -> Result<String, SceneError> {
     let whole = |reason: String| file_error(file, None, reason);
+    let is_volume =
+        |extension: &std::ffi::OsStr| ["vdb", "nvdb", "vol"].iter().any(|e| extension.eq_ignore_ascii_case(e));
+    if file.extension().is_some_and(is_volume) {
+        return Err(whole(
+            "is a volume, no scene: name it in a fog file (shape = \"grid\") beside a glTF scene, or in a medium of a Mitsuba scene"
+                .to_owned(),
+        ));
+    }
     let bytes = read_file(file).map_err(|e| whole(e.reason))?;
     String::from_utf8(bytes).map_err(|e| whole(format!("is not UTF-8 text: {e}")))
 }

@@ -3,7 +3,7 @@
 use fogbow::spectrum::Spectrum;
 use fogbow::surface::Surface;
 
-use super::description::{Container, Emitter, Geometry, Matter, SceneFile};
+use super::description::{Container, Emitter, Geometry, Matter, MediumDescription, SceneFile};
 use super::element::Element;
 use super::shapes::ShapeElement;
 use crate::world::bounds_of;
@@ -88,25 +88,22 @@ fn hidden_lights(scene: &SceneFile, shapes: &[ShapeElement<'_>], emitters: &[Ele
 /// Media that take forever, or cannot be seen.
 fn media(root: &Element<'_>, scene: &SceneFile) {
     for medium in &scene.media {
-        let Matter::Homogeneous { absorption, scattering, .. } = &medium.matter else { continue };
-        let extinction: Spectrum = *absorption + *scattering;
-        let size = medium.places.iter().map(|place| {
-            let [low, high] = place.container.bounds();
-            (0..3).map(|i| high[i] - low[i]).fold(0.0, f64::max)
-        });
-        let size = size.fold(0.0, f64::max);
-        let depth = size * f64::from(extinction.max_element());
-        let name = &medium.id;
-        if depth.is_finite() && depth > 0.0 && depth < 1e-4 {
-            root.suspicious(format!(
-                "medium \"{name}\" has an optical thickness of {depth:.1e}: it cannot be seen; see \"scale\""
-            ));
-        }
-        let is_white = |i: usize| scattering.0[i] > 0.9995 * extinction.0[i] && extinction.0[i] > 0.0;
-        if depth.is_finite() && depth > 300.0 && (0..3).any(is_white) {
-            root.suspicious(format!(
-                "medium \"{name}\" is {depth:.0} free paths thick and absorbs next to nothing: paths in it have many thousand vertices"
-            ));
-        }
+        of_medium(medium).into_iter().for_each(|reason| root.suspicious(reason));
     }
+}
+
+/// What is odd about a medium.
+pub(super) fn of_medium(medium: &MediumDescription) -> Option<String> {
+    let (name, depth) = (&medium.id, medium.thickness());
+    if depth < 1e-2 {
+        return Some(format!(
+            "medium \"{name}\" is at most {depth:.1e} free paths across: it can hardly be seen; mind its size and its extinction"
+        ));
+    }
+    let Matter::Homogeneous { absorption, scattering, .. } = &medium.matter else { return None };
+    let extinction: Spectrum = *absorption + *scattering;
+    let is_white = |i: usize| scattering.0[i] > 0.9995 * extinction.0[i] && extinction.0[i] > 0.0;
+    (depth.is_finite() && depth > 300.0 && (0..3).any(is_white)).then(|| {
+        format!("medium \"{name}\" is {depth:.0} free paths thick and absorbs next to nothing: paths in it have many thousand vertices")
+    })
 }

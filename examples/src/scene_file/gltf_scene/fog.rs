@@ -4,6 +4,13 @@
 //! [sky]
 //! radiance = [0.4, 0.5, 0.7]        # or image = "sky.hdr"
 //!
+//! [sun]
+//! from = [1, 2, 0.5]                # where it stands, as seen from the scene
+//! irradiance = 3                    # on what faces it
+//!
+//! [[fog]]                           # even fog in the box of all surfaces
+//! visibility = 200
+//!
 //! [[fog]]
 //! shape = "box"                     # or "sphere", "height", "grid"
 //! min = [-2, 0, -2]
@@ -22,7 +29,7 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use fogbow::math::Bounds;
+use fogbow::math::{Bounds, Vec3};
 use fogbow::phase::{Lobe, Phase};
 use fogbow::spectrum::Spectrum;
 use serde::Deserialize;
@@ -30,15 +37,17 @@ use serde::Deserialize;
 use crate::error::{SceneError, read_file};
 use crate::picture::Picture;
 use crate::scene_file::description::{Container, Emitter, Matter, MediumDescription, Place, SceneFile};
-use crate::transform::{Transform, to_vec3};
+use crate::transform::{Transform, normalized, to_array, to_vec3};
 use crate::vdb;
 use crate::volume::{Values, Volume};
+use crate::world::bounds_of;
 
 /// All of a file.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct FogFile {
     sky: Option<Sky>,
+    sun: Option<Sun>,
     #[serde(default)]
     fog: Vec<toml::Spanned<Fog>>,
 }
@@ -50,9 +59,18 @@ struct Sky {
     image: Option<String>,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+/// Parallel light.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Sun {
+    from: [f64; 3],
+    irradiance: Colour,
+}
+
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
 enum Form {
+    #[default]
     Box,
     Sphere,
     Height,
@@ -78,6 +96,7 @@ impl Colour {
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Fog {
+    #[serde(default)]
     shape: Form,
     min: Option<[f64; 3]>,
     max: Option<[f64; 3]>,
@@ -127,13 +146,23 @@ pub(super) fn read(file: &Path, scene: &mut SceneFile) -> Result<(), SceneError>
         let error = |reason: String| SceneError { element: "[sky]".to_owned(), ..whole(reason) };
         scene.emitters.push(read_sky(file, &sky).map_err(error)?);
     }
+    if let Some(sun) = fog.sun {
+        let error = |reason: &str| SceneError { element: "[sun]".to_owned(), ..whole(reason.to_owned()) };
+        let direction = normalized(sun.from.map(|c| -c)).ok_or_else(|| error("\"from\" has no direction"))?;
+        let irradiance = sun.irradiance.spectrum();
+        if !irradiance.is_valid() {
+            return Err(error("\"irradiance\" is negative or not finite"));
+        }
+        scene.emitters.push(Emitter::Directional { direction, irradiance });
+    }
+    let around = scene.shapes.iter().map(|shape| bounds_of(&shape.geometry)).fold(Bounds::EMPTY, Bounds::union);
     for (number, one) in fog.fog.iter().enumerate() {
         let error = |reason: String| SceneError {
             line: Some(line_of(one.span().start)),
             element: format!("[[fog]] {}", number + 1),
             ..whole(reason)
         };
-        let (matter, container) = medium(file, one.get_ref()).map_err(error)?;
+        let (matter, container) = medium(file, one.get_ref(), around).map_err(error)?;
         let places = vec![Place { container, holes: Vec::new() }];
         scene.media.push(MediumDescription {
             id: format!("fog {}", number + 1),
@@ -184,7 +213,8 @@ fn read_sky(file: &Path, sky: &Sky) -> Result<Emitter, String> {
     }
 }
 
-fn medium(file: &Path, fog: &Fog) -> Result<(Matter, Container), String> {
+/// `around` is the box of all surfaces.
+fn medium(file: &Path, fog: &Fog, around: Bounds) -> Result<(Matter, Container), String> {
     check_names(fog)?;
     let extinction = match (fog.extinction, fog.visibility) {
         (Some(extinction), None) => extinction.spectrum(),
@@ -206,7 +236,7 @@ fn medium(file: &Path, fog: &Fog) -> Result<(Matter, Container), String> {
         Some(g) => Phase::from(Lobe::HenyeyGreenstein { g }.check().map_err(|e| e.to_string())?),
     };
     match fog.shape {
-        Form::Box => Ok((Matter::Homogeneous { absorption, scattering, phase }, cube(corners(fog)?))),
+        Form::Box => Ok((Matter::Homogeneous { absorption, scattering, phase }, cube(corners(fog, Some(around))?))),
         Form::Sphere => {
             let centre = fog.centre.ok_or("a sphere needs \"centre\"")?;
             let radius = fog.radius.ok_or("a sphere needs \"radius\"")?;
@@ -216,7 +246,7 @@ fn medium(file: &Path, fog: &Fog) -> Result<(Matter, Container), String> {
             Ok((Matter::Homogeneous { absorption, scattering, phase }, Container::Sphere { centre, radius }))
         }
         Form::Height => {
-            let [low, high] = corners(fog)?;
+            let [low, high] = corners(fog, Some(around))?;
             let ground = fog.ground.unwrap_or(low[1]);
             let fall_off = fog.fall_off.ok_or("height fog needs \"fall_off\"")?;
             if !(fall_off > 0.0 && fall_off.is_finite() && ground.is_finite()) {
@@ -237,7 +267,7 @@ fn medium(file: &Path, fog: &Fog) -> Result<(Matter, Container), String> {
             let is_boxed = fog.min.is_some() || fog.max.is_some();
             // From the unit cube to the place that was named.
             let into_box = || -> Result<Transform, String> {
-                let [low, high] = corners(fog)?;
+                let [low, high] = corners(fog, None)?;
                 Ok(Transform::scaling([0, 1, 2].map(|i| high[i] - low[i])).then(&Transform::translation(low)))
             };
             let moved = moved(fog)?;
@@ -248,7 +278,7 @@ fn medium(file: &Path, fog: &Fog) -> Result<(Matter, Container), String> {
                 let to_world = place.then(&moved);
                 check_place(&to_world)?;
                 let matter = Matter::Sparse { bricks: Arc::new(bricks), to_world, absorption, scattering, phase };
-                return Ok((matter, around(&to_world)));
+                return Ok((matter, just_around(&to_world)));
             }
             if fog.grid.is_some() {
                 return Err("\"grid\" names a grid of a .vdb or .nvdb file".to_owned());
@@ -257,7 +287,7 @@ fn medium(file: &Path, fog: &Fog) -> Result<(Matter, Container), String> {
             let to_world = into_box()?.then(&moved);
             check_place(&to_world)?;
             let matter = Matter::Grid { volume: Arc::new(volume), to_world, absorption, scattering, phase };
-            Ok((matter, around(&to_world)))
+            Ok((matter, just_around(&to_world)))
         }
     }
 }
@@ -284,8 +314,15 @@ fn check_names(fog: &Fog) -> Result<(), String> {
     }
 }
 
-fn corners(fog: &Fog) -> Result<[[f64; 3]; 2], String> {
-    let (low, high) = (fog.min.ok_or("needs \"min\"")?, fog.max.ok_or("needs \"max\"")?);
+/// Both corners of a box, those of `around` where none is named.
+fn corners(fog: &Fog, around: Option<Bounds>) -> Result<[[f64; 3]; 2], String> {
+    // Fog begins beyond outer walls, not in them.
+    let around = around.filter(|b| b.size().is_finite() && b.size().min_element() > 0.0).map(|b| {
+        let room = 1e-3 * b.size().max_element();
+        [b.min - Vec3::splat(room), b.max + Vec3::splat(room)].map(to_array)
+    });
+    let low = fog.min.or(around.map(|b| b[0])).ok_or("needs \"min\"")?;
+    let high = fog.max.or(around.map(|b| b[1])).ok_or("needs \"max\"")?;
     let is_box = (0..3).all(|i| low[i] < high[i] && low[i] > -1e18 && high[i] < 1e18);
     if is_box { Ok([low, high]) } else { Err(format!("\"max\" {high:?} must be greater than \"min\" {low:?}")) }
 }
@@ -314,7 +351,7 @@ fn check_place(to_world: &Transform) -> Result<(), String> {
 }
 
 /// A container just around the image of the unit cube: a grid ends by itself.
-fn around(to_world: &Transform) -> Container {
+fn just_around(to_world: &Transform) -> Container {
     const ROOM: f64 = 0.5 + 1e-6;
     let unit = Transform::scaling([ROOM; 3]).then(&Transform::translation([0.5; 3]));
     Container::Cube(unit.then(to_world))

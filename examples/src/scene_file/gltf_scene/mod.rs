@@ -29,6 +29,7 @@ use fogbow::spectrum::Spectrum;
 
 use super::description::{Emitter, FovAxis, Integrator, Projection as View, SceneFile, Sensor};
 use super::notes::{NoteKind, Sink};
+use super::suspicions::of_medium;
 use super::{Findings, ReadOptions};
 use crate::error::{SceneError, read_file};
 use crate::transform::{Transform, normalized};
@@ -207,6 +208,9 @@ fn read_scene(source: &Source<'_>, bytes: &[u8], options: &ReadOptions) -> Resul
     };
     if let Some(file) = fog_file(source.file, options) {
         fog::read(&file, &mut scene_file)?;
+    }
+    for reason in scene_file.media.iter().filter_map(of_medium) {
+        source.note(NoteKind::Suspicious, "", reason);
     }
     let is_lit = !scene_file.emitters.is_empty() || scene_file.shapes.iter().any(|shape| shape.radiance.is_some());
     if !is_lit {
