@@ -1,5 +1,6 @@
 //! `fogbow plan`.
 
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
@@ -85,7 +86,7 @@ pub(super) fn words_for_render(words: &[String]) -> Vec<String> {
 
 pub(super) fn run(arguments: &PlanArguments) -> Result<Ending, Failure> {
     let graph = graph(arguments)?;
-    println!("{}", serde_json::to_string_pretty(&graph)?);
+    writeln!(std::io::stdout(), "{}", serde_json::to_string_pretty(&graph)?)?;
     Ok(Ending::Done)
 }
 
