@@ -119,7 +119,8 @@ def frames(program, scene):
     backwards, _ = ran(steps[::-1])
     wanted, needed = ["frame-0004-merge"], []
     while wanted:
-        step = next(s for s in steps if s["id"] == wanted.pop())
+        due = wanted.pop()
+        step = next(s for s in steps if s["id"] == due)
         needed.append(step)
         wanted += step["after"]
     alone, _ = ran(needed)

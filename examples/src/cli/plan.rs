@@ -1,6 +1,5 @@
 //! `fogbow plan`.
 
-use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
@@ -86,7 +85,7 @@ pub(super) fn words_for_render(words: &[String]) -> Vec<String> {
 
 pub(super) fn run(arguments: &PlanArguments) -> Result<Ending, Failure> {
     let graph = graph(arguments)?;
-    writeln!(std::io::stdout(), "{}", serde_json::to_string_pretty(&graph)?)?;
+    println!("{}", serde_json::to_string_pretty(&graph)?);
     Ok(Ending::Done)
 }
 
