@@ -19,6 +19,14 @@ import tempfile
 import numpy as np
 
 
+# Scenes of mitsuba-data that differ for a reason that is not here, with the smallest scene that shows it.
+KNOWN = {
+    "bsdf_blendbsdf.xml": "Mitsuba adds the probability of a mirror to the density of a rough lobe in `blendbsdf`: in a white world, 0.3 of `conductor` over 0.7 of "
+    "`roughplastic` (which alone is 0.568) looks like 0.602 there; 0.3 + 0.7 * 0.568 = 0.698",
+    "hello.xml": "`direct` with `emitter_samples` 4 counts the light of a point four times there: with 1, both agree",
+}
+
+
 def read_pfm(file):
     data = file.read_bytes()
     kind, size, scale, rest = data.split(b"\n", 3)
@@ -107,8 +115,12 @@ def main():
         rows.append((off, np.abs(sigmas).max(), whole, file))
         print(f"{file}: whole {100 * whole:+.2f} %, blocks beyond 4 sigma {100 * off:.1f} %, worst {np.abs(sigmas).max():.1f}", flush=True)
     # Of 64 blocks of three colours in a hundred scenes, some lie beyond 4 sigma by chance: noise is known from few runs.
-    bad = sorted((r for r in rows if r[0] > 0.02), reverse=True)
-    print(f"\n{len(rows)} compared, {len(rows) - len(bad)} agree, {skipped} not rendered here")
+    known = [row for row in rows if row[0] > 0.02 and row[3].name in KNOWN]
+    bad = sorted((r for r in rows if r[0] > 0.02 and r not in known), reverse=True)
+    agree = len(rows) - len(bad) - len(known)
+    print(f"\n{len(rows)} compared, {agree} agree, {len(known)} differ for a known reason, {skipped} not rendered here")
+    for _, _, whole, file in known:
+        print(f"  {100 * whole:+7.2f} %: {file}: {KNOWN[file.name]}")
     for off, worst, whole, file in bad:
         print(f"  {100 * off:5.1f} % of blocks, worst {worst:6.1f}, whole {100 * whole:+7.2f} %: {file}")
     return 1 if bad else 0
