@@ -121,8 +121,9 @@ def frames(program, scene):
     while wanted:
         due = wanted.pop()
         step = next(s for s in steps if s["id"] == due)
-        needed.append(step)
-        wanted += step["after"]
+        if step not in needed:
+            needed.append(step)
+            wanted += step["after"]
     alone, _ = ran(needed)
     _, single = ran(planned(1))
     print(f"CPU seconds of five fills: {single:.1f} alone, {seconds:.1f} in groups of two")
