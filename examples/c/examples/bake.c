@@ -55,7 +55,7 @@ int main(void) {
     check(fogbow_world_new(&parts, &world));
 
     /* The bake, a few jobs in every frame. */
-    const fogbow_bake_settings settings = {.size = sizeof settings, .spacing = 0.5f, .error = 0.1f};
+    const fogbow_bake_settings settings = {.size = sizeof settings, .spacing = 0.5f, .error = 0.1f, .photons = 1};
     fogbow_work *work;
     fogbow_probes *baked, *probes;
     check(fogbow_bake(world, NULL, &settings, &work));

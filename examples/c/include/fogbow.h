@@ -609,6 +609,10 @@ typedef struct {
     fogbow_box bounds;
     // Chooses other random numbers.
     uint64_t seed;
+    // 1: light that was scattered before comes by photons that all probes share, many times faster: means over cells, without what media emit. 0: by paths from each probe.
+    uint32_t photons;
+    // 0.
+    uint32_t reserved;
 } fogbow_bake_settings;
 
 // What a grid of probes is.

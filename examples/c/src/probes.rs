@@ -5,8 +5,8 @@ use core::ops::Range;
 use std::sync::{Arc, PoisonError, RwLock, RwLockReadGuard};
 
 use fogbow::bake::{
-    Bake, BakeError, BakeMemory, BakeSettings, BakedProbes, MOST_COEFFICIENTS, MOST_PROBES, Orders, ProbeBasis,
-    ProbeGrid, Quantity, bytes,
+    Bake, BakeError, BakeMemory, BakeSettings, BakedProbes, FlightMemory, MOST_COEFFICIENTS, MOST_PROBES, Orders,
+    ProbeBasis, ProbeGrid, Quantity, bytes,
 };
 use fogbow::cache::RadianceCaches;
 use fogbow::spectrum::Spectrum;
@@ -82,6 +82,10 @@ pub struct fogbow_bake_settings {
     pub bounds: fogbow_box,
     /// Chooses other random numbers.
     pub seed: u64,
+    /// 1: light that was scattered before comes by photons that all probes share, many times faster: means over cells, without what media emit. 0: by paths from each probe.
+    pub photons: u32,
+    /// 0.
+    pub reserved: u32,
 }
 
 // SAFETY: `repr(C)`, the size first, then numbers.
@@ -249,6 +253,10 @@ pub unsafe extern "C" fn fogbow_bake(
         // SAFETY: what the head of the header asks of pointers.
         let (settings, work) = unsafe { (arguments::read(settings, "settings")?, arguments::place(work, "work")?) };
         let caches = if caches.is_null() { None } else { Some(caches::get(caches)?.share()?) };
+        if settings.photons > 1 {
+            return wrong(format!("`settings->photons` is {}, neither 0 nor 1", settings.photons));
+        }
+        let has_photons = settings.photons == 1;
         let settings = settings.check(&world)?;
         check_memory(&settings)?;
         let mut bake = Bake::new(settings).map_err(|error| match error {
@@ -259,6 +267,9 @@ pub unsafe extern "C" fn fogbow_bake(
             // SAFETY: the caches are kept beside the bake, do not move, are changed by nobody who does not own them alone, and are
             // dropped after it.
             bake = bake.with_caches(unsafe { &*Arc::as_ptr(caches) });
+        }
+        if has_photons {
+            bake = bake.with_photons(FlightMemory::default(), world.outline().bounds);
         }
         let of = Borrowing { bake, _caches: caches };
         work.set(Work::put(Kind::Bake(Box::new(BakeWork(RwLock::new(Some(of))))), world)?);

@@ -512,8 +512,9 @@ int main(void) {
     FAILS(HANDLE, fogbow_bake(world, freed_caches, &baked, &made_work));
     SIZED(fogbow_bake_settings, baked, fogbow_bake(world, NULL, structure, &made_work));
     FAILS(NULL, fogbow_bake(world, NULL, &baked, NULL));
-    for (int i = 0; i < 9; i++) {
+    for (int i = 0; i < 10; i++) {
         fogbow_bake_settings bad = baked;
+        if (i == 9) bad.photons = 2;
         if (i == 0) memset(bad.counts, 0, sizeof bad.counts);
         if (i == 1) bad.counts[1] = 0;
         if (i == 2) memset(bad.counts, 0xff, sizeof bad.counts);
