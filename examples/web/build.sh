@@ -10,9 +10,9 @@ cd "$own"
 TARGET=${CARGO_TARGET_DIR:-$own/../../target}/web
 
 linker=$(rustc --print sysroot)/lib/rustlib/$(rustc --print host-tuple)/bin/rust-lld
-# Functions are inlined where they are short, those that ask for it where they are not long: a fifth smaller for a tenth of the speed. Panics have no words,
+# Functions are inlined where they are short, those that ask for it where they are not long: a sixth smaller for a tenth of the speed. Panics have no words,
 # and nobody prints with `{:?}`.
-flags="-Cllvm-args=-inline-threshold=15 -Cllvm-args=-inlinehint-threshold=60 -Zunstable-options -Cpanic=immediate-abort -Zfmt-debug=none -Zlocation-detail=none"
+flags="-Cllvm-args=-inline-threshold=25 -Cllvm-args=-inlinehint-threshold=100 -Zunstable-options -Cpanic=immediate-abort -Zfmt-debug=none -Zlocation-detail=none"
 module() {
     env RUSTC=/usr/bin/rustc RUSTDOC=/usr/bin/rustdoc RUSTC_BOOTSTRAP=1 CARGO_TARGET_WASM32_UNKNOWN_UNKNOWN_LINKER="$linker" RUSTFLAGS="$2" \
         cargo rustc --quiet --locked --lib --crate-type cdylib --release -Zbuild-std=core,alloc,panic_abort \
