@@ -21,19 +21,18 @@ pub struct SceneArguments {
 
 /// How a scene file is read.
 #[derive(Debug, Clone, Args)]
-#[command(next_help_heading = "Scenes")]
 pub struct ReadArguments {
     /// Value of a parameter ($NAME) of the scene, before the one the scene has for it; may be repeated.
-    #[arg(short = 'D', long = "define", value_name = "NAME=VALUE", value_parser = definition)]
+    #[arg(help_heading = "Scenes", short = 'D', long = "define", value_name = "NAME=VALUE", value_parser = definition)]
     pub define: Vec<(String, String)>,
     /// Which of the scene's sensors (glTF: cameras), counted from 0.
-    #[arg(long, value_name = "N", default_value_t = 0)]
+    #[arg(help_heading = "Scenes", long, value_name = "N", default_value_t = 0)]
     pub sensor: usize,
     /// Takes the nearest there is in place of what cannot be rendered, and lists it.
-    #[arg(long)]
+    #[arg(help_heading = "Scenes", long)]
     pub lenient: bool,
     /// Fog for a glTF scene, in TOML [default: SCENE.fog.toml beside it, if there is one].
-    #[arg(long, value_name = "FILE.toml")]
+    #[arg(help_heading = "Scenes", long, value_name = "FILE.toml")]
     pub fog: Option<PathBuf>,
 }
 
