@@ -9,7 +9,7 @@ use glam::Vec3;
 
 use super::arriving::{Sampler, phase_at};
 use super::basis::MOST_COEFFICIENTS;
-use super::flights::{Flight, FlightMemory, PROBES, Photons, open_share};
+use super::flights::{FlightMemory, PROBES, PhotonFlight, Photons, open_share};
 use super::grid::{BakeMemory, Brick, Probe, ProbeGrid, WALLS_AT};
 use super::places;
 use super::settings::{BakeError, BakeSettings};
@@ -35,7 +35,7 @@ const LEAST_PASSES: u32 = 8;
 pub struct BakedProbes<'o> {
     pub(super) values: List<'o, Spectrum>,
     pub(super) probes: List<'o, Probe>,
-    pub(super) flights: List<'o, Flight>,
+    pub(super) flights: List<'o, PhotonFlight>,
     pub(super) is_cut: bool,
 }
 
@@ -59,14 +59,27 @@ impl<'o> BakedProbes<'o> {
     /// With memory for the flights of a job of [`Bake::with_photons`], of 1024 photons.
     ///
     /// ```
-    /// # use fogbow::{bake::{BakedProbes, Flight, Probe}, spectrum::Spectrum};
-    /// # let (mut values, mut probes) = ([Spectrum::ZERO; 64 * 9], [Probe::default(); 64]);
-    /// let mut flights = [Flight::default(); 4096];
-    /// let output = BakedProbes::lent(&mut values, &mut probes).with_flights(&mut flights);
-    /// # drop(output);
+    /// # use fogbow::{host::Empty, light::{Light, PointLight}, math::{Bounds, Vec3}, medium::{Homogeneous, Placed, Region}, phase::Phase};
+    /// # use fogbow::{spectrum::Spectrum, work, world::{Outline, World}};
+    /// # use fogbow::bake::{Bake, BakeSettings, BakedProbes, FlightMemory, PhotonFlight, Probe, ProbeBasis};
+    /// # #[cfg(feature = "alloc")] {
+    /// # let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::splat(0.8), Phase::ISOTROPIC)?;
+    /// # let ball = Placed::new(fog, Region::sphere(Vec3::ZERO, 1.0)?);
+    /// # let lamps = [Light::Point(PointLight::from_flux(0.2 * Vec3::Y, Spectrum::ONE)?)];
+    /// # let world = World { medium: &ball, scene: &Empty, lights: (&lamps).into() };
+    /// # let outline = Outline::of(&world, Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE });
+    /// # let settings = BakeSettings { basis: ProbeBasis::Fluence, error: 0.2, ..BakeSettings::for_outline(&outline, [4, 4, 4]) };
+    /// let (mut values, mut probes) = ([Spectrum::ZERO; 64], [Probe::default(); 64]);
+    /// let mut flights = vec![PhotonFlight::default(); 32 * 1024];
+    /// let mut output = BakedProbes::lent(&mut values, &mut probes).with_flights(&mut flights);
+    /// let mut bake = Bake::new(settings)?.with_photons(FlightMemory::default(), outline.bounds);
+    /// work::finish(&mut bake, &world, &mut output);
+    /// assert!(!bake.is_cut());   // a ball of fog leaves a photon about one flight
+    /// # }
+    /// # Ok::<(), Box<dyn core::error::Error>>(())
     /// ```
     #[must_use]
-    pub fn with_flights(self, flights: &'o mut [Flight]) -> Self {
+    pub fn with_flights(self, flights: &'o mut [PhotonFlight]) -> Self {
         Self { flights: flights.into(), ..self }
     }
 }
@@ -238,7 +251,7 @@ impl<'s, 'c> Bake<'s, 'c> {
     }
 
     /// Lets photons from the lights find light that was scattered before it comes to a probe. All probes share them: in the atrium of the examples
-    /// fifty times faster than paths from each probe at 2 % of error with 32³ probes.
+    /// some fifty times faster than paths from each probe would be, at 2 % of error with 32³ probes (decision 79).
     ///
     /// What a probe gets is the mean over its cell, or over the part that surfaces do not hide: off by about a third of what
     /// [`ProbeGrid::coarseness`] tells, which is in no standard error. Light straight from the lights is that at the probe. Light that a medium emits is in none.

@@ -54,7 +54,7 @@ pub(super) const PROBES: usize = (BRICK * BRICK * BRICK) as usize;
 /// A photon's flight within the box.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Pod, Zeroable)]
 #[repr(C)]
-pub struct Flight {
+pub struct PhotonFlight {
     /// Where it begins (m).
     pub origin: Vec3,
     /// Where it goes (unit).
@@ -65,7 +65,7 @@ pub struct Flight {
     pub power: Spectrum,
 }
 
-impl Flight {
+impl PhotonFlight {
     fn ray(&self) -> Ray {
         Ray::new(self.origin, self.direction).with_length(self.length)
     }
@@ -84,7 +84,7 @@ impl Flight {
 #[cfg_attr(feature = "alloc", derive(Default))]
 pub struct FlightMemory<'s> {
     /// Flights within the box: of each photon about as many as it is scattered.
-    pub flights: List<'s, Flight>,
+    pub flights: List<'s, PhotonFlight>,
     /// For each flight as many as it crosses bricks of 4 × 4 × 4 probes.
     pub crossings: List<'s, u32>,
     /// One more than bricks.
@@ -127,7 +127,7 @@ impl<'s> Photons<'s> {
         job: u32,
         world: &World<'_, M, S>,
         settings: &BakeSettings,
-        flights: &mut List<'_, Flight>,
+        flights: &mut List<'_, PhotonFlight>,
     ) -> Result<(), Full> {
         let parts = Parts::from(settings.orders);
         let mut result = Ok(());
@@ -143,7 +143,7 @@ impl<'s> Photons<'s> {
                     let Some((near, far)) = settings.bounds.intersect(reach) else { return };
                     let (begin, end) = (near.max(0.0), far.min(*distance));
                     if begin < end {
-                        let flight = Flight {
+                        let flight = PhotonFlight {
                             origin: reach.at(begin),
                             direction: reach.direction,
                             length: end - begin,
@@ -159,7 +159,7 @@ impl<'s> Photons<'s> {
     }
 
     /// Takes the flights of the next job; after the last, sorts them by the bricks that they cross.
-    pub(super) fn accept(&mut self, flights: &[Flight], grid: &ProbeGrid<'_>) -> Result<(), Full> {
+    pub(super) fn accept(&mut self, flights: &[PhotonFlight], grid: &ProbeGrid<'_>) -> Result<(), Full> {
         self.next += 1;
         self.memory.flights.extend_from_slice(flights)?;
         if self.next == self.jobs { self.sort(grid) } else { Ok(()) }
@@ -197,7 +197,7 @@ impl<'s> Photons<'s> {
     }
 
     /// The flights that cross a brick.
-    fn across(&self, brick: usize) -> impl Iterator<Item = &Flight> {
+    fn across(&self, brick: usize) -> impl Iterator<Item = &PhotonFlight> {
         let range = match self.memory.starts.as_slice().get(brick..brick + 2) {
             Some(&[begin, end]) => begin as usize..end as usize,
             _ => 0..0,

@@ -22,7 +22,7 @@
 //! | `arriving` | the light that arrives at a probe, from caches, by connections and by paths |
 //! | `places` | which probes are in walls or far from any medium |
 //! | `fill` | [`Bake`]: passes over bricks |
-//! | `flights` | [`Flight`]s of photons that all probes share: what they leave in cells |
+//! | `flights` | [`PhotonFlight`]s that all probes share: what they leave in cells |
 //! | `grid` | [`ProbeGrid`]: what was baked; look-ups, dilation |
 //! | `froxels` | [`Froxels`]: fog before a camera in cells of its frustum, as engines show it |
 //! | `one_light` | [`OneLight`]: a layer of light for each lamp |
@@ -45,7 +45,7 @@ mod tests;
 
 pub use basis::{AXES, MOST_COEFFICIENTS, Orders, ProbeBasis, Quantity};
 pub use fill::{Bake, BakedProbes};
-pub use flights::{Flight, FlightMemory};
+pub use flights::{FlightMemory, PhotonFlight};
 pub use froxels::{Froxel, Froxels};
 pub use grid::{BakeMemory, Brick, Probe, ProbeDeviation, ProbeGrid, ProbeState};
 pub use one_light::OneLight;

@@ -3,12 +3,12 @@
 use glam::Vec3;
 
 use super::fill::BakedProbes;
-use super::flights::Flight;
+use super::flights::PhotonFlight;
 use super::grid::Probe;
 use crate::sent::{JobBytesError, Packed, Received, Sending, byte_count, packed};
 use crate::spectrum::Spectrum;
 
-packed!(Flight { origin: Vec3, direction: Vec3, length: f32, power: Spectrum });
+packed!(PhotonFlight { origin: Vec3, direction: Vec3, length: f32, power: Spectrum });
 packed!(Probe {
     extinction: Spectrum,
     albedo: Spectrum,
@@ -23,7 +23,7 @@ packed!(Probe {
 /// Tells such jobs from others.
 const KIND: u32 = 2;
 
-const EACH: [usize; 4] = [Spectrum::WORDS, Probe::WORDS, Flight::WORDS, 0];
+const EACH: [usize; 4] = [Spectrum::WORDS, Probe::WORDS, PhotonFlight::WORDS, 0];
 
 impl BakedProbes<'_> {
     /// Number of bytes that [`BakedProbes::write`] writes.
@@ -34,7 +34,7 @@ impl BakedProbes<'_> {
     /// ```
     #[must_use]
     pub fn byte_count(&self) -> usize {
-        let flights = self.flights.len() * Flight::WORDS;
+        let flights = self.flights.len() * PhotonFlight::WORDS;
         byte_count(bool::WORDS + self.values.len() * Spectrum::WORDS + self.probes.len() * Probe::WORDS + flights)
     }
 

@@ -381,7 +381,7 @@ fn photons_in_any_order_and_after_any_interruption_give_the_same_bits() {
     }
     assert!(bits(&bake.finish()) == due);
     // Lent memory that is too small is told.
-    let mut few = [Flight::default(); 50];
+    let mut few = [PhotonFlight::default(); 50];
     let memory = FlightMemory { flights: (&mut few[..]).into(), ..FlightMemory::default() };
     let mut bake = Bake::new(settings).unwrap().with_photons(memory, bounds);
     step(&mut bake, &world, &mut BakedProbes::default());
