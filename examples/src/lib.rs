@@ -13,9 +13,12 @@
 //! | [`texture`] | values that vary over surfaces |
 //! | [`statistics`] | what a run took, phase by phase |
 //! | [`compare`] | how far two images are apart |
-//! | [`cli`] | the command line |
+//! | [`cli`], `say` | the command line; lines on standard error and output |
 
 extern crate alloc;
+
+#[macro_use]
+mod say;
 
 pub mod bake;
 pub mod camera;

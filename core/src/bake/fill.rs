@@ -250,6 +250,32 @@ impl<'s, 'c> Bake<'s, 'c> {
         Self { caches: Some(caches), ..self }
     }
 
+    /// The same bake without its caches, for hosts that keep a bake from call to call and lend caches for each. All jobs of a bake want the same caches.
+    ///
+    /// ```
+    /// # use fogbow::{host::Empty, light::Light, math::{Bounds, Vec3}, medium::Homogeneous, phase::Phase, spectrum::Spectrum};
+    /// # use fogbow::{work, world::{Outline, World}};
+    /// # use fogbow::bake::{Bake, BakeSettings, BakedProbes};
+    /// # #[cfg(feature = "alloc")] {
+    /// # let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::ONE, Phase::ISOTROPIC)?;
+    /// # let sky = [Light::Constant(Spectrum::ONE)];
+    /// # let world = World { medium: &fog, scene: &Empty, lights: (&sky).into() };
+    /// # let bounds = Bounds { min: Vec3::ZERO, max: Vec3::ONE };
+    /// # let settings = BakeSettings { most_passes: 2, ..BakeSettings::for_outline(&Outline::of(&world, bounds), [8, 1, 1]) };
+    /// let mut bake = Bake::new(settings)?;
+    /// while work::step(&mut bake, &world, &mut BakedProbes::default()) {
+    ///     bake = bake.without_caches(); // it goes on where it was
+    /// }
+    /// assert_eq!([bake.grid().passes(0), bake.grid().passes(7)], [2, 2]);
+    /// # }
+    /// # Ok::<(), Box<dyn core::error::Error>>(())
+    /// ```
+    #[must_use]
+    pub fn without_caches<'d>(self) -> Bake<'s, 'd> {
+        let Self { settings, grid, caches: _, photons, next, bricks, share, is_cut } = self;
+        Bake { settings, grid, caches: None, photons, next, bricks, share, is_cut }
+    }
+
     /// Lets photons from the lights find light that was scattered before it comes to a probe. All probes share them: in the atrium of the examples
     /// some fifty times faster than paths from each probe would be, at 2 % of error with 32³ probes (decision 79).
     ///

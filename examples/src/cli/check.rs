@@ -4,7 +4,7 @@ use clap::Args;
 use fogbow::math::Bounds;
 
 use super::scene::{SceneArguments, said};
-use super::{Ending, Failure};
+use super::{Ending, Failure, output};
 use crate::scene_file::{Findings, NoteKind, SceneFile};
 use crate::transform::to_array;
 use crate::world::{Storage, World, bounds_of};
@@ -25,17 +25,19 @@ pub(super) fn run(arguments: &CheckArguments) -> Result<Ending, Failure> {
         let mut storage = Storage::new(scene);
         errors.extend(World::new(scene, &mut storage).err());
     }
-    scene.iter().flat_map(inventory).for_each(|line| println!("{line}"));
-    errors.iter().for_each(|error| println!("error: {error}"));
-    said(&notes).iter().for_each(|line| println!("{line}"));
+    let found = errors.iter().map(|error| format!("error: {error}"));
+    let lines: Vec<_> = scene.iter().flat_map(inventory).chain(found).chain(said(&notes)).collect();
+    lines.iter().try_for_each(|line| output::print(line))?;
     let file = arguments.scene.file.display();
     if !errors.is_empty() {
         return Err(format!("{file}: cannot be rendered; {}", counted(errors.len(), "error")).into());
     }
     let replaced = notes.iter().filter(|note| note.kind == NoteKind::Replaced).count();
     match replaced {
-        0 => println!("{file}: can be rendered"),
-        _ => println!("{file}: can be rendered with --lenient; {} replaced", counted(replaced, "thing")),
+        0 => output::print(&format!("{file}: can be rendered"))?,
+        _ => {
+            output::print(&format!("{file}: can be rendered with --lenient; {} replaced", counted(replaced, "thing")))?
+        }
     }
     Ok(Ending::Done)
 }

@@ -33,12 +33,17 @@ pub(super) fn run(arguments: &CompareArguments) -> Result<Ending, Failure> {
     let image = Picture::read(&arguments.image)?;
     let reference = Picture::read(&arguments.reference)?;
     let result = compare(&image, &reference)?;
-    println!("relRMSE      {:.6}", result.rel_rmse);
-    println!("relMSE       {:.6}", result.rel_mse);
-    println!("bias         {:+.4} %", 100.0 * result.bias);
-    println!("largest      {:.4}", result.largest);
     let worst = result.worst_block;
-    println!("worst block  {:+.3} % at ({}, {})", 100.0 * worst.difference, worst.x, worst.y);
+    output::print(&format!(
+        "relRMSE      {:.6}\nrelMSE       {:.6}\nbias         {:+.4} %\nlargest      {:.4}\nworst block  {:+.3} % at ({}, {})",
+        result.rel_rmse,
+        result.rel_mse,
+        100.0 * result.bias,
+        result.largest,
+        100.0 * worst.difference,
+        worst.x,
+        worst.y
+    ))?;
     if let Some(file) = &arguments.output {
         let picture = false_colour(&image, &reference, arguments.range)?;
         write(file, &[Layer { name: "difference", image: &picture }], 0.0)?;

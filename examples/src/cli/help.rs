@@ -65,11 +65,11 @@ impl Answer {
     pub fn exit(self) -> ! {
         match self {
             Self::Help(text) => {
-                print!("{text}");
+                let _ = super::output::print(text.trim_end());
                 std::process::exit(0)
             }
             Self::Wrong(text) => {
-                eprintln!("fogbow: {text}");
+                say!("fogbow: {text}");
                 std::process::exit(2)
             }
             Self::Parser(error) => error.exit(),
@@ -233,9 +233,11 @@ pub struct CompletionsArguments {
     pub shell: clap_complete::Shell,
 }
 
-pub(super) fn completions(arguments: &CompletionsArguments) -> Ending {
-    clap_complete::generate(arguments.shell, &mut Arguments::command(), "fogbow", &mut std::io::stdout());
-    Ending::Done
+pub(super) fn completions(arguments: &CompletionsArguments) -> Result<Ending, Failure> {
+    let mut script = Vec::new();
+    clap_complete::generate(arguments.shell, &mut Arguments::command(), "fogbow", &mut script);
+    super::output::print(&String::from_utf8_lossy(&script))?;
+    Ok(Ending::Done)
 }
 
 /// Writes the pages of the manual into a folder.

@@ -86,7 +86,7 @@ pub(super) fn run(arguments: &MergeArguments) -> Result<Ending, Failure> {
         };
         let missing = if sorted.good.is_empty() { vec![] } else { missing };
         let is_complete = missing.is_empty() && sorted.refused.is_empty();
-        println!("{}", serde_json::to_string(&Checked { split, of, there, missing, refused: &sorted.refused })?);
+        output::print(&serde_json::to_string(&Checked { split, of, there, missing, refused: &sorted.refused })?)?;
         return Ok(if is_complete { Ending::Done } else { Ending::Stopped });
     }
     let mut wrong: Vec<String> =
@@ -116,12 +116,12 @@ pub(super) fn run(arguments: &MergeArguments) -> Result<Ending, Failure> {
             _ => film.write(file)?,
         }
         if !arguments.quiet {
-            println!("wrote {}", file.display());
+            report!("wrote {}", file.display());
         }
     }
     if !missing.is_empty() {
         let (missing, what) = (numbers(&missing), lack(&film));
-        eprintln!("fogbow: {word} {missing} of {of} {verb} missing: {what}");
+        say!("fogbow: {word} {missing} of {of} {verb} missing: {what}");
         return Ok(Ending::Stopped);
     }
     Ok(Ending::Done)

@@ -118,14 +118,14 @@ pub fn run(arguments: Arguments) -> ExitCode {
         Command::Probe(arguments) => probe::run(&arguments),
         Command::Plume(arguments) => plume::run(&arguments),
         Command::Figures(arguments) => figures::run(&arguments),
-        Command::Completions(arguments) => Ok(help::completions(&arguments)),
+        Command::Completions(arguments) => help::completions(&arguments),
         Command::Man(arguments) => help::man(&arguments),
     };
     match result {
         Ok(Ending::Done) => ExitCode::SUCCESS,
         Ok(Ending::Stopped) => ExitCode::from(1),
         Err(error) => {
-            eprintln!("fogbow: {error}");
+            say!("fogbow: {error}");
             ExitCode::from(2)
         }
     }

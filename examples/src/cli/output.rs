@@ -1,9 +1,23 @@
 //! Checks made before a long render, so that its result is not lost.
 
 use std::fs::OpenOptions;
+use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
 use fogbow_std::image::is_writable;
+
+use super::Failure;
+
+/// Writes what was asked for to standard output, and ends the line. Who has stopped reading has read enough.
+///
+/// # Errors
+/// A disk that is full, and the like.
+pub(super) fn print(text: &str) -> Result<(), Failure> {
+    match writeln!(std::io::stdout().lock(), "{text}") {
+        Err(error) if error.kind() != ErrorKind::BrokenPipe => Err(format!("standard output: {error}").into()),
+        _ => Ok(()),
+    }
+}
 
 /// # Errors
 /// A file whose kind is not known, or that cannot be written.

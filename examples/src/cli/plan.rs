@@ -85,7 +85,7 @@ pub(super) fn words_for_render(words: &[String]) -> Vec<String> {
 
 pub(super) fn run(arguments: &PlanArguments) -> Result<Ending, Failure> {
     let graph = graph(arguments)?;
-    println!("{}", serde_json::to_string_pretty(&graph)?);
+    output::print(&serde_json::to_string_pretty(&graph)?)?;
     Ok(Ending::Done)
 }
 

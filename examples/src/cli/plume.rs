@@ -37,7 +37,7 @@ pub(super) fn run(arguments: &PlumeArguments) -> Result<Ending, Failure> {
         let scene = folder.join(format!("{name}.xml"));
         std::fs::write(&scene, plume::scene(&volume)).map_err(|e| fail(&scene, e))?;
         if !arguments.quiet {
-            eprintln!("wrote {}", scene.display());
+            say!("wrote {}", scene.display());
         }
     }
     Ok(Ending::Done)

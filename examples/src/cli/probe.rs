@@ -147,13 +147,13 @@ fn hessian(arguments: &HessianArguments) -> Result<Ending, Failure> {
     let table = table(&grid, &points);
     match &arguments.output {
         Some(file) => std::fs::write(file, table).map_err(|e| format!("{}: cannot be written: {e}", file.display()))?,
-        None => print!("{table}"),
+        None => output::print(table.trim_end())?,
     }
     if !arguments.quiet {
         let [x, y, z] = grid.lattice().size();
         let count = points.len();
         let s = if count == 1 { "" } else { "s" };
-        eprintln!("{count} point{s}, in a grid of {x} x {y} x {z} cells filled by {} photons", grid.paths());
+        say!("{count} point{s}, in a grid of {x} x {y} x {z} cells filled by {} photons", grid.paths());
     }
     Ok(Ending::Done)
 }

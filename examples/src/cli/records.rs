@@ -140,9 +140,9 @@ pub(super) fn run(arguments: &RecordsArguments) -> Result<Ending, Failure> {
     write(&arguments.output, &[Layer { name: "records", image: &canvas.image }], 0.0)?;
     if !arguments.quiet {
         for (shown, drawn) in shown.iter().zip(counts) {
-            eprintln!("{:?}: {} records, {drawn} drawn", shown.kind, shown.records.len());
+            say!("{:?}: {} records, {drawn} drawn", shown.kind, shown.records.len());
         }
-        eprintln!("wrote {}", arguments.output.display());
+        say!("wrote {}", arguments.output.display());
     }
     Ok(Ending::Done)
 }

@@ -105,14 +105,14 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<Ending, Failure> {
     let rendered = match render(arguments) {
         // Nothing has been rendered yet, and nothing is wrong.
         Err(error) if error.is::<Stopped>() => {
-            eprintln!("fogbow: {error}");
+            say!("fogbow: {error}");
             return Ok(Ending::Stopped);
         }
         rendered => rendered?,
     };
     let Rendered { mut film, choice, outcome, mut statistics, audit, audited, film_file, .. } = rendered;
     if outcome.samples == 0 && outcome.reason == Reason::Cancelled {
-        eprintln!("fogbow: stopped before every pixel had a sample; no picture is written");
+        say!("fogbow: stopped before every pixel had a sample; no picture is written");
         return Ok(Ending::Stopped);
     }
     if !arguments.aov && film.layers().len() > 1 {
@@ -199,7 +199,7 @@ pub(crate) fn render(arguments: &RenderArguments) -> Result<Rendered, Failure> {
         return Err(format!("--method {} fills nothing: parts of it need no fill", method.name()).into());
     }
     if arguments.method.is_none() && !arguments.quiet {
-        eprintln!("{}", choice.line());
+        say!("{}", choice.line());
     }
     let (width, height) = arguments.size.unwrap_or((scene.sensor.width, scene.sensor.height));
     let layers: &[&str] = match (arguments.aov, method) {
@@ -337,7 +337,7 @@ pub(crate) fn render(arguments: &RenderArguments) -> Result<Rendered, Failure> {
     };
     bar.finish();
     if let Some(problem) = keeper.problem() {
-        eprintln!("fogbow: {problem}");
+        say!("fogbow: {problem}");
     }
     if plan.is_some() {
         keeper.needs_finishing("pixels are filled in (--image-sampling)");

@@ -91,14 +91,14 @@ impl Bar {
             let left =
                 left.filter(|left| left.is_finite()).map_or_else(|| "null".to_owned(), |left| format!("{left:.1}"));
             let stage = quoted(stage);
-            println!(
+            report!(
                 "{{\"event\": \"progress\", \"stage\": {stage}, \"share\": {share:.3}, \"elapsed\": {elapsed:.1}, \"left\": {left}}}"
             );
         } else {
             let left =
                 left.filter(|left| left.is_finite()).map_or_else(String::new, |left| format!(", {} left", clock(left)));
             let detail = if detail.is_empty() { String::new() } else { format!(", {detail}") };
-            eprintln!("{}: {stage} {:.0} %{detail}{left}", clock(elapsed), 100.0 * share);
+            say!("{}: {stage} {:.0} %{detail}{left}", clock(elapsed), 100.0 * share);
         }
     }
 
@@ -122,14 +122,14 @@ impl Bar {
     /// Tells other programs of a file that was written.
     pub(super) fn wrote(&self, file: &Path) {
         if self.voice == Voice::Json {
-            println!("{{\"event\": \"wrote\", \"file\": {}}}", quoted(&file.display().to_string()));
+            report!("{{\"event\": \"wrote\", \"file\": {}}}", quoted(&file.display().to_string()));
         }
     }
 
     /// Tells other programs how the command ended.
     pub(super) fn ended(&self, how: Reason) {
         if self.voice == Voice::Json {
-            println!("{{\"event\": \"end\", \"ended\": \"{}\"}}", reason_word(how));
+            report!("{{\"event\": \"end\", \"ended\": \"{}\"}}", reason_word(how));
         }
     }
 
@@ -190,15 +190,11 @@ impl Report<'_> {
             Reason::TimeUp => " (time is up)",
             Reason::Cancelled => " (stopped early; the image so far is kept)",
         };
-        eprintln!("{width} x {height} pixels, {} samples per pixel{ending}", self.samples_per_pixel());
+        say!("{width} x {height} pixels, {} samples per pixel{ending}", self.samples_per_pixel());
         let cpu = cpu.map_or_else(String::new, |c| format!(" and {} of processor time", clock(c)));
         let all: f64 = self.statistics.phases.iter().map(|(_, seconds)| seconds.wall).sum();
         let rays = self.rays_per_second() * 1e-6;
-        eprintln!(
-            "{} in all; {}{cpu} for samples, {rays:.2} million rays per second",
-            clock(all.max(wall)),
-            clock(wall)
-        );
+        say!("{} in all; {}{cpu} for samples, {rays:.2} million rays per second", clock(all.max(wall)), clock(wall));
         if let Some(Audited { error: most, findings, map, repaired }) = self.audited {
             let most = *most;
             let per_cent = (1e4 * most).round() / 100.0;
@@ -207,7 +203,7 @@ impl Report<'_> {
             let due = format!("{per_cent} % {}", if may_improve { "it was made for" } else { "of --error" });
             if self.is_timed() {
                 let hint = if may_improve { "; more --time makes it smaller" } else { "" };
-                eprintln!("made for an error of {per_cent} %{hint}");
+                say!("made for an error of {per_cent} %{hint}");
             }
             let in_places = |map: &BiasMap| {
                 map.worst(f64::from(most)).map(|region| {
@@ -217,9 +213,9 @@ impl Report<'_> {
             };
             for (found, map) in repaired {
                 let places = in_places(map).map_or_else(String::new, |places| format!("; {places}"));
-                eprintln!("repaired: bias was {} of what is cached{}{places}", percent(&found.cached), blamed(found));
+                say!("repaired: bias was {} of what is cached{}{places}", percent(&found.cached), blamed(found));
             }
-            eprintln!(
+            say!(
                 "bias {} of what is cached{}; {} of all light, by path tracing along {} eye rays",
                 percent(&findings.cached),
                 blamed(findings),
@@ -227,21 +223,21 @@ impl Report<'_> {
                 findings.rays,
             );
             if findings.all.exceeds(f64::from(most)) || findings.cached.exceeds(f64::from(most)) {
-                eprintln!("warning: the picture is off by more than the {due}");
+                say!("warning: the picture is off by more than the {due}");
             } else if findings.cached.is_unknown() {
-                eprintln!(
+                say!(
                     "warning: how far the picture is off is not known: what is cached, or paths, vary too much; take more --audit rays"
                 );
             }
             if let Some(places) = in_places(map) {
-                eprintln!("warning: off by more than the {due} {places}");
+                say!("warning: off by more than the {due} {places}");
             }
         }
         if counters.non_finite > 0 {
-            eprintln!("warning: {} samples were no finite numbers and count as black", counters.non_finite);
+            say!("warning: {} samples were no finite numbers and count as black", counters.non_finite);
         }
         for file in self.outputs.iter().chain(&self.arguments.cache.cache_out) {
-            eprintln!("wrote {}", file.display());
+            say!("wrote {}", file.display());
         }
     }
 

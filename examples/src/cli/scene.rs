@@ -67,7 +67,7 @@ impl SceneArguments {
         let Findings { scene, errors, notes } = self.findings();
         let scene = scene.ok_or(SceneErrors(errors))?;
         if !is_quiet {
-            said(&notes).iter().for_each(|note| eprintln!("{note}"));
+            said(&notes).iter().for_each(|note| say!("{note}"));
         }
         Ok(scene)
     }

@@ -77,7 +77,7 @@ impl Plan {
 
     fn say(&self, what: &str) {
         if !self.quiet {
-            eprintln!("{what}");
+            say!("{what}");
         }
     }
 

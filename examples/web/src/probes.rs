@@ -17,8 +17,8 @@ use super::world::{CoreWorld, WebWorld};
 #[derive(Debug)]
 pub struct WebProbes {
     settings: BakeSettings,
-    /// None only while a bake has it.
-    grid: Option<ProbeGrid<'static>>,
+    /// None only while a step of it runs.
+    bake: Option<Bake<'static, 'static>>,
     output: BakedProbes<'static>,
     jobs: [u32; 2],
     share: f32,
@@ -63,18 +63,16 @@ impl WebProbes {
         };
         let bake = Bake::new(settings)?;
         let jobs = jobs_of(&bake);
-        let grid = Some(bake.finish());
-        Ok(Self { settings, grid, output: BakedProbes::default(), jobs, share: 0.0, tag: world.tag() })
+        Ok(Self { settings, bake: Some(bake), output: BakedProbes::default(), jobs, share: 0.0, tag: world.tag() })
     }
 
-    /// Does something with the bake, which goes on from the grid.
+    /// Does something with the bake, by these caches.
     fn with_bake<T>(
         &mut self,
         caches: Option<&WebCaches>,
         work: impl FnOnce(&mut Bake<'static, '_>, &mut BakedProbes<'static>) -> T,
     ) -> Result<T, Fault> {
-        let grid = self.grid.take().ok_or_else(|| Fault::new("there are no probes"))?;
-        let mut bake = Bake::resume(grid, self.settings)?;
+        let mut bake: Bake<'static, '_> = self.bake.take().ok_or_else(no_probes)?;
         if let Some(caches) = caches.and_then(WebCaches::caches) {
             bake = bake.with_caches(caches);
         }
@@ -84,7 +82,7 @@ impl WebProbes {
             // Known only when a round has just been planned.
             self.share = bake.share();
         }
-        self.grid = Some(bake.finish());
+        self.bake = Some(bake.without_caches());
         Ok(done)
     }
 
@@ -136,7 +134,7 @@ impl WebProbes {
     }
 
     fn grid(&self) -> Result<&ProbeGrid<'static>, Fault> {
-        self.grid.as_ref().ok_or_else(|| Fault::new("there are no probes"))
+        self.bake.as_ref().map(Bake::grid).ok_or_else(no_probes)
     }
 
     /// Relative standard error; infinite before there are two passes.
@@ -216,9 +214,13 @@ impl WebProbes {
         let grid = bytes::read(saved, self.tag, BakeMemory::default())?;
         let bake = Bake::resume(grid, self.settings)?;
         self.jobs = jobs_of(&bake);
-        self.grid = Some(bake.finish());
+        self.bake = Some(bake);
         Ok(())
     }
+}
+
+fn no_probes() -> Fault {
+    Fault::new("there are no probes")
 }
 
 fn jobs_of(bake: &Bake<'static, '_>) -> [u32; 2] {

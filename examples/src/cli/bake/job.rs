@@ -172,7 +172,7 @@ impl BakeJob<'_> {
         }
         bar.finish();
         if let Some(trouble) = trouble {
-            eprintln!("fogbow: {trouble}");
+            say!("fogbow: {trouble}");
         }
         let ending = if ran.ending == threads::Ending::Done { Ending::Done } else { Ending::Stopped };
         Ok((bake.finish(), outline.phase.mean_cosine().mean(), deviation, ending))

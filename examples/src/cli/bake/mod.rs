@@ -321,7 +321,7 @@ pub(super) fn run(arguments: &BakeArguments) -> Result<Ending, Failure> {
     if !arguments.per_light {
         let (made, ending) = match bake(arguments, scene, None) {
             Err(error) if error.is::<super::covariance::Stopped>() => {
-                eprintln!("fogbow: {error}");
+                say!("fogbow: {error}");
                 return Ok(Ending::Stopped);
             }
             made => made?,
@@ -348,7 +348,7 @@ fn finish(arguments: &BakeArguments, made: Made, ending: Ending, files: &[PathBu
     let files: Vec<_> = files.iter().filter(is_due).collect();
     let written = write::all(arguments, made, &files)?;
     if !arguments.quiet {
-        eprintln!("{written}");
+        say!("{written}");
     }
     Ok(ending)
 }
