@@ -267,3 +267,22 @@ fn a_scene_alone_is_a_hint_and_idle_options_are_refused() {
     let completions = folder.run(&["completions", "bash"]);
     assert!(completions.status.success() && String::from_utf8_lossy(&completions.stdout).contains("--light-points"));
 }
+
+/// `fogbow render … 2>&1 | head -1`: what is written has no reader any more.
+#[test]
+fn who_stops_reading_ends_no_render() {
+    let folder = Folder::new("unread");
+    let file = folder.0.join("a.pfm");
+    for option in ["--json", "--lenient"] {
+        let mut child = folder
+            .fogbow()
+            .args(["render", SCENE, "--size", "16x16", "--method", "path", "--spp", "4", "-o", "a.pfm", option])
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        drop((child.stdout.take(), child.stderr.take()));
+        assert!(child.wait().unwrap().success() && size(&file) > 0, "{option}");
+        std::fs::remove_file(&file).unwrap();
+    }
+}
