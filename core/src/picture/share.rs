@@ -71,8 +71,8 @@ impl Share {
 }
 
 impl<Q, C> Tiles<'_, Q, C> {
-    /// Takes a part of the picture only: the same that was taken before, if this one was left. [`Settings::samples`] are those of the whole
-    /// picture, in passes of `pass` samples that share something, or of 1. A [`Settings::goal`] would be judged by the tiles that are taken, so
+    /// Takes a part of the picture only: the same that was taken before, if this one was left. [`Settings::samples`](super::Settings::samples) are those of the whole
+    /// picture, in passes of `pass` samples that share something, or of 1. A [`Settings::goal`](super::Settings::goal) would be judged by the tiles that are taken, so
     /// with one, parts are not those of the whole.
     ///
     /// ```
@@ -122,7 +122,7 @@ impl<Q, C> Tiles<'_, Q, C> {
     }
 
     /// Adds the samples of a part to a whole picture, which has none of them yet: see [`Tiles::of_share`]. A picture of another size or with other
-    /// layers adds nothing. Noise is not known of merged pictures: without a [`Settings::goal`].
+    /// layers adds nothing. Noise is not known of merged pictures: without a [`Settings::goal`](super::Settings::goal).
     ///
     /// ```
     /// # #[cfg(feature = "alloc")] {
