@@ -96,8 +96,9 @@ fn media(root: &Element<'_>, scene: &SceneFile) {
 pub(super) fn of_medium(medium: &MediumDescription) -> Option<String> {
     let (name, depth) = (&medium.id, medium.thickness());
     if depth < 1e-2 {
+        let seen = if depth < 1e-4 { "cannot" } else { "can hardly" };
         return Some(format!(
-            "medium \"{name}\" is at most {depth:.1e} free paths across: it can hardly be seen; mind its size and its extinction"
+            "medium \"{name}\" is at most {depth:.1e} free paths across: it {seen} be seen; mind its size and its extinction"
         ));
     }
     let Matter::Homogeneous { absorption, scattering, .. } = &medium.matter else { return None };
