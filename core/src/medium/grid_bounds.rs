@@ -1,5 +1,7 @@
 //! Bounds of a voxel grid along a ray.
 
+use core::marker::PhantomData;
+
 use super::DensityGrid;
 use super::joining::{Found, Joining, Range, Span};
 use super::majorant::{BlockSpan, Entry, Field, MinMax, Walk};
@@ -70,6 +72,23 @@ impl Range for FieldBounds {
     }
 }
 
+/// The blocks along a ray, with their bounds. No closure, for a compiler leaves one that is called from two places where it is.
+struct Blocks<'g, 'a, B> {
+    grid: &'g DensityGrid<'a>,
+    walk: Walk,
+    bounds: PhantomData<B>,
+}
+
+impl<B: DensityBounds> Iterator for Blocks<'_, '_, B> {
+    type Item = Span<B>;
+
+    #[inline(always)]
+    fn next(&mut self) -> Option<Span<B>> {
+        let BlockSpan { block, begin, end } = self.walk.next()?;
+        Some(Span { bounds: B::of(self.grid, Some(block)), begin, end })
+    }
+}
+
 impl DensityGrid<'_> {
     /// See [`Medium::majorant_segment`](crate::host::Medium::majorant_segment) and
     /// [`Medium::marching_segment`](crate::host::Medium::marching_segment) of a grid.
@@ -86,17 +105,14 @@ impl DensityGrid<'_> {
     fn joined<B: DensityBounds>(&self, ray: &Ray, from: f32, joining: Joining) -> MajorantSegment {
         let line = LocalLine::new(&self.cells_from_world, ray);
         let origin = ray.origin.abs().max_element();
-        let mut walk = match Walk::enter(&line, self.size, from, origin, &self.reach) {
+        let walk = match Walk::enter(&line, self.size, from, origin, &self.reach) {
             Entry::Miss => return MajorantSegment::vacuum(f32::INFINITY),
             Entry::Coarse(near, _) if near > from => return MajorantSegment::vacuum(near),
             Entry::Coarse(_, far) => return self.segment_of(&B::of(self, None).all(), far),
             Entry::Blocks(walk) => walk,
         };
-        let next = || {
-            let BlockSpan { block, begin, end } = walk.next()?;
-            Some(Span { bounds: B::of(self, Some(block)), begin, end })
-        };
-        let found = joining.join(ray, from, self.resolution, next, |bounds| self.thickest(&bounds.all()));
+        let blocks = Blocks::<B> { grid: self, walk, bounds: PhantomData };
+        let found = joining.join(ray, from, self.resolution, blocks, |bounds| self.thickest(&bounds.all()));
         match found {
             Found::Vacuum(until) => MajorantSegment::vacuum(until),
             Found::Matter(bounds, until) => self.segment_of(&bounds.all(), until),

@@ -77,11 +77,11 @@ impl Joining {
         ray: &Ray,
         from: f32,
         cell: f32,
-        mut next: impl FnMut() -> Option<Span<B>>,
+        mut parts: impl Iterator<Item = Span<B>>,
         thickest: impl Fn(&B) -> f32,
     ) -> Found<B> {
         let (mut found, mut until) = loop {
-            let Some(span) = next() else { return Found::Vacuum(f32::INFINITY) };
+            let Some(span) = parts.next() else { return Found::Vacuum(f32::INFINITY) };
             if !span.bounds.is_empty() {
                 if span.begin > from {
                     return Found::Vacuum(span.begin);
@@ -95,7 +95,7 @@ impl Joining {
         let is_constant = found.is_constant();
         let mut thickness = thickest(&found) * (until - from);
         while until < ray.length && (is_constant || self == Self::Loose || thickness < ENOUGH) {
-            let Some(span) = next() else { break };
+            let Some(span) = parts.next() else { break };
             let bounds = span.bounds;
             let joined = found.union(&bounds);
             if is_constant {

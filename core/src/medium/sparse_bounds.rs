@@ -101,9 +101,9 @@ impl SparseGrid<'_> {
             return if near > from { MajorantSegment::vacuum(near) } else { self.segment_of(self.whole, far) };
         }
         let mut walk = Walk::new(&line, line.origin + line.direction * start, self.bricks.size, start);
-        let next = || walk.next(&self.bricks, self.bounds);
+        let bricks = core::iter::from_fn(|| walk.next(&self.bricks, self.bounds));
         let most = self.extinction.max_element();
-        match joining.join(ray, from, self.resolution, next, |bounds: &MinMax| most * bounds.max) {
+        match joining.join(ray, from, self.resolution, bricks, |bounds: &MinMax| most * bounds.max) {
             Found::Vacuum(until) => MajorantSegment::vacuum(until),
             Found::Matter(bounds, until) => self.segment_of(bounds, until),
         }

@@ -54,20 +54,17 @@ impl Growing {
             true => Film::new(film.width(), film.height(), film.layers()),
             false => Film::new(film.width(), film.height(), &LAYERS),
         };
-        let cached = match has_parts {
-            // As parts are written.
-            true => vec![
-                false,
-                false,
-                false,
-                reader.irradiance.is_some(),
-                reader.single.is_some(),
-                reader.surface.is_some(),
-                reader.multiple.is_some(),
-            ],
-            false => vec![false, true],
+        let is_cached = |layer: &String| match layer.as_str() {
+            "cached" => true,
+            "surface_indirect" => reader.irradiance.is_some(),
+            "medium_single" => reader.single.is_some(),
+            "medium_surface" => reader.surface.is_some(),
+            "medium_multiple" => reader.multiple.is_some(),
+            _ => false,
         };
-        Ok(Self { film: empty()?, before: empty()?, cached, outcome: None, noise: None })
+        let film_of_levels = empty()?;
+        let cached = film_of_levels.layers().iter().map(is_cached).collect();
+        Ok(Self { film: film_of_levels, before: empty()?, cached, outcome: None, noise: None })
     }
 
     /// Adds samples, of which this is what they took.
