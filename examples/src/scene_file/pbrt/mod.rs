@@ -5,14 +5,16 @@
 //! | `tokens` | words, parameters |
 //! | `nodes` | writing elements |
 //! | `cloud` | the procedural cloud, drawn on a grid |
-//! | `things` | materials, textures, lights, shapes, media as elements |
+//! | `materials`, `lights`, `shapes` | materials and textures, lights, shapes and media as elements |
 //!
 //! pbrt shows +x of its camera on the right, Mitsuba on the left. Brightness is that of pbrt's `cie1931` sensor: lights have the
 //! luminance of their `scale`, other sensors' response and white balance are left out, with a note.
 
 mod cloud;
+mod lights;
+mod materials;
 mod nodes;
-mod things;
+mod shapes;
 mod tokens;
 
 use std::collections::HashMap;
@@ -26,8 +28,8 @@ use super::tree::NodeId;
 use super::{Findings, ReadOptions, preprocess, read_scene};
 use crate::error::SceneError;
 use crate::transform::Transform;
+use materials::Texture;
 use nodes::Nodes;
-use things::Texture;
 use tokens::{Parameters, Token, Word, Words};
 
 /// Files within files, and no further.
