@@ -8,6 +8,7 @@ use fogbow::path::{self, Settings};
 use fogbow::sampling::Generator;
 use fogbow::spectrum::Spectrum;
 use fogbow::world::World as LitWorld;
+use fogbow_examples::picture::Picture;
 use fogbow_examples::scene_file::{Findings, NoteKind, ReadOptions, SceneFile};
 use fogbow_examples::world::{Storage, WithMedium, World};
 
@@ -196,6 +197,8 @@ fn what_is_wrong_or_missing_is_told_with_its_line() {
         ("WorldBegin\nInclude \"nowhere.pbrt\"", 2, "nowhere.pbrt"),
         ("LookAt 0 0 0 0 0 0 0 1 0", 1, "on one line"),
         ("Film \"rgb\"", 1, "no WorldBegin"),
+        ("WorldBegin\nWorldEnd", 2, "pbrt --upgrade"),
+        ("WorldBegin\nLightSource \"projection\"", 2, "filename"),
     ] {
         let all = errors(&read(text, false));
         let place = format!("room.pbrt:{line}");
@@ -206,6 +209,34 @@ fn what_is_wrong_or_missing_is_told_with_its_line() {
     assert!(lenient.scene.is_some(), "{:?}", errors(&lenient));
     let of = |kind| lenient.notes.iter().filter(|note| note.kind == kind).count();
     assert!(of(NoteKind::Replaced) == 2 && of(NoteKind::Ignored) == 1, "{:?}", lenient.notes);
+}
+
+/// As `ProjectionLight` of pbrt-v4 (`lights.cpp`): the picture is radiant intensity, its first row is above, its rows begin at -x, and the field of
+/// view is that of its shorter side.
+#[test]
+fn projections_throw_their_picture() {
+    let file = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/shapes/pattern.png");
+    let text = format!(
+        "WorldBegin\nTranslate 0 0 1\nLightSource \"projection\" \"string filename\" \"{file}\" \"float scale\" 3 \"float fov\" 60"
+    );
+    let findings = read(&text, false);
+    let scene = findings.scene.as_ref().unwrap_or_else(|| panic!("{:?}", errors(&findings)));
+    let mut storage = Storage::new(scene);
+    let world = World::new(scene, &mut storage).unwrap();
+    let lights = world.lights();
+    let [fogbow::light::Light::Projector(projector)] = lights.as_slice() else { panic!("{lights:?}") };
+    assert_eq!(projector.position, Vec3::Z);
+    let picture = Picture::read(Path::new(file)).unwrap();
+    let [width, height] = [picture.width as f32, picture.height as f32];
+    let tangent = 30_f32.to_radians().tan();
+    for (row, column) in (0..picture.height).flat_map(|row| (0..picture.width).map(move |column| (row, column))) {
+        let across = (2.0 * (column as f32 + 0.5) / width - 1.0) * tangent * width / height;
+        let up = 1.0 - 2.0 * (row as f32 + 0.5) / height;
+        let found = projector.intensity(Vec3::new(across, up * tangent, 1.0).normalize());
+        let due = Spectrum(picture.pixels[row * picture.width + column]) * 3.0;
+        assert!((found - due).0.iter().all(|off| off.abs() < 1e-4), "{row} {column}: {found:?} for {due:?}");
+    }
+    assert_eq!(projector.intensity(Vec3::new(0.0, 1.01 * tangent, 1.0).normalize()), Spectrum::ZERO);
 }
 
 /// Pieces of a scene in any order, some of them damaged: errors, and no panic.

@@ -130,7 +130,7 @@ fn pbrt(directive: &str, kind: &str) -> String {
         "bilinearmesh" => "\"point3 P\" [ 0 0 0 1 0 0 0 1 0 1 1 0 ]".to_owned(),
         "plymesh" => ply,
         "mix" if directive == "Material" => "\"string materials\" [ \"a\" \"a\" ]".to_owned(),
-        "imagemap" => format!("\"string filename\" \"{FOLDER}/tests/shapes/pattern.png\""),
+        "imagemap" | "projection" => format!("\"string filename\" \"{FOLDER}/tests/shapes/pattern.png\""),
         "uniformgrid" => "\"float density\" [ 1 ]".to_owned(),
         "nanovdb" => format!("\"string filename\" \"{FOLDER}/scenes/volumes/cloud-94x32x73.nvdb\""),
         _ => String::new(),

@@ -114,13 +114,19 @@ impl Shown<'_> {
     }
 }
 
-/// `irradiance` is that on a screen one unit ahead, over π.
+/// Angles of a cone that cuts nothing of a picture away.
+const WHOLE: [f64; 2] = [90.0; 2];
+
+/// `irradiance` is that on a screen one unit ahead, over π; pbrt's have `intensity` in place of it.
 fn projector(plugin: &Plugin<'_>) -> Result<Emitter, SceneError> {
     let to_world = plugin.to_world()?.map_or(Transform::IDENTITY, |(t, _)| t);
-    let (texture, source) = match textures::property(plugin, "irradiance")? {
-        Some(found) => found,
-        None => (Texture::Constant(Spectrum::ONE), plugin.element),
-    };
+    let intensity = textures::property(plugin, "intensity")?;
+    let cone = intensity.as_ref().map(|_| WHOLE);
+    let (texture, source) =
+        match intensity.map_or_else(|| textures::property(plugin, "irradiance"), |it| Ok(Some(it)))? {
+            Some(found) => found,
+            None => (Texture::Constant(Spectrum::ONE), plugin.element),
+        };
     let [width, height] = match &texture {
         Texture::Bitmap { picture, .. } => [picture.width, picture.height].map(|n| n as f64),
         _ => [1.0; 2],
@@ -138,8 +144,8 @@ fn projector(plugin: &Plugin<'_>) -> Result<Emitter, SceneError> {
         FovAxis::Diagonal => width.hypot(height),
     };
     let half = [tangent * width / across, tangent * height / across];
-    let shown = Shown { texture, source, half, cone: None };
-    shown.emitter(&to_world, [-1.0, -1.0], Spectrum::splat(scale * std::f32::consts::PI))
+    let intensity = if cone.is_some() { scale } else { scale * std::f32::consts::PI };
+    Shown { texture, source, half, cone }.emitter(&to_world, [-1.0, -1.0], Spectrum::splat(intensity))
 }
 
 fn strength(plugin: &Plugin<'_>, name: &str) -> Result<Spectrum, SceneError> {

@@ -114,6 +114,29 @@ impl Reader<'_> {
                 let children = vec![self.nodes.inline(Inline::Picture(picture)), self.nodes.float("scale", scale)];
                 Some(self.nodes.thing("emitter", "envmap", children))
             }
+            "projection" => {
+                let scale = parameters.number("scale").unwrap_or(1.0);
+                if parameters.get("power").is_some() {
+                    self.instead("LightSource", "the \"power\" of a projection is not supported", "by scale");
+                }
+                let Some(file) = parameters.text("filename") else {
+                    self.error("LightSource", "a projection needs a \"filename\"");
+                    return None;
+                };
+                // Rows begin at -x, and not at +x as those of a Mitsuba projector.
+                let mirrored = Transform { rows: [[-1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]] };
+                let of_picture = vec![self.nodes.string("filename", file), self.nodes.string("filter_type", "nearest")];
+                let picture = self.nodes.thing("texture", "bitmap", of_picture);
+                self.nodes.tree.node_mut(picture).set("name", "intensity".to_owned());
+                let children = vec![
+                    self.nodes.transform("to_world", &mirrored.then(&ctm)),
+                    picture,
+                    self.nodes.float("scale", scale),
+                    self.nodes.float("fov", parameters.number("fov").unwrap_or(90.0)),
+                    self.nodes.string("fov_axis", "smaller"),
+                ];
+                Some(self.nodes.thing("emitter", "projector", children))
+            }
             other => {
                 self.instead("LightSource", &format!("a \"{other}\" light is not supported"), "left out");
                 None

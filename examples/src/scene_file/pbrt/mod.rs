@@ -234,6 +234,11 @@ impl Reader<'_> {
                 let parameters = Parameters::read(words).map_err(|reason| fail(self, reason))?;
                 self.thing(directive, &kind, parameters);
             }
+            "WorldEnd" => {
+                let hint =
+                    "is of an older pbrt; pbrt-v4 makes a scene of its own from one of pbrt-v3: pbrt --upgrade FILE";
+                return Err(fail(self, hint.to_owned()));
+            }
             _ => return Err(fail(self, "is no directive that is known here".to_owned())),
         }
         Ok(())
