@@ -74,10 +74,13 @@ impl core::error::Error for DataError {}
 /// bring a desktop machine to swap.
 const MAX_FILE: u64 = 1 << 30;
 
+/// How a file begins that stands for one kept elsewhere, by Git LFS.
+const POINTER: &[u8] = b"version https://git-lfs.github.com/";
+
 /// The bytes of a file.
 ///
 /// # Errors
-/// A file that is missing, cannot be read, is not a regular file or is larger than 1 GiB.
+/// A file that is missing, cannot be read, is not a regular file, is larger than 1 GiB or is a pointer of Git LFS.
 pub fn read_file(file: &Path) -> Result<Vec<u8>, DataError> {
     let fail = |reason: String| DataError::new(file, "", reason);
     let meta = std::fs::metadata(file).map_err(|e| fail(format!("cannot be read: {e}")))?;
@@ -87,5 +90,9 @@ pub fn read_file(file: &Path) -> Result<Vec<u8>, DataError> {
     if meta.len() > MAX_FILE {
         return Err(fail(format!("has {} bytes; more than {MAX_FILE} are not read", meta.len())));
     }
-    std::fs::read(file).map_err(|e| fail(format!("cannot be read: {e}")))
+    let bytes = std::fs::read(file).map_err(|e| fail(format!("cannot be read: {e}")))?;
+    if bytes.starts_with(POINTER) {
+        return Err(fail("is a pointer of Git LFS and not the file itself, which `git lfs pull` brings".to_owned()));
+    }
+    Ok(bytes)
 }

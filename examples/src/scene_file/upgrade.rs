@@ -67,8 +67,22 @@ pub(super) fn properties(tree: &mut Tree, id: NodeId) {
     match (tag.as_str(), kind.as_str()) {
         ("bsdf", "diffuse") => rename(tree, "diffuse_reflectance", "reflectance"),
         ("medium", "heterogeneous") => rename(tree, "density", "sigma_t"),
-        ("texture", _) => uv_transform(tree, id, &children),
+        ("texture", _) => {
+            uv_transform(tree, id, &children);
+            filter(tree, &children);
+        }
         _ => {}
+    }
+}
+
+/// Pictures were filtered by pyramids; what is left between pixels is the same.
+fn filter(tree: &mut Tree, children: &[NodeId]) {
+    for child in children {
+        let node = tree.node_mut(*child);
+        if node.attribute("name") == Some("filter_type") && matches!(node.attribute("value"), Some("ewa" | "trilinear"))
+        {
+            node.set("value", "bilinear".to_owned());
+        }
     }
 }
 

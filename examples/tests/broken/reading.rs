@@ -137,14 +137,28 @@ fn files_of_version_0_6_are_upgraded() {
         <transform name="toWorld"><lookAt origin="0, 0, 4" target="0, 0, 0" up="0, 1, 0"/></transform>
         <film type="ldrfilm"><integer name="width" value="32"/><rfilter type="tent"/></film></sensor>
         <shape type="rectangle"><bsdf type="diffuse"><srgb name="reflectance" value="#ffffff"/></bsdf>
-        <transform name="toWorld"><translate z="1"/></transform>
+        <transform name="toWorld"><translate z="1"/></transform></shape>
+        <shape type="rectangle"><bsdf type="diffuse"><texture name="reflectance" type="bitmap">
+        <string name="filterType" value="trilinear"/><string name="filename" value="PATTERN"/></texture></bsdf>
         <emitter type="area"><spectrum name="radiance" value="1, 2, 3"/></emitter></shape></scene>"##;
-    let scene = scene(&folder, text);
+    let pattern = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/shapes/pattern.png");
+    let scene = scene(&folder, &text.replace("PATTERN", pattern));
     assert_eq!(scene.integrator.max_depth, Some(7));
     assert_eq!((scene.sensor.fov_axis, scene.sensor.width), (FovAxis::Smaller, 32));
     assert_eq!(scene.sensor.filter, Filter::Tent { radius: 1.0 });
     assert_eq!(scene.sensor.to_world.column(3), [0.0, 0.0, 4.0]);
-    assert_eq!(scene.shapes.len(), 1);
+    assert_eq!(scene.shapes.len(), 2);
+}
+
+#[test]
+fn pointers_of_git_lfs_are_told_from_what_they_stand_for() {
+    let folder = Folder::new("lfs");
+    let pointer = "version https://git-lfs.github.com/spec/v1\noid sha256:00\nsize 9\n";
+    folder.write("far.obj", pointer.as_bytes());
+    let text = r#"<scene version="3.0.0"><shape type="obj"><string name="filename" value="far.obj"/></shape></scene>"#;
+    let findings = read(&folder, text, &ReadOptions::default());
+    let error = findings.errors[0].to_string();
+    assert!(error.contains("far.obj: is a pointer of Git LFS"), "{error}");
 }
 
 #[test]
