@@ -311,8 +311,27 @@ impl ProbeGrid<'_> {
         if error.is_nan() { 0.0 } else { error as f32 }
     }
 
-    /// Mean light of valid probes, whatever the direction.
-    pub(super) fn level(&self) -> f64 {
+    /// Mean light of valid probes, whatever the direction: what errors are in proportion to.
+    ///
+    /// ```
+    /// # use fogbow::{host::Empty, light::Light, math::{Bounds, Vec3}, medium::{Homogeneous, Placed, Region}, phase::Phase};
+    /// # use fogbow::{spectrum::Spectrum, work, world::{Outline, World}};
+    /// # use fogbow::bake::{Bake, BakeSettings, BakedProbes};
+    /// # #[cfg(feature = "alloc")] {
+    /// # let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::splat(0.5), Phase::ISOTROPIC)?;
+    /// # let ball = Placed::new(fog, Region::sphere(Vec3::ZERO, 1.0)?);
+    /// # let sky = [Light::Constant(Spectrum::splat(3.0))];
+    /// # let world = World { medium: &ball, scene: &Empty, lights: (&sky).into() };
+    /// # let bounds = Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE };
+    /// # let settings = BakeSettings { error: 0.02, ..BakeSettings::for_outline(&Outline::of(&world, bounds), [2, 2, 2]) };
+    /// let mut bake = Bake::new(settings)?;
+    /// work::finish(&mut bake, &world, &mut BakedProbes::default());
+    /// assert!((bake.grid().level() - 3.0).abs() < 0.2);   // fog that absorbs nothing is as bright as the sky
+    /// # }
+    /// # Ok::<(), Box<dyn core::error::Error>>(())
+    /// ```
+    #[must_use]
+    pub fn level(&self) -> f64 {
         let (mut sum, mut count) = (0.0_f64, 0_u32);
         for (index, _) in self.probes().iter().enumerate().filter(|(_, probe)| probe.is_valid()) {
             sum += f64::from(self.basis.level(self.held(index)));

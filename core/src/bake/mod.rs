@@ -24,6 +24,7 @@
 //! | `fill` | [`Bake`]: passes over bricks |
 //! | `flights` | [`PhotonFlight`]s that all probes share: what they leave in cells |
 //! | `grid` | [`ProbeGrid`]: what was baked; look-ups, dilation |
+//! | `parts` | parts of a grid, for several machines, and their merging |
 //! | `froxels` | [`Froxels`]: fog before a camera in cells of its frustum, as engines show it |
 //! | `one_light` | [`OneLight`]: a layer of light for each lamp |
 //! | `output_bytes` | what jobs leave, as bytes |
@@ -38,6 +39,7 @@ mod froxels;
 mod grid;
 mod one_light;
 mod output_bytes;
+mod parts;
 mod places;
 mod settings;
 #[cfg(all(test, feature = "alloc"))]

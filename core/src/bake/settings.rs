@@ -35,6 +35,10 @@ pub struct BakeSettings {
     /// Standard error at which a brick of probes has enough passes, in proportion to the mean of the whole grid: a root mean square over
     /// its probes and their numbers, of degree 1 and more compared with degree 0.
     pub error: f32,
+    /// The mean that errors are in proportion to, if it is known beforehand ([`ProbeGrid::level`](super::ProbeGrid::level) of a coarse grid, for instance): then no brick
+    /// depends on any other, and several machines may bake some of them each ([`Bake::of_part`](super::Bake::of_part)). `None`: that of all probes, as far as
+    /// they are baked. Photons take no notice of it.
+    pub level: Option<f32>,
     /// Directions of a pass in which light is looked for.
     pub directions: u32,
     /// Passes at most.
@@ -105,6 +109,7 @@ impl BakeSettings {
             quantity: Quantity::InScattered,
             orders: Orders::All,
             error: ERROR,
+            level: None,
             directions: DIRECTIONS,
             most_passes: MOST_PASSES,
             phase: outline.phase,

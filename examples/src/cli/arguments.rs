@@ -169,9 +169,8 @@ impl RenderArguments {
         let cache = CacheArguments { cache_in: None, cache_out: None, ..cache.clone() };
         let covariance = CovarianceArguments { grid_out: None, ..covariance.clone() };
         // Only what is written or read is worth the words.
+        let (width, height) = size.unwrap_or((scene.sensor.width, scene.sensor.height));
         let options = if keeps {
-            let [width, height] = [scene.sensor.width, scene.sensor.height];
-            let (width, height) = size.unwrap_or((width, height));
             vec![
                 ("method".to_owned(), method.name().to_owned()),
                 ("size".to_owned(), format!("{width}x{height}")),
@@ -208,7 +207,7 @@ impl RenderArguments {
             layers: layers.iter().map(|layer| (*layer).to_owned()).collect(),
             has_layers: *aov,
             unfinished: None,
-            parts: self.parts.parts(samples),
+            parts: self.parts.parts(method, samples, [width, height]),
         };
         Ok((crc.value(), about))
     }

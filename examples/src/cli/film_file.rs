@@ -38,6 +38,19 @@ pub enum Split {
     Samples,
     /// Each part has all samples of some of the tiles.
     Tiles,
+    /// Of a bake: each part has some of the bricks of probes.
+    #[value(skip)]
+    Bricks,
+}
+
+impl Split {
+    pub(super) fn name(self) -> &'static str {
+        match self {
+            Self::Samples => "samples",
+            Self::Tiles => "tiles",
+            Self::Bricks => "bricks",
+        }
+    }
 }
 
 /// Which parts of a picture a file has.
@@ -56,6 +69,8 @@ impl Parts {
         match self.split {
             Split::Samples => Share::Samples { part, of },
             Split::Tiles => Share::Tiles { part, of },
+            // No picture.
+            Split::Bricks => Share::Whole,
         }
     }
 
@@ -95,9 +110,9 @@ impl About {
         const LONG: usize = 60;
         let told = |name: &str, found: &str, due: &str| {
             if found.len().max(due.len()) > LONG {
-                format!("was rendered with another {name}")
+                format!("was made with another {name}")
             } else {
-                format!("was rendered with another {name}: {found}, not {due}")
+                format!("was made with another {name}: {found}, not {due}")
             }
         };
         if other.program != self.program {
@@ -125,7 +140,7 @@ impl About {
         match &self.parts {
             None => "the whole picture".to_owned(),
             Some(Parts { split, of, has }) => {
-                let split = if *split == Split::Tiles { "tiles" } else { "samples" };
+                let split = split.name();
                 let (word, numbers) = (if has.len() == 1 { "part" } else { "parts" }, numbers(has));
                 format!("{word} {numbers} of {of} by {split}")
             }
@@ -165,6 +180,7 @@ pub(super) struct FilmFile {
     /// Of all these, nothing where there is none.
     pub(super) caches: Vec<u8>,
     pub(super) grid: Vec<u8>,
+    /// Or the probes of a part of a bake.
     pub(super) picture: Vec<u8>,
 }
 

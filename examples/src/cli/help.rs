@@ -82,7 +82,10 @@ impl Answer {
 /// # Errors
 /// The answer.
 pub fn parse(words: impl IntoIterator<Item = OsString>) -> Result<Arguments, Answer> {
-    let words: Vec<OsString> = words.into_iter().collect();
+    let mut words: Vec<OsString> = words.into_iter().collect();
+    if words.len() > 2 && words[1] == "plan" && words[2] == "bake" {
+        words.splice(1..3, ["plan-bake".into()]);
+    }
     if let Some(answer) = help_of_render(&words) {
         return Err(answer);
     }
@@ -99,6 +102,9 @@ pub fn parse(words: impl IntoIterator<Item = OsString>) -> Result<Arguments, Ans
     match &mut arguments.command {
         super::Command::Render(render) | super::Command::Fill(render) => {
             (render.given, render.is_fill) = (ids(), name == "fill");
+        }
+        super::Command::PlanBake(plan) => {
+            plan.words = words.iter().skip(2).map(|word| word.to_string_lossy().into_owned()).collect();
         }
         super::Command::Plan(plan) => {
             let words: Vec<String> = words.iter().skip(2).map(|word| word.to_string_lossy().into_owned()).collect();

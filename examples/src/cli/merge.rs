@@ -10,22 +10,24 @@ use fogbow_std::image::write_film;
 use fogbow_std::seed::Sequence;
 use serde::Serialize;
 
-use super::film_file::{About, FilmFile, Parts, Split, is_film, numbers};
+use super::bake::parts::{holds_probes, probe_bytes, probes};
+use super::film_file::{About, FilmFile, Measured, Parts, Split, is_film, numbers};
 use super::{Ending, Failure, output};
 
-/// Puts parts of a picture together: to the bits of the whole, in whatever order they are given.
+/// Puts parts of a picture or of a bake together: to the bits of the whole, in whatever order they are given.
 ///
-/// Parts come from `fogbow render --part`, or from a merge of some of them. Nothing is written if one of them is damaged, of another picture, there twice or
+/// Parts come from `fogbow render --part`, from `fogbow bake --part`, or from a merge of some of them. Nothing is written if one of them is damaged, of another picture, there twice or
 /// missing; all that is wrong is told at once. Exit code 2 then.
 #[derive(Debug, Args)]
 pub struct MergeArguments {
     /// The parts; a folder stands for the .fogbow files in it.
     #[arg(required = true, value_name = "PART.fogbow")]
     pub parts: Vec<PathBuf>,
-    /// Image to write: .png, .exr or .pfm, or .fogbow for sums that `fogbow render --checkpoint FILE --resume` goes on with; may be repeated.
+    /// Image to write: .png, .exr or .pfm, or .fogbow for sums that `fogbow render --checkpoint FILE --resume` goes on with; of a bake, .bake; may be
+    /// repeated.
     #[arg(short, long, value_name = "FILE", required_unless_present = "check")]
     pub output: Vec<PathBuf>,
-    /// Makes the picture of the parts that are there, and says which are not.
+    /// Makes the picture or the bake of the parts that are there, and says which are not.
     #[arg(long)]
     pub allow_missing: bool,
     /// Stops by which PNG images are brightened.
@@ -40,13 +42,19 @@ pub struct MergeArguments {
     pub quiet: bool,
 }
 
-/// A file without its sums, which may be large.
+/// A file that can be used.
 struct Found {
     file: PathBuf,
     about: About,
     tag: u64,
-    picture: Described,
+    /// Of a bake, nothing.
+    picture: Option<Described>,
+    /// All of it, or read again when its turn comes: see [`MOST_HELD`].
+    film: Option<FilmFile>,
 }
+
+/// Bytes of parts that are held in memory while all are looked at. More are read twice.
+const MOST_HELD: usize = 1 << 30;
 
 /// A file that cannot be used.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
@@ -75,7 +83,7 @@ struct Checked<'a> {
 pub(super) fn run(arguments: &MergeArguments) -> Result<Ending, Failure> {
     let files = files(&arguments.parts)?;
     for file in &arguments.output {
-        if is_film(file) { output::check_place(file) } else { output::check(file) }?;
+        if is_film(file) || is_bake(file) { output::check_place(file) } else { output::check(file) }?;
     }
     let sorted = sorted(&files);
     let missing = sorted.parts.as_ref().map_or_else(Vec::new, Parts::missing);
@@ -100,8 +108,17 @@ pub(super) fn run(arguments: &MergeArguments) -> Result<Ending, Failure> {
     if !wrong.is_empty() || sorted.good.is_empty() {
         return Err(wrong.join("\n").into());
     }
-    let film = merged(sorted)?;
-    let pictures = arguments.output.iter().filter(|file| !is_film(file)).count();
+    let is_of_bake = sorted.good.iter().all(|found| found.picture.is_none());
+    if let Some(file) = arguments.output.iter().find(|file| !is_film(file) && is_bake(file) != is_of_bake) {
+        let what = if is_of_bake {
+            "these are parts of a bake, which make a .bake file; fogbow bake --from-file turns it into others"
+        } else {
+            "these are parts of a picture, and no bake"
+        };
+        return Err(format!("{}: {what}", file.display()).into());
+    }
+    let film = if is_of_bake { merged_probes(sorted) } else { merged(sorted) }?;
+    let pictures = arguments.output.iter().filter(|file| !is_film(file) && !is_bake(file)).count();
     if let (Some(reason), true) = (&film.about.unfinished, pictures > 0) {
         return Err(format!(
             "sums alone do not make this picture: {reason}; merge into a .fogbow file, and finish it by fogbow render with the same options and \
@@ -112,7 +129,8 @@ pub(super) fn run(arguments: &MergeArguments) -> Result<Ending, Failure> {
     let picture = if pictures > 0 { Some(developed(&film)?) } else { None };
     for file in &arguments.output {
         match &picture {
-            Some(picture) if !is_film(file) => write_film(file, picture, arguments.exposure)?,
+            Some(picture) if !is_film(file) && !is_bake(file) => write_film(file, picture, arguments.exposure)?,
+            _ if is_bake(file) => fogbow_std::files::write(file, &film.picture).map_err(|error| error.to_string())?,
             _ => film.write(file)?,
         }
         if !arguments.quiet {
@@ -131,8 +149,13 @@ pub(super) fn run(arguments: &MergeArguments) -> Result<Ending, Failure> {
 fn lack(film: &FilmFile) -> &'static str {
     match &film.about.parts {
         Some(Parts { split: Split::Tiles, .. }) => "their tiles are black",
+        Some(Parts { split: Split::Bricks, .. }) => "their probes are dark until fogbow bake --resume bakes them",
         _ => "all pixels have fewer samples",
     }
+}
+
+fn is_bake(file: &Path) -> bool {
+    file.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("bake"))
 }
 
 /// All files, those of folders by name.
@@ -155,7 +178,7 @@ fn files(given: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
     Ok(all)
 }
 
-fn found(file: &Path) -> Result<Found, String> {
+fn found(file: &Path, held: &mut usize) -> Result<Found, String> {
     let prefix = format!("{}: ", file.display());
     let film = FilmFile::read(file).map_err(|error| {
         let text = error.to_string();
@@ -164,23 +187,27 @@ fn found(file: &Path) -> Result<Found, String> {
     if film.picture.is_empty() {
         return Err("has no samples: it is a fill, for fogbow render --fill".to_owned());
     }
-    let picture = described(&film.picture).map_err(|error| format!("its picture {error}"))?;
     let is_single = film.about.parts.as_ref().is_none_or(|parts| parts.has.len() == 1);
-    if is_single && !picture.is_done {
-        return Err(format!(
-            "is not done yet ({}): go on with it by fogbow render --checkpoint FILE --resume",
-            film.about.name()
-        ));
+    let (picture, is_done, command) = if holds_probes(&film) {
+        (None, film.about.unfinished.is_none(), "bake --resume with the same options")
+    } else {
+        let picture = described(&film.picture).map_err(|error| format!("its picture {error}"))?;
+        (Some(picture), picture.is_done, "render --checkpoint FILE --resume")
+    };
+    if is_single && !is_done {
+        return Err(format!("is not done yet ({}): go on with it by fogbow {command}", film.about.name()));
     }
-    Ok(Found { file: file.to_owned(), about: film.about, tag: film.tag, picture })
+    *held = held.saturating_add(film.picture.len());
+    let (about, tag) = (film.about.clone(), film.tag);
+    Ok(Found { file: file.to_owned(), about, tag, picture, film: (*held <= MOST_HELD).then_some(film) })
 }
 
 /// Which files belong together: those of the picture that most of them are of.
 fn sorted(files: &[PathBuf]) -> Sorted {
-    let (mut all, mut refused) = (Vec::new(), Vec::new());
+    let (mut all, mut refused, mut held) = (Vec::new(), Vec::new(), 0);
     let refuse = |file: &Path, why: String| Refused { file: file.display().to_string(), why };
     for file in files {
-        match found(file) {
+        match found(file, &mut held) {
             Ok(found) => all.push(found),
             Err(why) => refused.push(refuse(file, why)),
         }
@@ -232,29 +259,69 @@ fn sums(settings: Settings, film: &FilmFile) -> Result<Sums, Failure> {
 fn merged(sorted: Sorted) -> Result<FilmFile, Failure> {
     let Sorted { good, parts, .. } = sorted;
     let Some(first) = good.first() else { return Err("there is nothing to merge".into()) };
-    let mut whole = FilmFile::read(&first.file)?;
-    (whole.caches, whole.grid) = (Vec::new(), Vec::new());
-    let Some(parts) = parts else { return Ok(whole) };
-    let samples = match parts.split {
-        Split::Tiles => first.picture.settings.samples,
-        Split::Samples => good.iter().map(|found| found.picture.settings.samples).sum(),
+    let mut whole = first.empty();
+    let Some(parts) = parts else {
+        let film = good.into_iter().next().map(Found::film).transpose()?;
+        return Ok(film.map_or(whole, |film| FilmFile { caches: Vec::new(), grid: Vec::new(), ..film }));
     };
-    let mut sum: Sums = Tiles::new(Settings { samples, ..first.picture.settings }, Sequence::default());
+    let settings: Vec<Settings> = good.iter().filter_map(|found| Some(found.picture?.settings)).collect();
+    let Some(of_first) = settings.first() else { return Err("there is nothing to merge".into()) };
+    let samples = match parts.split {
+        Split::Samples => settings.iter().map(|settings| settings.samples).sum(),
+        Split::Tiles | Split::Bricks => of_first.samples,
+    };
+    let mut sum: Sums = Tiles::new(Settings { samples, ..*of_first }, Sequence::default());
     let mut unfinished = None;
-    for found in &good {
-        let film = FilmFile::read(&found.file)?;
-        // Changed since it was looked at.
-        if (film.tag, &film.about.parts) != (found.tag, &found.about.parts) {
-            return Err(format!("{}: is being written", found.file.display()).into());
-        }
-        sum.merge(&sums(found.picture.settings, &film)?);
+    for (found, settings) in good.into_iter().zip(settings) {
+        let film = found.film()?;
+        sum.merge(&sums(settings, &film)?);
         unfinished = unfinished.or(film.about.unfinished);
     }
-    let is_whole = parts.missing().is_empty();
-    whole.about.parts = (!is_whole).then_some(parts);
     whole.about.unfinished = unfinished;
     whole.picture = sum.to_bytes(whole.tag);
+    whole.about.parts = (!parts.missing().is_empty()).then_some(parts);
     Ok(whole)
+}
+
+/// All probes of all parts.
+fn merged_probes(sorted: Sorted) -> Result<FilmFile, Failure> {
+    let Sorted { good, parts, .. } = sorted;
+    let Some(first) = good.first() else { return Err("there is nothing to merge".into()) };
+    let mut whole = first.empty();
+    let mut all = None;
+    for found in good {
+        let (file, film) = (found.file.clone(), found.film()?);
+        let read = || probes(&film).map_err(|error| format!("{}: its grid {error}", file.display()));
+        if all.is_none() {
+            all = Some(read()?);
+        }
+        // The first adds nothing to itself, but what it lacks is due from then on.
+        if let Some((sum, _)) = &mut all {
+            sum.merge(&read()?.0).map_err(|error| format!("{}: {error}", file.display()))?;
+        }
+    }
+    whole.picture = all.map_or_else(Vec::new, |(grid, tag)| probe_bytes(&grid, tag));
+    whole.about.parts = parts.filter(|parts| !parts.missing().is_empty());
+    Ok(whole)
+}
+
+impl Found {
+    /// What it is of, without what is in it.
+    fn empty(&self) -> FilmFile {
+        let (caches, grid, picture) = (Vec::new(), Vec::new(), Vec::new());
+        let about = About { unfinished: None, ..self.about.clone() };
+        FilmFile { tag: self.tag, about, measured: Measured::default(), caches, grid, picture }
+    }
+
+    /// All of it.
+    fn film(self) -> Result<FilmFile, Failure> {
+        let film = self.film.map_or_else(|| FilmFile::read(&self.file), Ok)?;
+        // Changed since it was looked at.
+        if (film.tag, &film.about.parts) != (self.tag, &self.about.parts) {
+            return Err(format!("{}: is being written", self.file.display()).into());
+        }
+        Ok(film)
+    }
 }
 
 /// The picture that sums make.

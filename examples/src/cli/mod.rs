@@ -22,6 +22,7 @@ mod output;
 mod parts;
 mod photon_beams;
 mod plan;
+mod plan_bake;
 mod plume;
 mod probe;
 mod radiance_cache;
@@ -36,7 +37,7 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 
 pub use arguments::{Method, RenderArguments};
-pub use bake::BakeArguments;
+pub use bake::{BakeArguments, BakePartArguments};
 pub use check::CheckArguments;
 pub use compare::CompareArguments;
 pub use covariance::{CovarianceArguments, MarchArguments, Step};
@@ -49,6 +50,7 @@ pub use merge::MergeArguments;
 pub use parts::PartArguments;
 pub use photon_beams::{BeamArguments, Kernel};
 pub use plan::PlanArguments;
+pub use plan_bake::PlanBakeArguments;
 pub use plume::PlumeArguments;
 pub use probe::{HessianArguments, Probe, ProbeArguments};
 pub use radiance_cache::{CacheArguments, Kind, Single};
@@ -76,6 +78,9 @@ pub enum Command {
     Merge(MergeArguments),
     /// Prints which commands render a scene on many machines.
     Plan(PlanArguments),
+    /// Prints which commands bake a scene on many machines: fogbow plan bake.
+    #[command(hide = true)]
+    PlanBake(PlanBakeArguments),
     /// Says all at once what of a scene cannot be rendered or looks like a mistake.
     Check(CheckArguments),
     /// Bakes light in fog into 3D textures for engines.
@@ -111,6 +116,7 @@ pub fn run(arguments: Arguments) -> ExitCode {
         Command::Render(arguments) | Command::Fill(arguments) => render::run(&arguments),
         Command::Merge(arguments) => merge::run(&arguments),
         Command::Plan(arguments) => plan::run(&arguments),
+        Command::PlanBake(arguments) => plan_bake::run(&arguments),
         Command::Check(arguments) => check::run(&arguments),
         Command::Bake(arguments) => bake::run(&arguments),
         Command::Records(arguments) => records::run(&arguments),

@@ -15,7 +15,8 @@ pub struct PartArguments {
     /// Renders part K of N of the picture, into a .fogbow file for `fogbow merge`; without it, such a file has the whole picture.
     #[arg(long, value_name = "K/N", value_parser = part)]
     pub part: Option<(u32, u32)>,
-    /// What parts are of: of the samples of all pixels, or of the tiles [default: samples, where there are enough].
+    /// What parts are of: of the tiles, which reads and writes less, or of the samples of all pixels [default: tiles; samples for photon beams and virtual
+    /// lights, whose passes serve the whole picture].
     #[arg(long, value_enum)]
     pub split: Option<Split>,
     /// Takes the caches or the covariance grid that `fogbow fill` has left in this file.
@@ -24,7 +25,7 @@ pub struct PartArguments {
 }
 
 /// `K/N`.
-fn part(text: &str) -> Result<(u32, u32), String> {
+pub(super) fn part(text: &str) -> Result<(u32, u32), String> {
     let parsed = text.split_once('/').and_then(|(part, of)| Some((part.parse().ok()?, of.parse().ok()?)));
     match parsed {
         Some((part, of)) if part >= 1 && part <= of => Ok((part, of)),
@@ -34,15 +35,27 @@ fn part(text: &str) -> Result<(u32, u32), String> {
 }
 
 impl PartArguments {
-    /// Which part of so many samples; `None` for all.
-    pub(super) fn parts(&self, samples: u32) -> Option<Parts> {
-        self.part.map(|(part, of)| Parts { split: self.split_for(of, samples), of, has: vec![part] })
+    /// Which part of a picture by this method, with so many samples; `None` for all.
+    pub(super) fn parts(&self, method: Method, samples: u32, size: [u32; 2]) -> Option<Parts> {
+        self.part.map(|(part, of)| Parts { split: self.split_for(method, of, samples, size), of, has: vec![part] })
     }
 
     /// By what so many parts are split.
-    pub(super) fn split_for(&self, of: u32, samples: u32) -> Split {
-        self.split.unwrap_or(if of > samples { Split::Tiles } else { Split::Samples })
+    pub(super) fn split_for(&self, method: Method, of: u32, samples: u32, size: [u32; 2]) -> Split {
+        let has_passes = matches!(method, Method::PhotonBeams | Method::Vpl);
+        let (fewer_tiles, fewer_samples) = (u64::from(of) > tile_count(size), of > samples);
+        let usual = match has_passes {
+            true if fewer_samples => Split::Tiles,
+            false if !fewer_tiles || fewer_samples => Split::Tiles,
+            _ => Split::Samples,
+        };
+        self.split.unwrap_or(usual)
     }
+}
+
+fn tile_count(size: [u32; 2]) -> u64 {
+    let side = tiles::Settings::default().tile;
+    size.map(|length| u64::from(length.div_ceil(side))).iter().product()
 }
 
 impl RenderArguments {
@@ -78,7 +91,9 @@ impl RenderArguments {
     pub(super) fn check_part_of(&self, method: Method, samples: u32, size: [u32; 2]) -> Result<(), Failure> {
         match self.parts.part {
             None => Ok(()),
-            Some((_, of)) => self.check_parts(method, (of, self.parts.split_for(of, samples)), samples, size),
+            Some((_, of)) => {
+                self.check_parts(method, (of, self.parts.split_for(method, of, samples, size)), samples, size)
+            }
         }
     }
 
@@ -99,13 +114,10 @@ impl RenderArguments {
                     .into(),
             );
         }
-        let side = tiles::Settings::default().tile;
         let (most, what, other) = match split {
             Split::Samples => (u64::from(samples), "samples per pixel", "tiles"),
-            Split::Tiles => {
-                let [columns, rows] = size.map(|length| u64::from(length.div_ceil(side)));
-                (columns * rows, "tiles", "samples")
-            }
+            // Bricks are of bakes.
+            Split::Tiles | Split::Bricks => (tile_count(size), "tiles", "samples"),
         };
         if u64::from(of) > most {
             return Err(format!("--part: {of} parts of {most} {what}; take fewer, or --split {other}").into());

@@ -16,6 +16,8 @@ use crate::world::{Storage, World};
 ///
 /// `fill` is made once, if the method has something to fill; then all parts may run anywhere, in any order and at once; `merge` puts them together. All steps
 /// share one folder. A step that was stopped goes on where it was when it is run again; one that is run twice writes the same file twice.
+///
+/// `fogbow plan bake SCENE` does the same for `fogbow bake`.
 #[derive(Debug, Args)]
 pub struct PlanArguments {
     /// What to render, with all options of `fogbow render`.
@@ -41,26 +43,26 @@ pub struct PlanArguments {
 
 /// A command, and what it waits for.
 #[derive(Debug, Clone, Serialize, PartialEq, Eq)]
-struct Step {
-    id: String,
-    kind: &'static str,
+pub(super) struct Step {
+    pub(super) id: String,
+    pub(super) kind: &'static str,
     /// Words behind `fogbow`.
-    run: Vec<String>,
+    pub(super) run: Vec<String>,
     /// Steps that have to be done before.
-    after: Vec<String>,
-    writes: Vec<String>,
+    pub(super) after: Vec<String>,
+    pub(super) writes: Vec<String>,
 }
 
 #[derive(Debug, Serialize)]
-struct Graph {
-    version: u32,
-    scene: String,
-    method: &'static str,
-    split: Option<Split>,
-    parts: u32,
-    frames: usize,
-    folder: String,
-    steps: Vec<Step>,
+pub(super) struct Graph {
+    pub(super) version: u32,
+    pub(super) scene: String,
+    pub(super) method: &'static str,
+    pub(super) split: Option<Split>,
+    pub(super) parts: u32,
+    pub(super) frames: usize,
+    pub(super) folder: String,
+    pub(super) steps: Vec<Step>,
 }
 
 /// Options of this command with a value: all others are for `fogbow render`, but for the pictures, which are for `fogbow merge`.
@@ -68,13 +70,18 @@ const OWN: [&str; 6] = ["--parts", "--folder", "--cameras", "--group", "--output
 
 /// Words for `fogbow render`, of those behind `fogbow plan`.
 pub(super) fn words_for_render(words: &[String]) -> Vec<String> {
+    without(words, &OWN)
+}
+
+/// Words without these options, their values and -o.
+pub(super) fn without(words: &[String], options: &[&str]) -> Vec<String> {
     let mut kept = Vec::new();
     let mut words = words.iter();
     while let Some(word) = words.next() {
         let has_value = |own: &&str| word.starts_with(&format!("{own}="));
-        if OWN.contains(&word.as_str()) || word == "-o" {
+        if options.contains(&word.as_str()) || word == "-o" {
             words.next();
-        } else if word.starts_with("-o") || OWN.iter().any(has_value) {
+        } else if word.starts_with("-o") || options.iter().any(has_value) {
             // Option and value in one word.
         } else {
             kept.push(word.clone());
@@ -105,7 +112,7 @@ fn graph(arguments: &PlanArguments) -> Result<Graph, Failure> {
     render.check_given(method, None)?;
     let (width, height) = render.size.unwrap_or((scene.sensor.width, scene.sensor.height));
     let (samples, _) = render.samples(method, scene.sensor.samples);
-    let split = render.parts.split_for(arguments.parts, samples);
+    let split = render.parts.split_for(method, arguments.parts, samples, [width, height]);
     if render.noise.is_some() || render.time.is_some() {
         return Err("--noise and --time: no part has the noise of the whole picture, or its time; use --spp".into());
     }
@@ -226,7 +233,7 @@ impl Planned<'_> {
                 writes,
             });
         }
-        let split = if self.split == Split::Tiles { "tiles" } else { "samples" };
+        let split = self.split.name();
         let digits = parts.to_string().len();
         let mut written = Vec::new();
         for part in 1..=parts {

@@ -1,6 +1,9 @@
 //! Pictures in parts: whatever the method, the number of parts, their order and what they are of, merged they are the bits of the whole; and nothing
 //! that does not belong to a picture gets into it.
 
+use fogbow::bytes::Crc;
+use serde_json::{Value, json};
+
 use super::{Folder, SCENE, said};
 
 /// Options of each method, with passes that do not fit the parts; and whether there is something to fill.
@@ -126,8 +129,8 @@ fn what_does_not_belong_to_a_picture_is_refused_by_name() {
     write("text.fogbow", b"not a film");
     let three = ["p1.fogbow", "p3.fogbow", "p4.fogbow"];
     for (file, words) in [
-        ("seed.fogbow", "was rendered with another seed: 1, not 0"),
-        ("spp.fogbow", "was rendered with another number of samples: 9, not 8"),
+        ("seed.fogbow", "was made with another seed: 1, not 0"),
+        ("spp.fogbow", "was made with another number of samples: 9, not 8"),
         ("fifth.fogbow", "is part 2 of 5 by tiles"),
         ("samples.fogbow", "is part 2 of 4 by samples"),
         ("lantern.fogbow", "is of another scene: lantern.xml"),
@@ -149,11 +152,143 @@ fn what_does_not_belong_to_a_picture_is_refused_by_name() {
     assert!(said(&missing).contains("part 2 of 4 is missing"), "{}", said(&missing));
     let checked = folder.run(&[&["merge", "--check", "flipped.fogbow"], &three[..]].concat());
     assert_eq!(checked.status.code(), Some(1));
-    let told: serde_json::Value = serde_json::from_slice(&checked.stdout).unwrap();
-    assert_eq!((&told["missing"], &told["there"]), (&serde_json::json!([2]), &serde_json::json!([1, 3, 4])));
+    let told: Value = serde_json::from_slice(&checked.stdout).unwrap();
+    assert_eq!((&told["missing"], &told["there"]), (&json!([2]), &json!([1, 3, 4])));
     assert_eq!(told["refused"][0]["file"], "flipped.fogbow");
     done(&folder, &[&["merge", "-q", "-o", "merged.pfm"], &FOUR[..]].concat());
     assert_eq!(read(&folder, "merged.pfm"), read(&folder, "whole.pfm"));
+}
+
+/// A film file whose words and sums somebody else wrote: checksums are right.
+fn rewritten(file: &[u8], about: impl Fn(&mut Value), picture: impl Fn(&mut [u8])) -> Vec<u8> {
+    const HEADER: usize = 68;
+    let length = |at: usize| u64::from_le_bytes(file[at..at + 8].try_into().unwrap()) as usize;
+    let (end, rest) = (HEADER + length(20), file.len() - length(44));
+    let mut words: Value = serde_json::from_slice(&file[HEADER..end]).unwrap();
+    about(&mut words);
+    let mut sums = file[rest..].to_vec();
+    picture(&mut sums);
+    let words = serde_json::to_vec(&words).unwrap();
+    let mut all = [&file[..HEADER], &words, &file[end..rest], &sums].concat();
+    all[20..28].copy_from_slice(&(words.len() as u64).to_le_bytes());
+    let crc = crc_of(&all, HEADER);
+    all[HEADER - 8..HEADER].copy_from_slice(&crc);
+    all
+}
+
+/// Checksum of all but the last eight bytes of a header.
+fn crc_of(bytes: &[u8], header: usize) -> [u8; 8] {
+    let mut crc = Crc::new();
+    crc.add(&bytes[..header - 8]);
+    crc.add(&bytes[header..]);
+    crc.value().to_le_bytes()
+}
+
+#[test]
+fn parts_of_another_version_and_unfinished_ones_are_refused() {
+    let folder = Folder::new("parts-versions");
+    four(&folder, &[]);
+    let bytes = read(&folder, "p2.fogbow");
+    let write = |name: &str, bytes: &[u8]| std::fs::write(folder.0.join(name), bytes).unwrap();
+    write("same.fogbow", &rewritten(&bytes, |_| (), |_| ()));
+    done(&folder, &["merge", "-q", "p1.fogbow", "same.fogbow", "p3.fogbow", "p4.fogbow", "-o", "same.pfm"]);
+    assert_eq!(read(&folder, "same.pfm"), read(&folder, "whole.pfm"));
+    write("version.fogbow", &rewritten(&bytes, |about| about["program"] = json!("0.0.9"), |_| ()));
+    let left = |picture: &mut [u8]| {
+        picture[52] &= !1; // not all samples
+        let crc = crc_of(picture, 120);
+        picture[112..120].copy_from_slice(&crc);
+    };
+    write("left.fogbow", &rewritten(&bytes, |_| (), left));
+    for (file, words) in [
+        ("version.fogbow", "was made by fogbow 0.0.9, not 0"),
+        ("left.fogbow", "is not done yet (part 2 of 4 by tiles): go on with it by fogbow render --checkpoint"),
+    ] {
+        let output = folder.run(&["merge", "-o", "a.pfm", "--allow-missing", "p1.fogbow", "p3.fogbow", file]);
+        assert_eq!(output.status.code(), Some(2), "{file}");
+        assert!(said(&output).contains(file) && said(&output).contains(words), "{file}: {}", said(&output));
+        assert!(!folder.0.join("a.pfm").exists());
+    }
+}
+
+/// A bake of six bricks, of which some need more passes than others.
+const BAKE: [&str; 8] = ["--counts", "9x8x4", "--error", "0.15", "--passes", "40", "--basis", "sh1"];
+
+#[test]
+fn parts_of_a_bake_merge_to_the_bits_of_the_whole() {
+    let folder = Folder::new("parts-bake");
+    done(
+        &folder,
+        &["bake", SCENE, "-q", "--counts", "3x2x1", "--basis", "fluence", "--error", "0.1", "-o", "level.bake"],
+    );
+    let bake =
+        |more: &[&str]| done(&folder, &[&["bake", SCENE, "-q", "--level", "level.bake"], &BAKE[..], more].concat());
+    bake(&["-o", "whole.bake"]);
+    for part in ["1", "2", "3"] {
+        bake(&["--part", &format!("{part}/3"), "--threads", "1", "-o", &format!("{part}.fogbow")]);
+    }
+    let again = read(&folder, "2.fogbow");
+    bake(&["--part", "2/3", "--resume", "-o", "2.fogbow"]);
+    assert!(read(&folder, "2.fogbow") == again, "what is done is done");
+    done(&folder, &["merge", "-q", "3.fogbow", "1.fogbow", "2.fogbow", "-o", "merged.bake"]);
+    assert!(read(&folder, "merged.bake") == read(&folder, "whole.bake"));
+
+    // Some of them, and then the others; or baked on in one piece.
+    let some =
+        folder.run(&["merge", "-q", "3.fogbow", "1.fogbow", "--allow-missing", "-o", "31.fogbow", "-o", "31.bake"]);
+    assert_eq!(some.status.code(), Some(1), "{}", said(&some));
+    assert!(said(&some).contains("part 2 of 3 is missing: their probes are dark"), "{}", said(&some));
+    done(&folder, &["merge", "-q", "2.fogbow", "31.fogbow", "-o", "two.bake"]);
+    assert!(read(&folder, "two.bake") == read(&folder, "whole.bake"));
+    bake(&["--resume", "-o", "31.bake"]);
+    assert!(read(&folder, "31.bake") == read(&folder, "whole.bake"));
+
+    // A part that was left, and one of another program.
+    let file = read(&folder, "2.fogbow");
+    let write = |name: &str, bytes: &[u8]| std::fs::write(folder.0.join(name), bytes).unwrap();
+    write("left.fogbow", &rewritten(&file, |about| about["unfinished"] = json!("bricks are"), |_| ()));
+    write("version.fogbow", &rewritten(&file, |about| about["program"] = json!("0.0.9"), |_| ()));
+    let flipped = |(i, byte): (usize, &u8)| byte ^ u8::from(i == file.len() / 2);
+    write("flipped.fogbow", &file.iter().enumerate().map(flipped).collect::<Vec<_>>());
+    write("again.fogbow", &read(&folder, "1.fogbow"));
+    write("short.fogbow", &file[..file.len() / 2]);
+    bake(&["--part", "2/3", "--seed", "1", "-o", "seed.fogbow"]);
+    part(&folder, "2/3", "picture.fogbow", &["--method", "path", "--spp", "3"]);
+    for (more, words) in [
+        ("left.fogbow", "is not done yet (part 2 of 3 by bricks): go on with it by fogbow bake --resume"),
+        ("version.fogbow", "was made by fogbow 0.0.9"),
+        ("flipped.fogbow", "is damaged"),
+        ("again.fogbow", "has part 1, which 1.fogbow has, too"),
+        ("short.fogbow", "is cut off"),
+        ("seed.fogbow", "was made with another seed: 1, not 0"),
+        ("picture.fogbow", "was made with another"),
+    ] {
+        let output = folder.run(&["merge", "-o", "a.bake", "--allow-missing", "1.fogbow", "3.fogbow", more]);
+        assert_eq!(output.status.code(), Some(2), "{more}: {}", said(&output));
+        assert!(said(&output).contains(more) && said(&output).contains(words), "{more}: {}", said(&output));
+    }
+    for (words, why) in [
+        (&["merge", "1.fogbow", "3.fogbow", "-o", "a.bake"][..], "part 2 of 3 is missing"),
+        (&["merge", "1.fogbow", "2.fogbow", "3.fogbow", "-o", "a.exr"], "these are parts of a bake"),
+        (&["merge", "picture.fogbow", "--allow-missing", "-o", "a.bake"], "these are parts of a picture"),
+        (&["bake", SCENE, "--part", "1/2", "-o", "a.fogbow"], "--level"),
+        (&["bake", SCENE, "--part", "1/2", "--level", "level.bake", "-o", "a.bake"], "-o PART.fogbow"),
+        (&["bake", SCENE, "--level", "level.bake", "--method", "photons", "-o", "a.bake"], "photons serve all probes"),
+        (&["bake", SCENE, "--level", "2.fogbow", "-o", "a.bake"], "is no grid of probes"),
+        (
+            &["bake", SCENE, "--level", "level.bake", "--orders", "indirect", "-o", "a.bake"],
+            "holds other light: --quantity and --orders",
+        ),
+        (
+            &["bake", SCENE, "--counts", "4x4x4", "--part", "1/2", "--level", "level.bake", "-o", "a.fogbow"],
+            "2 parts of 1 bricks",
+        ),
+    ] {
+        let output = folder.run(words);
+        assert_eq!(output.status.code(), Some(2), "{words:?}: {}", said(&output));
+        assert!(said(&output).contains(why), "{words:?}: {}", said(&output));
+        assert!(!folder.0.join("a.bake").exists());
+    }
 }
 
 #[test]

@@ -18,6 +18,7 @@ use super::super::covariance::Stopped;
 use super::super::render::stop_flag;
 use super::super::report::{Bar, Voice};
 use super::super::{Ending, Failure};
+use super::parts::PartOf;
 use super::{BakeArguments, Source, begun, write};
 use crate::world::{WithMedium, World};
 
@@ -60,6 +61,10 @@ pub(super) struct BakeJob<'a> {
     pub(super) tag: u64,
     /// The one light that shines; `None` for all.
     pub(super) light: Option<u32>,
+    /// The mean that errors are in proportion to, if it is given.
+    pub(super) level: Option<f32>,
+    /// What a part is of.
+    pub(super) part: Option<&'a PartOf>,
     /// Where the grid is kept, to be gone on with.
     pub(super) kept: Option<PathBuf>,
 }
@@ -75,6 +80,7 @@ impl BakeJob<'_> {
             error: self.arguments.error.unwrap_or(usual.error),
             most_passes: self.arguments.passes.unwrap_or(usual.most_passes),
             paths: self.paths,
+            level: self.level,
             seed: self.arguments.seed,
             ..usual
         }
@@ -140,13 +146,16 @@ impl BakeJob<'_> {
         }
         let settings = self.settings(outline);
         let begun = match self.kept.as_ref().filter(|_| self.arguments.resume) {
-            Some(file) => begun(file, self.tag)?,
+            Some(file) => self.part.map_or_else(|| begun(file, self.tag), |part| part.begun(file, self.tag))?,
             None => None,
         };
         let bake = match begun {
             Some(grid) => Bake::resume(grid, settings)
                 .map_err(|_| "--resume: the file is of other probes: of another --box, --counts, --basis, --quantity or --orders")?,
-            None => Bake::new(settings)?,
+            None => match self.arguments.many.part {
+                Some((part, of)) => Bake::new(settings)?.of_part(part - 1, of),
+                None => Bake::new(settings)?,
+            },
         };
         let mut bake = match &caches {
             Some(caches) => bake.with_caches(caches),
@@ -159,7 +168,11 @@ impl BakeJob<'_> {
             bar.share(bake.share(), elapsed);
             if let Some(file) = self.kept.as_ref().filter(|_| elapsed - written > self.arguments.checkpoint_every) {
                 written = elapsed;
-                trouble = trouble.take().or(write::keep(file, bake.grid(), self.tag).err());
+                let kept = match self.part {
+                    Some(part) => part.write(file, bake.grid(), self.tag, false),
+                    None => write::keep(file, bake.grid(), self.tag),
+                };
+                trouble = trouble.take().or(kept.err());
             }
         });
         let mut deviation = None;

@@ -1,6 +1,7 @@
 //! `fogbow bake`: light in fog as 3D textures.
 
 mod job;
+pub(super) mod parts;
 mod write;
 
 use std::path::{Path, PathBuf};
@@ -20,6 +21,9 @@ use crate::bake::{Baked, Layout};
 use crate::error::read_file;
 use crate::world::{Storage, World, light_tree, view};
 use job::BakeJob;
+pub use parts::BakePartArguments;
+use parts::PartOf;
+pub(super) use parts::check_count;
 use write::Target;
 
 /// Bakes light in fog into 3D textures for engines.
@@ -37,7 +41,7 @@ pub struct BakeArguments {
     #[command(flatten)]
     pub reading: ReadArguments,
     /// Bakes nothing but writes what is in a .bake file in other formats.
-    #[arg(long, value_name = "FILE.bake", conflicts_with_all = ["scene", "region", "spacing", "counts", "basis", "quantity", "orders", "error", "passes", "per_light", "resume"])]
+    #[arg(long, value_name = "FILE.bake", conflicts_with_all = ["scene", "region", "spacing", "counts", "basis", "quantity", "orders", "error", "passes", "per_light", "resume", "part", "level"])]
     pub from_file: Option<PathBuf>,
     /// The box to bake: two corners, the smaller one first [default: around all media].
     #[arg(long = "box", value_name = "MIN MAX", value_parser = corners, allow_hyphen_values = true)]
@@ -91,6 +95,9 @@ pub struct BakeArguments {
     /// Chooses other random numbers.
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub seed: u64,
+    /// Parts.
+    #[command(flatten)]
+    pub many: BakePartArguments,
     /// File to write; may be repeated: .bake (all there is, for --resume and --from-file), .json (with plain numbers in a .bin file beside it), .ktx2 (with a
     /// .json file beside it; for the plain layout, a file for each number) or .exr (slices side by side).
     #[arg(short, long, value_name = "FILE", required = true)]
@@ -227,12 +234,13 @@ impl BakeArguments {
         }
     }
 
-    /// The one .bake file that is written.
+    /// The one file that is written and can be gone on with: .bake, or .fogbow of a part.
     ///
     /// # Errors
     /// None or several, where one is needed.
     fn kept(&self) -> Result<Option<&Path>, String> {
-        let mut files = self.output.iter().map(PathBuf::as_path).filter(|file| Target::of(file) == Ok(Target::Bake));
+        let is_kept = |file: &&Path| self.many.part.is_some() || Target::of(file) == Ok(Target::Bake);
+        let mut files = self.output.iter().map(PathBuf::as_path).filter(is_kept);
         match (files.next(), files.next()) {
             (None, _) if self.resume => Err("--resume goes on with a .bake file, but none is to be written".to_owned()),
             (Some(_), Some(_)) => Err("--output: there may be one .bake file".to_owned()),
@@ -308,8 +316,11 @@ fn error(text: &str) -> Result<f32, String> {
 }
 
 pub(super) fn run(arguments: &BakeArguments) -> Result<Ending, Failure> {
+    arguments.check_part()?;
     for file in &arguments.output {
-        Target::of(file)?;
+        if arguments.many.part.is_none() {
+            Target::of(file)?;
+        }
         output::check_place(file)?;
     }
     arguments.kept()?;
@@ -318,6 +329,9 @@ pub(super) fn run(arguments: &BakeArguments) -> Result<Ending, Failure> {
         return finish(arguments, from_file(file)?, Ending::Done, &arguments.output);
     };
     let scene = &SceneArguments { file: file.clone(), reading: arguments.reading.clone() };
+    if arguments.many.part.is_some() {
+        return parts::run(arguments, scene);
+    }
     if !arguments.per_light {
         let (made, ending) = match bake(arguments, scene, None) {
             Err(error) if error.is::<super::covariance::Stopped>() => {
@@ -384,13 +398,14 @@ fn of_light(file: &Path, number: u32) -> PathBuf {
 struct Made {
     baked: Baked,
     tag: u64,
+    part: Option<PartOf>,
 }
 
 fn from_file(file: &Path) -> Result<Made, Failure> {
     let bytes = read_file(file)?;
     let grid = bytes::tag(&bytes).and_then(|tag| Ok((bytes::read(&bytes, tag, BakeMemory::default())?, tag)));
     let (grid, tag) = grid.map_err(|error| format!("{}: {error}", file.display()))?;
-    Ok(Made { baked: Baked { grid, method: None, mean_cosine: None, deviation: None, scale: 1.0 }, tag })
+    Ok(Made { baked: Baked { grid, method: None, mean_cosine: None, deviation: None, scale: 1.0 }, tag, part: None })
 }
 
 /// Bakes a scene, by all its lights or by one of them.
@@ -399,6 +414,59 @@ fn bake(arguments: &BakeArguments, file: &SceneArguments, light: Option<u32>) ->
     let mut storage = Storage::new(&scene);
     let world = World::new(&scene, &mut storage)?;
     let paths = super::render::path_settings(&scene, None);
+    let (bounds, counts) = place(arguments, file, &world)?;
+    let lights = world.lights();
+    if lights.is_empty() && !world.media().glow() {
+        return Err(format!("{}: has no lights, so there is nothing to bake", file.file.display()).into());
+    }
+    let tree = light_tree(&lights);
+    let method = arguments.method;
+    if method == Source::RadianceCache
+        && arguments.quantity() == Quantity::Irradiance
+        && arguments.basis() != ProbeBasis::Fluence
+    {
+        return Err("--method radiance-cache: caches in a medium know nothing of irradiance; take --method path".into());
+    }
+    job::check(method, &paths, &world)?;
+    let tag = tag(arguments, file, &paths, light)?;
+    let level = arguments.level(file, &paths)?;
+    let part = arguments.part_of(file, &paths, (&bounds, counts), level)?;
+    let job = BakeJob {
+        arguments,
+        world: &world,
+        lights: view(&lights, tree.as_ref()),
+        paths,
+        bounds,
+        counts,
+        method,
+        tag,
+        light,
+        level,
+        part: part.as_ref(),
+        kept: arguments.kept()?.map(|file| light.map_or(file.to_owned(), |number| of_light(file, number))),
+    };
+    let (grid, mean_cosine, deviation, ending) = world.media().with(job)?;
+    let name = match method {
+        Source::RadianceCache => "radiance-cache",
+        Source::Path => "path",
+        Source::Photons => "photons",
+    };
+    let baked = Baked { grid, method: Some(name), mean_cosine: Some(mean_cosine), deviation, scale: 1.0 };
+    if baked.counts()[0] == 0 && ending == Ending::Done && part.is_none() {
+        let [_, in_wall, empty] = baked.counts();
+        return Err(format!(
+            "no probe holds light: {in_wall} are in walls, {empty} far from any medium; choose another --box or smaller cells"
+        )
+        .into());
+    }
+    Ok((Made { baked, tag, part }, ending))
+}
+
+/// The box that is baked, and the probes along its sides.
+///
+/// # Errors
+/// A scene without a medium, or a box far from it; too many probes.
+fn place(arguments: &BakeArguments, file: &SceneArguments, world: &World<'_>) -> Result<(Bounds, [u32; 3]), Failure> {
     let around = world.medium_bounds();
     let needs_medium = arguments.quantity() == Quantity::InScattered;
     let bounds = match (arguments.region, around) {
@@ -416,48 +484,18 @@ fn bake(arguments: &BakeArguments, file: &SceneArguments, light: Option<u32>) ->
         (Some(region), _) => region,
         (None, around) => around.unwrap_or(world.bounds()),
     };
-    let counts = arguments.cells(&bounds)?;
-    let lights = world.lights();
-    if lights.is_empty() && !world.media().glow() {
-        return Err(format!("{}: has no lights, so there is nothing to bake", file.file.display()).into());
-    }
-    let tree = light_tree(&lights);
-    let method = arguments.method;
-    if method == Source::RadianceCache
-        && arguments.quantity() == Quantity::Irradiance
-        && arguments.basis() != ProbeBasis::Fluence
-    {
-        return Err("--method radiance-cache: caches in a medium know nothing of irradiance; take --method path".into());
-    }
-    job::check(method, &paths, &world)?;
-    let tag = tag(arguments, file, &paths, light)?;
-    let job = BakeJob {
-        arguments,
-        world: &world,
-        lights: view(&lights, tree.as_ref()),
-        paths,
-        bounds,
-        counts,
-        method,
-        tag,
-        light,
-        kept: arguments.kept()?.map(|file| light.map_or(file.to_owned(), |number| of_light(file, number))),
-    };
-    let (grid, mean_cosine, deviation, ending) = world.media().with(job)?;
-    let name = match method {
-        Source::RadianceCache => "radiance-cache",
-        Source::Path => "path",
-        Source::Photons => "photons",
-    };
-    let baked = Baked { grid, method: Some(name), mean_cosine: Some(mean_cosine), deviation, scale: 1.0 };
-    if baked.counts()[0] == 0 && ending == Ending::Done {
-        let [_, in_wall, empty] = baked.counts();
-        return Err(format!(
-            "no probe holds light: {in_wall} are in walls, {empty} far from any medium; choose another --box or smaller cells"
-        )
-        .into());
-    }
-    Ok((Made { baked, tag }, ending))
+    Ok((bounds, arguments.cells(&bounds)?))
+}
+
+/// Probes along the sides of the box that is baked.
+///
+/// # Errors
+/// A scene that cannot be read, and what [`place`] refuses.
+pub(super) fn cells_of(arguments: &BakeArguments, file: &SceneArguments) -> Result<[u32; 3], Failure> {
+    let scene = file.read(true)?;
+    let mut storage = Storage::new(&scene);
+    let world = World::new(&scene, &mut storage)?;
+    Ok(place(arguments, file, &world)?.1)
 }
 
 fn overlap(a: &Bounds, b: &Bounds) -> bool {

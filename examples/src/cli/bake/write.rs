@@ -38,7 +38,7 @@ impl Target {
 /// # Errors
 /// A layout that has no place for what was baked, numbers that texels do not hold, or what the system says.
 pub(super) fn all(arguments: &BakeArguments, made: Made, files: &[&PathBuf]) -> Result<String, String> {
-    let Made { mut baked, tag } = made;
+    let Made { mut baked, tag, .. } = made;
     let mut written = Vec::new();
     for file in files.iter().filter(|file| Target::of(file) == Ok(Target::Bake)) {
         keep(file, &baked.grid, tag)?;
@@ -143,12 +143,16 @@ fn named(file: &Path, name: &str) -> PathBuf {
 /// # Errors
 /// What the system says.
 pub(super) fn keep(file: &Path, grid: &ProbeGrid<'_>, tag: u64) -> Result<(), String> {
+    save(file, &to_bytes(grid, tag))
+}
+
+pub(super) fn to_bytes(grid: &ProbeGrid<'_>, tag: u64) -> Vec<u8> {
     let mut all = Vec::with_capacity(bytes::byte_count(grid));
     let Ok(()) = bytes::write(grid, tag, |part| {
         all.extend_from_slice(part);
         Ok::<(), core::convert::Infallible>(())
     });
-    save(file, &all)
+    all
 }
 
 fn save(file: &Path, bytes: &[u8]) -> Result<(), String> {
