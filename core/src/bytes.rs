@@ -31,31 +31,26 @@ pub(crate) fn element<T: Pod>(bytes: &[u8]) -> T {
 #[derive(Debug, Clone, Copy)]
 pub struct Crc(u64);
 
-/// For eight bytes at once: `TABLES[k][b]` is what byte `b` with `k` bytes behind it becomes.
-static TABLES: [[u64; 256]; 8] = tables();
+/// For eight bytes at once: `TABLES[k][n]` is what half byte `n` with `k` half bytes behind it becomes. Tables of whole bytes would be
+/// quicker, but there is nothing in these 16 kB that compresses, and modules for browsers and microcontrollers are small.
+static TABLES: [[u64; 16]; 16] = tables();
 
-const fn tables() -> [[u64; 256]; 8] {
-    let mut tables = [[0; 256]; 8];
-    let mut byte = 0;
-    while byte < 256 {
-        let mut value = byte as u64;
-        let mut bit = 0;
-        while bit < 8 {
-            value = if value & 1 == 1 { value >> 1 ^ 0xc96c_5795_d787_0f42 } else { value >> 1 };
-            bit += 1;
+const fn tables() -> [[u64; 16]; 16] {
+    let mut tables = [[0; 16]; 16];
+    let mut half = 0;
+    while half < 16 {
+        let mut value = half as u64;
+        let mut behind = 0;
+        while behind < 16 {
+            let mut bit = 0;
+            while bit < 4 {
+                value = if value & 1 == 1 { value >> 1 ^ 0xc96c_5795_d787_0f42 } else { value >> 1 };
+                bit += 1;
+            }
+            tables[behind][half] = value;
+            behind += 1;
         }
-        tables[0][byte] = value;
-        byte += 1;
-    }
-    let mut behind = 1;
-    while behind < 8 {
-        byte = 0;
-        while byte < 256 {
-            let value = tables[behind - 1][byte];
-            tables[behind][byte] = value >> 8 ^ tables[0][(value & 0xff) as usize];
-            byte += 1;
-        }
-        behind += 1;
+        half += 1;
     }
     tables
 }
@@ -77,11 +72,12 @@ impl Crc {
     pub fn add(&mut self, bytes: &[u8]) {
         let (eights, rest) = bytes.as_chunks::<8>();
         for eight in eights {
-            let mixed = (self.0 ^ u64::from_le_bytes(*eight)).to_le_bytes();
-            self.0 = mixed.iter().zip(TABLES.iter().rev()).fold(0, |sum, (&b, table)| sum ^ table[b as usize]);
+            let mixed = self.0 ^ u64::from_le_bytes(*eight);
+            self.0 = TABLES.iter().rev().zip(0..).fold(0, |sum, (table, n)| sum ^ table[(mixed >> (4 * n) & 15) as usize]);
         }
         for &byte in rest {
-            self.0 = self.0 >> 8 ^ TABLES[0][((self.0 ^ u64::from(byte)) & 0xff) as usize];
+            let mixed = self.0 ^ u64::from(byte);
+            self.0 = mixed >> 8 ^ TABLES[1][(mixed & 15) as usize] ^ TABLES[0][(mixed >> 4 & 15) as usize];
         }
     }
 

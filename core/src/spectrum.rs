@@ -47,7 +47,7 @@ impl Spectrum {
     }
 
     /// `f` of every channel.
-    #[inline]
+    #[inline(always)]
     #[must_use]
     pub fn map(self, f: impl Fn(f32) -> f32) -> Self {
         // Written out: without link-time optimisation an array's own `map` stays a call.
@@ -56,7 +56,7 @@ impl Spectrum {
     }
 
     /// `f` of every pair of channels.
-    #[inline]
+    #[inline(always)]
     #[must_use]
     pub fn zip(self, other: Self, f: impl Fn(f32, f32) -> f32) -> Self {
         Self([f(self[0], other[0]), f(self[1], other[1]), f(self[2], other[2])])

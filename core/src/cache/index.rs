@@ -113,7 +113,7 @@ impl Block {
     /// Scaled before squaring, so that neither huge nor tiny spheres leave the range of `f32`. Written
     /// with four-vectors because a loop over lanes would be vectorised across blocks, at three times the
     /// cost; lane by lane they are the same sums.
-    #[inline]
+    #[inline(always)]
     fn squared(&self, point: Vec3) -> Vec4 {
         let x = (Vec4::splat(point.x) - self.x) * self.inverse;
         let y = (Vec4::splat(point.y) - self.y) * self.inverse;

@@ -328,6 +328,7 @@ impl<'s> PhotonGrid<'s> {
         Bounds { min: self.first, max: self.first + size }
     }
 
+    #[inline]
     fn cell_of(&self, point: Vec3) -> Option<[u32; 3]> {
         let at = (point - self.first) / self.side;
         // Written so that NaN fails, too.

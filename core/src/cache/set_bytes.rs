@@ -26,6 +26,7 @@ use super::settings::Effort;
 use super::slot::Slot;
 use super::store::Cache;
 use crate::bytes::Crc;
+use crate::math::digits::Digits;
 use crate::storage::Full;
 
 /// The first bytes.
@@ -117,6 +118,7 @@ impl fmt::Display for CachesError {
             }
             Self::Absent { part, .. } => write!(f, "has a cache \"{}\", which is not asked for", part.name()),
             Self::Setting { part, what, found, due } => {
+                let (found, due) = (Digits(*found), Digits(*due));
                 write!(f, "its cache \"{}\" was made with {what} {found}; {due} is asked for", part.name())
             }
             Self::Full => f.write_str("does not fit into the memory lent for it"),

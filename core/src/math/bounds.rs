@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use super::Ray;
+use super::{Ray, float};
 
 /// An axis-aligned box.
 ///
@@ -83,8 +83,8 @@ impl Bounds {
             }
             let inverse = 1.0 / d;
             let (a, b) = ((self.min[axis] - o) * inverse, (self.max[axis] - o) * inverse);
-            near = near.max(a.min(b));
-            far = far.min(a.max(b));
+            near = float::max(near, float::min(a, b));
+            far = float::min(far, float::max(a, b));
         }
         (near <= far).then_some((near, far))
     }

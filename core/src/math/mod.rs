@@ -6,12 +6,14 @@
 //! | [`frame`] | orthonormal frames around a direction |
 //! | [`ray`] | [`Ray`] |
 //! | [`bounds`] | [`Bounds`]: axis-aligned boxes |
+//! | `digits` | numbers in messages |
 //! | [`quadrature`] | Gauss–Legendre nodes |
 //! | [`symmetric`] | symmetric 2×2 and 3×3 matrices |
 //! | [`arrays`] | vectors, boxes and maps as arrays; Bevy's versions |
 
 pub mod arrays;
 pub mod bounds;
+pub(crate) mod digits;
 pub mod float;
 pub mod frame;
 pub mod quadrature;

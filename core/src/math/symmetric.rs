@@ -123,7 +123,8 @@ pub(crate) fn jacobi<const N: usize>(mut a: [[f32; N]; N]) -> Eigen<N> {
     for (i, o) in order.iter_mut().enumerate() {
         *o = i;
     }
-    order.sort_unstable_by(|&i, &j| a[j][j].total_cmp(&a[i][i]));
+    // Of equals in their order: the same on every machine.
+    order.sort_unstable_by(|&i, &j| a[j][j].total_cmp(&a[i][i]).then(i.cmp(&j)));
     let value = |i: usize| (a[i][i] * largest).clamp(-f32::MAX, f32::MAX);
     Eigen { values: order.map(value), vectors: order.map(|i| vectors[i]) }
 }

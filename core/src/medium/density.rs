@@ -83,7 +83,7 @@ pub(super) struct Cell {
 
 impl Cell {
     /// From `p·n + 1/2`, which lies in [1/2, n + 1/2] inside the grid; farther out, clamped.
-    #[inline]
+    #[inline(always)]
     pub(super) fn at(shifted: Vec3, size: [u32; 3]) -> Self {
         // Shifted by one, a truncation is the floor, and the fraction lies in [0, 1) exactly.
         let axis = |s: f32, n: u32| {
@@ -103,17 +103,25 @@ impl Cell {
     }
 
     /// The densities around, in units of the second.
-    #[inline]
+    #[inline(always)]
     fn corners(&self, density: &Density<'_>) -> (Corners, f32) {
+        // Written out: an array's own `map` may stay a call.
+        let [a, b, c, d, e, f, g, h] = self.corners;
         let (values, unit) = match density {
-            Density::F32(values) => (self.corners.map(|i| values.get(i).copied().unwrap_or(0.0)), 1.0),
-            Density::U8(values) => (self.corners.map(|i| f32::from(values.get(i).copied().unwrap_or(0))), 1.0 / 255.0),
+            Density::F32(values) => {
+                let at = |i: usize| values.get(i).copied().unwrap_or(0.0);
+                ([at(a), at(b), at(c), at(d), at(e), at(f), at(g), at(h)], 1.0)
+            }
+            Density::U8(values) => {
+                let at = |i: usize| f32::from(values.get(i).copied().unwrap_or(0));
+                ([at(a), at(b), at(c), at(d), at(e), at(f), at(g), at(h)], 1.0 / 255.0)
+            }
         };
         (Corners { values, fraction: self.fraction }, unit)
     }
 
     /// Density.
-    #[inline]
+    #[inline(always)]
     pub(super) fn value(&self, density: &Density<'_>) -> f32 {
         let (corners, unit) = self.corners(density);
         corners.value() * unit

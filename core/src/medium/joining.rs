@@ -1,7 +1,7 @@
 //! Bounds of parts of a ray, one after the other, become those of a segment.
 
 use super::majorant::MinMax;
-use crate::math::Ray;
+use crate::math::{Ray, float};
 
 /// Expected null collisions a joined segment may add over its parts by themselves: asking for a
 /// segment costs some three collisions. With 0 a ray through thin smoke takes twice the time; with
@@ -36,7 +36,7 @@ pub(super) trait Range: Copy + PartialEq {
 impl Range for MinMax {
     #[inline(always)]
     fn union(&self, other: &Self) -> Self {
-        Self { min: self.min.min(other.min), max: self.max.max(other.max) }
+        Self { min: float::min(self.min, other.min), max: float::max(self.max, other.max) }
     }
 
     #[inline(always)]

@@ -4,8 +4,9 @@ use bytemuck::{Pod, Zeroable};
 use glam::{Affine3, Vec3};
 
 use super::joining::Range;
-use super::region::{LocalLine, lesser};
+use super::region::LocalLine;
 use super::{Density, DensityGrid, MediumError};
+use crate::math::float;
 
 /// Cells along the edge of a block.
 ///
@@ -161,7 +162,7 @@ impl Axis {
         let index = ((start * (1.0 / EDGE)) as u32).min(blocks - 1);
         let forward = direction > 0.0;
         let end = size as f32;
-        let plane = lesser((index + u32::from(forward)) as f32 * EDGE, end);
+        let plane = float::min((index + u32::from(forward)) as f32 * EDGE, end);
         let axis = Self {
             stride: if forward { stride } else { stride.wrapping_neg() },
             step: if forward { EDGE } else { -EDGE },
@@ -185,7 +186,7 @@ impl Axis {
         self.left -= 1;
         // The last block may be cut short, and is then left through the grid's end; on the way
         // back, planes are counted from the start.
-        self.plane = lesser(self.plane + self.step, self.end);
+        self.plane = float::min(self.plane + self.step, self.end);
         self.exit = (self.plane - self.origin) * self.inverse;
         (true, self.stride, self.left >= 0)
     }
@@ -216,7 +217,7 @@ impl Reach {
 impl Walk {
     /// From distance `from` (m) along a line in cell coordinates `[0, size]`, whose origin has the
     /// largest component `origin` (m) in the world.
-    #[inline]
+    #[inline(always)]
     pub(super) fn enter(line: &LocalLine, size: [u32; 3], from: f32, origin: f32, reach: &Reach) -> Entry {
         let end = Vec3::new(size[0] as f32, size[1] as f32, size[2] as f32);
         let (o, d, inverse) = (line.origin, line.direction, line.inverse);
@@ -229,7 +230,7 @@ impl Walk {
             if far <= from {
                 return Entry::Miss;
             }
-            t = near.max(from);
+            t = float::max(near, from);
             let is_precise = origin + t <= reach.0;
             if !is_precise {
                 return Entry::Coarse(t, far);
@@ -247,7 +248,7 @@ impl Walk {
     #[inline(always)]
     pub(super) fn next(&mut self) -> Option<BlockSpan> {
         while !self.is_over {
-            let end = lesser(lesser(self.x.exit, self.y.exit), self.z.exit);
+            let end = float::min(float::min(self.x.exit, self.y.exit), self.z.exit);
             let block = self.block;
             let (x, y, z) = (self.x.pass(end), self.y.pass(end), self.z.pass(end));
             self.block = block.wrapping_add(x.1).wrapping_add(y.1).wrapping_add(z.1);

@@ -4,7 +4,7 @@ use glam::Vec3;
 
 use super::MediumError;
 use crate::host::{Face, Gradients, MajorantSegment, Medium, Properties};
-use crate::math::Ray;
+use crate::math::{Ray, float};
 use crate::phase::Phase;
 use crate::spectrum::{Gradient, Hessian, Spectrum};
 
@@ -70,7 +70,7 @@ impl<M> Overlap<'_, M> {
         let mut is_constant = true;
         for segment in self.0.iter().map(ask) {
             is_constant &= segment.is_constant();
-            sum.until = sum.until.min(segment.until);
+            sum.until = float::min(sum.until, segment.until);
             sum.minorant += segment.minorant;
             sum.majorant += segment.majorant;
         }

@@ -253,7 +253,7 @@ pub(super) struct LocalLine {
 }
 
 impl LocalLine {
-    #[inline]
+    #[inline(always)]
     pub(super) fn new(local_from_world: &Affine3, ray: &Ray) -> Self {
         let origin = local_from_world.transform_point3(ray.origin);
         let direction = local_from_world.matrix3 * ray.direction;
@@ -269,22 +269,10 @@ impl LocalLine {
     #[inline]
     pub(super) fn slabs(&self, size: Vec3) -> Slabs {
         let (a, b) = (-self.origin * self.inverse, (size - self.origin) * self.inverse);
-        let near = Vec3::new(lesser(a.x, b.x), lesser(a.y, b.y), lesser(a.z, b.z));
-        let far = Vec3::new(greater(a.x, b.x), greater(a.y, b.y), greater(a.z, b.z));
+        let near = Vec3::new(float::min(a.x, b.x), float::min(a.y, b.y), float::min(a.z, b.z));
+        let far = Vec3::new(float::max(a.x, b.x), float::max(a.y, b.y), float::max(a.z, b.z));
         Slabs { near, far }
     }
-}
-
-/// The lesser number; one instruction, unlike `f32::min`, which promises an answer beside NaN.
-#[inline(always)]
-pub(super) fn lesser(a: f32, b: f32) -> f32 {
-    if a < b { a } else { b }
-}
-
-/// The greater number.
-#[inline(always)]
-fn greater(a: f32, b: f32) -> f32 {
-    if a > b { a } else { b }
 }
 
 /// Distances at which a line crosses three pairs of parallel planes.
@@ -297,8 +285,8 @@ pub(super) struct Slabs {
 impl Slabs {
     #[inline]
     pub(super) fn interval(&self) -> Option<(f32, f32)> {
-        let near = greater(greater(self.near.x, self.near.y), self.near.z);
-        let far = lesser(lesser(self.far.x, self.far.y), self.far.z);
+        let near = float::max(float::max(self.near.x, self.near.y), self.near.z);
+        let far = float::min(float::min(self.far.x, self.far.y), self.far.z);
         (near < far).then_some((near, far))
     }
 }

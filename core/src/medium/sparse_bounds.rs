@@ -6,9 +6,9 @@ use super::SparseGrid;
 use super::bricks::{BRICK, Bricks, NODE, gap};
 use super::joining::{Found, Joining, Span};
 use super::majorant::MinMax;
-use super::region::{LocalLine, lesser};
+use super::region::LocalLine;
 use crate::host::MajorantSegment;
-use crate::math::Ray;
+use crate::math::{Ray, float};
 
 /// A walk through bricks along a line, and in one step through gaps and through nodes that are not there; every distance is computed from the origin,
 /// since a sum of steps would drift.
@@ -57,7 +57,7 @@ impl<'w> Walk<'w> {
                 behind[axis] = next;
                 exits[axis] = (plane - origin[axis]) * inverse[axis];
             }
-            let end = lesser(lesser(exits[0], exits[1]), exits[2]);
+            let end = float::min(float::min(exits[0], exits[1]), exits[2]);
             let is_known = end == exits[0] || end == exits[1] || end == exits[2];
             for axis in 0..3 {
                 if exits[axis] == end {

@@ -1,6 +1,7 @@
 //! The closed set of simple phase functions.
 
 use super::{CosineSample, Deflection, draine, henyey_greenstein, rayleigh, schlick};
+use crate::math::digits::Digits;
 use crate::math::float::INV_FOUR_PI;
 
 /// Largest |g| or |k| accepted: above, the peak `(1+g)/(4π(1−g)²)` leaves what `f32` can do.
@@ -46,9 +47,9 @@ pub enum LobeError {
 impl core::fmt::Display for LobeError {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         match self {
-            Self::Anisotropy(g) => write!(f, "anisotropy {g} is outside (-1, 1)"),
-            Self::Alpha(a) => write!(f, "alpha {a} is negative or not finite"),
-            Self::Diameter(d) => write!(f, "droplet diameter {d} µm is outside [5, 50]"),
+            Self::Anisotropy(g) => write!(f, "anisotropy {} is outside (-1, 1)", Digits(*g)),
+            Self::Alpha(a) => write!(f, "alpha {} is negative or not finite", Digits(*a)),
+            Self::Diameter(d) => write!(f, "droplet diameter {} µm is outside [5, 50]", Digits(*d)),
         }
     }
 }

@@ -4,7 +4,7 @@
 //! and again; whether that advances, how often it may happen and where it ends is settled here.
 
 use crate::host::{MajorantSegment, Medium};
-use crate::math::Ray;
+use crate::math::{Ray, float};
 
 /// Most segments of a ray. More: a host's mistake takes longer to end. Fewer: a finite ray through very fine bounds,
 /// of which a walk visits some ten thousand at most, counts as vacuum behind the last.
@@ -100,7 +100,7 @@ impl<M: Medium + ?Sized> Iterator for Segments<'_, M> {
         if !(segment.until > from) {
             segment.until = self.forced(from);
         }
-        segment.until = segment.until.min(self.ray.length);
+        segment.until = float::min(segment.until, self.ray.length);
         self.at = segment.until;
         Some((from, segment))
     }

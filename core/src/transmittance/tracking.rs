@@ -116,14 +116,14 @@ fn grey(medium: &(impl Medium + ?Sized), ray: &Ray, u: f32, rng: &mut Generator)
     for (from, segment) in segments(medium, ray) {
         let end = segment.until;
         if segment.majorant[0] > vacuum_bound(end) {
-            let bound = segment.majorant[0].max(floor_of(emissive, end - from));
+            let bound = float::max(segment.majorant[0], floor_of(emissive, end - from));
             let sure = segment.minorant[0];
             let inverse = 1.0 / bound;
             let mut t = from;
             for _ in 0..MAX_COLLISIONS {
                 let length = thickness * inverse;
                 if !(t + length < end) {
-                    thickness = (thickness - (end - t) * bound).max(0.0);
+                    thickness = float::max(thickness - (end - t) * bound, 0.0);
                     break;
                 }
                 t += length;
@@ -173,16 +173,16 @@ fn coloured(medium: &(impl Medium + ?Sized), ray: &Ray, throughput: Spectrum, u:
         let end = segment.until;
         if segment.majorant.max_element() > vacuum_bound(end) {
             let floor = floor_of(emissive, end - from);
-            let majorant = segment.majorant.map(|c| c.max(floor));
+            let majorant = segment.majorant.map(|c| float::max(c, floor));
             let is_sure = segment.is_constant() && majorant == segment.majorant;
             let bound = majorant[channel];
             let mut t = from;
             for _ in 0..MAX_COLLISIONS {
                 let length = if bound > 0.0 { thickness / bound } else { f32::INFINITY };
-                let travelled = length.min(end - t);
+                let travelled = float::min(length, end - t);
                 relative = passed(relative, majorant, channel, travelled);
                 if !(t + length < end) {
-                    thickness = (thickness - (end - t) * bound).max(0.0);
+                    thickness = float::max(thickness - (end - t) * bound, 0.0);
                     break;
                 }
                 t += length;

@@ -23,15 +23,16 @@ for compilers in "gcc g++" "clang clang++"; do
     for header in fogbow.h fogbow.hpp; do
         echo "#include <$header>" | "$cxx" -std=c++17 "${flags[@]}" -fsyntax-only -x c++ -
     done
-    for source in examples/{bake,fog,formulas,smoke_box}.c tests/misuse.c; do
+    for source in examples/{atrium,bake,fog,formulas,smoke_box}.c tests/misuse.c; do
         "$cc" -std=c99 "${flags[@]}" -o "$out/$cc/$(basename "$source" .c)" "$source" "${shared[@]}" -lm
     done
     "$cxx" -std=c++17 "${flags[@]}" -o "$out/$cc/jobs" examples/jobs.cpp "${shared[@]}" -pthread
     echo "$cc and $cxx: built without a warning"
-    (cd "$out" && "$cc/formulas" >formulas && "$cc/smoke_box" >smoke_box)
+    (cd "$out" && "$cc/formulas" >formulas && "$cc/smoke_box" >smoke_box && "$cc/atrium" >atrium)
     diff examples/smoke_box.txt "$out/smoke_box"
+    diff examples/atrium.txt "$out/atrium"
 done
-cat "$out/formulas" "$out/smoke_box"
+cat "$out/formulas" "$out/smoke_box" "$out/atrium"
 (cd "$out" && gcc/bake && gcc/jobs && gcc/misuse)
 
 gcc -std=c99 "${flags[@]}" -o "$out/static" examples/smoke_box.c -L"$prefix/lib" "${static[@]}" -lm

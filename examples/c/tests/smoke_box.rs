@@ -9,7 +9,7 @@ use fogbow::light::{Light, QuadLight};
 use fogbow::math::{Bounds, Ray, Vec3, float};
 use fogbow::medium::{Homogeneous, Placed, Region};
 use fogbow::phase::Phase;
-use fogbow::sampling::{independent, pixel_key};
+use fogbow::sampling::{Generator, independent, pixel_key};
 use fogbow::spectrum::Spectrum;
 use fogbow::surface::Surface;
 use fogbow::work;
@@ -80,7 +80,7 @@ fn digest(bytes: impl IntoIterator<Item = u8>) -> u64 {
     bytes.into_iter().fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3))
 }
 
-fn line(caches: &[u8], picture: &[f32]) -> String {
+pub(crate) fn line(caches: &[u8], picture: &[f32]) -> String {
     let picture = picture.iter().flat_map(|value| value.to_le_bytes());
     format!("caches {:016x}, picture {:016x}\n", digest(caches.iter().copied()), digest(picture))
 }
@@ -91,8 +91,17 @@ fn camera_ray([x, y]: [f32; 2]) -> Ray {
     Ray { origin: Vec3::new(0.0, 0.0, 4.0), direction: direction.normalize(), length: f32::INFINITY }
 }
 
-fn film_point(x: u32, y: u32) -> [f32; 2] {
+pub(crate) fn film_point(x: u32, y: u32) -> [f32; 2] {
     [x, y].map(|k| (k as f32 + 0.5) / SIDE as f32)
+}
+
+/// Sums of samples, of seed 0.
+pub(crate) fn picture(light: impl Fn(u32, u32, &mut Generator) -> Spectrum) -> Vec<f32> {
+    let pixels = (0..SIDE).flat_map(|y| (0..SIDE).map(move |x| (x, y)));
+    let summed = pixels.map(|(x, y)| {
+        (0..SAMPLES).fold(Spectrum::ZERO, |sum, sample| sum + light(x, y, &mut independent(0, pixel_key(x, y), sample)))
+    });
+    summed.flat_map(|sum| sum.0).collect()
 }
 
 /// Nothing of this crate.
@@ -109,15 +118,7 @@ fn native() -> String {
     let mut filling = RadianceCaches::new(settings).fill(Asked::View { ray: camera_ray, pixel: 0.01 });
     work::finish(&mut filling, &world, &mut FilledRecords::default());
     let caches = filling.finish();
-    let mut picture = Vec::new();
-    for (y, x) in (0..SIDE).flat_map(|y| (0..SIDE).map(move |x| (y, x))) {
-        let mut sum = Spectrum::ZERO;
-        for sample in 0..SAMPLES {
-            let mut rng = independent(settings.seed, pixel_key(x, y), sample);
-            sum += caches.radiance(&camera_ray(film_point(x, y)), &world, &mut rng).total();
-        }
-        picture.extend(sum.0);
-    }
+    let picture = picture(|x, y, rng| caches.radiance(&camera_ray(film_point(x, y)), &world, rng).total());
     line(&caches.to_bytes(TAG), &picture)
 }
 

@@ -126,7 +126,7 @@ impl Surfaces {
 
     /// Calls `meets(primitive, length so far)` for primitives in boxes that the ray meets, until it says that the rest does not matter;
     /// it answers with the length that matters from now on.
-    fn visit(&self, ray: &Ray, mut meets: impl FnMut(&Primitive, f32) -> Option<f32>) {
+    fn visit<'s>(&'s self, ray: &Ray, mut meets: impl FnMut(&'s Primitive, f32) -> Option<f32>) {
         let inverse = ray.direction.recip();
         let mut length = ray.length;
         let mut stack = [0_u32; DEEPEST];
@@ -160,17 +160,14 @@ impl Surfaces {
 }
 
 /// Whether a ray comes through a box before `length`. Boxes are a little larger than what they hold, so that rounding misses nothing.
-#[inline]
+#[inline(always)]
 fn passes(bounds: &Bounds, ray: &Ray, inverse: Vec3, length: f32) -> bool {
-    let (mut near, mut far) = (0.0_f32, length);
-    for axis in 0..3 {
-        let (a, b) = (
-            (bounds.min[axis] - ray.origin[axis]) * inverse[axis],
-            (bounds.max[axis] - ray.origin[axis]) * inverse[axis],
-        );
-        // Where the ray lies in a face, 0·∞ is no number, and `min` and `max` leave it out.
-        near = near.max(a.min(b));
-        far = far.min(a.max(b));
+    let (a, b) = ((bounds.min - ray.origin) * inverse, (bounds.max - ray.origin) * inverse);
+    let (mut near, mut far) = (0.0, length);
+    for (a, b) in [(a.x, b.x), (a.y, b.y), (a.z, b.z)] {
+        // Where the ray lies in a face, 0·∞ is no number, and may be left out.
+        near = float::max(float::min(a, b), near);
+        far = float::min(float::max(a, b), far);
     }
     near <= far
 }
@@ -245,7 +242,7 @@ impl Shape {
 }
 
 /// Distance, and coordinates along both edges (Möller and Trumbore 1997).
-#[inline]
+#[inline(always)]
 fn across(ray: &Ray, corner: Vec3, [edge_u, edge_v]: [Vec3; 2]) -> Option<[f32; 3]> {
     let p = ray.direction.cross(edge_v);
     let determinant = edge_u.dot(p);
@@ -263,10 +260,10 @@ impl Scene for Surfaces {
         let mut nearest = None;
         self.visit(ray, |primitive, length| {
             let Some(distance) = primitive.shape.meet(ray, length) else { return Some(length) };
-            nearest = Some((distance, *primitive));
+            nearest = Some((distance, primitive));
             Some(distance)
         });
-        let (distance, Primitive { shape, material, light }) = nearest?;
+        let (distance, &Primitive { shape, material, light }) = nearest?;
         let mut normal = shape.normal(ray.at(distance));
         if material.is_two_sided && normal.dot(ray.direction) > 0.0 {
             normal = -normal;
