@@ -73,7 +73,8 @@ impl Crc {
         let (eights, rest) = bytes.as_chunks::<8>();
         for eight in eights {
             let mixed = self.0 ^ u64::from_le_bytes(*eight);
-            self.0 = TABLES.iter().rev().zip(0..).fold(0, |sum, (table, n)| sum ^ table[(mixed >> (4 * n) & 15) as usize]);
+            self.0 =
+                TABLES.iter().rev().zip(0..).fold(0, |sum, (table, n)| sum ^ table[(mixed >> (4 * n) & 15) as usize]);
         }
         for &byte in rest {
             let mixed = self.0 ^ u64::from(byte);

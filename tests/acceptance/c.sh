@@ -1,11 +1,11 @@
 #!/usr/bin/env bash
-# What of the interface for C takes longer than CI has: the same bits on AArch64, under emulation, and the job example under
-# ThreadSanitizer. Both build Rust's own library, ten minutes of CPU time in all:
+# What of the interface for C takes longer than CI has: the examples under valgrind, the same bits on AArch64, under emulation, and the
+# job example under ThreadSanitizer. The last two build Rust's own library, ten minutes of CPU time in all:
 #
-#   tests/acceptance/c.sh [aarch64] [threads]
+#   tests/acceptance/c.sh [memory] [aarch64] [threads]
 #
-# Needs Debian's rustc-web and rust-web-src; for aarch64 also gcc-aarch64-linux-gnu, libc6-dev-arm64-cross and qemu-user;
-# for threads g++.
+# Needs gcc; for memory valgrind; for the others Debian's rustc-web and rust-web-src; for aarch64 also gcc-aarch64-linux-gnu,
+# libc6-dev-arm64-cross and qemu-user; for threads g++.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/../.."
 target=${CARGO_TARGET_DIR:-$PWD/target}/acceptance
@@ -19,16 +19,32 @@ build() {
         --crate-type staticlib
 }
 
+# The profile is that of the tests, or PROFILE.
+step_memory() {
+    local name
+    examples/c/install.sh --prefix "$out/c" --profile "${PROFILE:-test}"
+    for name in bake fog formulas; do
+        gcc -std=c99 -g -O2 -Wall -Wextra -Werror -I"$out/c/include" -o "$out/$name" "examples/c/examples/$name.c" \
+            -L"$out/c/lib" -Wl,-rpath,"$out/c/lib" -lfogbow -lm
+        (cd "$out" && valgrind -q --leak-check=full --errors-for-leak-kinds=definite,indirect,possible --error-exitcode=9 \
+            "./$name" >/dev/null)
+        echo "valgrind: no error and no leak in $name"
+    done
+}
+
 step_aarch64() {
     local triple=aarch64-unknown-linux-gnu
     build $triple "" "$target/aarch64"
-    aarch64-linux-gnu-gcc -std=c99 -O2 -Wall -Wextra -Werror -Iexamples/c/include -o "$out/smoke_box" \
-        examples/c/examples/smoke_box.c "$target/aarch64/$triple/release/libfogbow_c.a" -static -lm -lpthread -ldl 2>"$out/log" || {
-        cat "$out/log"
-        return 1
-    }
-    qemu-aarch64 "$out/smoke_box" | tee "$out/digests"
-    diff examples/c/examples/smoke_box.txt "$out/digests"
+    local room
+    for room in smoke_box atrium; do
+        aarch64-linux-gnu-gcc -std=c99 -O2 -Wall -Wextra -Werror -Iexamples/c/include -o "$out/$room" \
+            examples/c/examples/$room.c "$target/aarch64/$triple/release/libfogbow_c.a" -static -lm -lpthread -ldl 2>"$out/log" || {
+            cat "$out/log"
+            return 1
+        }
+        qemu-aarch64 "$out/$room" | tee "$out/digests"
+        diff examples/c/examples/$room.txt "$out/digests"
+    done
     echo "AArch64: the same bits"
 }
 
@@ -49,7 +65,7 @@ C
 }
 
 asked=("$@")
-((${#asked[@]})) || asked=(aarch64 threads)
+((${#asked[@]})) || asked=(memory aarch64 threads)
 for step in "${asked[@]}"; do
     "step_$step"
 done

@@ -42,7 +42,8 @@ impl Display for Digits {
             left /= 10;
         }
         let used = digits.iter().rposition(|digit| *digit != b'0').map_or(1, |last| last + 1);
-        let text = |range: core::ops::Range<usize>| core::str::from_utf8(digits.get(range).unwrap_or(&[])).unwrap_or("");
+        let text =
+            |range: core::ops::Range<usize>| core::str::from_utf8(digits.get(range).unwrap_or(&[])).unwrap_or("");
         match exponent {
             0..7 => {
                 let whole = exponent as usize + 1;

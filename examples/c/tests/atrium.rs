@@ -1,6 +1,5 @@
 //! The atrium through the interface, in Rust alone, and in C (`examples/atrium.c`): the same bits.
 
-
 use fogbow::cache::{Asked, FilledRecords, RadianceCaches, Settings, USUAL_ERROR};
 use fogbow::host::{Hit, Scene};
 use fogbow::light::{Light, Sun};
@@ -96,7 +95,7 @@ impl Scene for Atrium {
             let (p, q) = (cross(d, panel.v), cross(from, panel.u));
             let determinant = dot(panel.u, p);
             let (t, u, v) = (dot(panel.v, q) / determinant, dot(from, p) / determinant, dot(d, q) / determinant);
-            if t > NEAREST && t < nearest && u >= 0.0 && u <= 1.0 && v >= 0.0 && v <= 1.0 {
+            if t > NEAREST && t < nearest && [u, v].iter().all(|at| (0.0..=1.0).contains(at)) {
                 nearest = t;
                 found = hit(t, panel.normal, panel.colour);
             }
@@ -140,5 +139,9 @@ fn the_atrium_in_c_has_the_bits_of_the_core() {
     work::finish(&mut filling, &world, &mut FilledRecords::default());
     let caches = filling.finish();
     let picture = picture(|x, y, rng| caches.radiance(&camera_ray(film_point(x, y)), &world, rng).total());
-    assert_eq!(line(&caches.to_bytes(TAG), &picture), DIGESTS, "examples/atrium.txt is what examples/atrium.c should print");
+    assert_eq!(
+        line(&caches.to_bytes(TAG), &picture),
+        DIGESTS,
+        "examples/atrium.txt is what examples/atrium.c should print"
+    );
 }
