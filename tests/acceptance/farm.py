@@ -66,8 +66,9 @@ class Farm:
         self.program, self.scene = (pathlib.Path(f).resolve() for f in (arguments.program, arguments.scene))
         self.options = ["--method", arguments.method, *arguments.more.split(), "-q", "--threads", 1]
 
-    def render(self, size, spp, part, file, fill=()):
-        return run(self.program, "render", self.scene, *self.options, "--size", "x".join(map(str, size)), "--spp", spp, "--part", part, *fill, "-o", file)[0]
+    def render(self, size, spp, part, file, fill=(), split="samples"):
+        sampled = ["--size", "x".join(map(str, size)), "--spp", spp, "--part", part, "--split", split]
+        return run(self.program, "render", self.scene, *self.options, *sampled, *fill, "-o", file)[0]
 
     def merge(self, files):
         return run(self.program, "merge", "-q", *files, "-o", "merged.exr")[0]
@@ -109,16 +110,17 @@ def check(farm, measured, size, parts, spp):
     """Real runs, dealt out to workers in turn; the greatest error of the model."""
     pixels, worst = size[0] * size[1], 0.0
     fill = farm.fill(size, spp)[1] if measured.fill else []
-    each = measured.before + pixels * (measured.write + measured.sample * spp / parts)
-    merge = measured.merge_start + parts * pixels * measured.merge_pixel
-    print(f"\nworkers  predicted s  measured s   error   ({parts} parts of {size[0]}x{size[1]}, {spp} spp; CPU seconds of the busiest worker, and the merge)")
-    for workers in (1, 2, 4):
+    print(f"\nworkers  split    predicted s  measured s   error   ({parts} parts of {size[0]}x{size[1]}, {spp} spp; CPU seconds of the busiest worker, and the merge)")
+    for split, workers in ((split, workers) for split in ("samples", "tiles") for workers in (1, 2, 4)):
+        own = pixels if split == "samples" else pixels / parts
+        each = measured.before + own * measured.write + pixels * measured.sample * spp / parts
+        merge = measured.merge_start + parts * own * measured.merge_pixel
         files = [f"p{k}.fogbow" for k in range(1, parts + 1)]
         busy = [0.0] * workers
 
         def work(worker):
             for k in range(worker, parts, workers):
-                busy[worker] += farm.render(size, spp, f"{k + 1}/{parts}", files[k], fill)
+                busy[worker] += farm.render(size, spp, f"{k + 1}/{parts}", files[k], fill, split)
 
         threads = [threading.Thread(target=work, args=(worker,)) for worker in range(workers)]
         [thread.start() for thread in threads]
@@ -127,7 +129,7 @@ def check(farm, measured, size, parts, spp):
         model = math.ceil(parts / workers) * each + merge
         error = model / real - 1
         worst = max(worst, abs(error))
-        print(f"{workers:7}  {model:11.2f}  {real:10.2f}  {100 * error:+5.1f} %", flush=True)
+        print(f"{workers:7}  {split:7}  {model:11.2f}  {real:10.2f}  {100 * error:+5.1f} %", flush=True)
     return worst
 
 

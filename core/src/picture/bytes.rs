@@ -42,7 +42,7 @@ use crate::storage::{Full, List};
 pub const MAGIC: [u8; 8] = *b"\x89FOGPIC\n";
 
 /// Of the layout above.
-pub const VERSION: u32 = 3;
+pub const VERSION: u32 = 4;
 
 /// Length of the header (bytes).
 pub const HEADER_BYTES: usize = 120;

@@ -1,5 +1,7 @@
 //! What of a picture is taken, where several machines share it out.
 
+use core::ops::Range;
+
 use super::tiles::Tiles;
 
 /// The part of a picture that [`Tiles`](super::Tiles) take.
@@ -63,10 +65,60 @@ impl Share {
     #[must_use]
     pub fn has(self, [column, row]: [u32; 2]) -> bool {
         let Self::Tiles { part, of } = self else { return true };
-        // Rows begin by the golden ratio of a period later each, so that no part is a few columns.
+        (u64::from(column) + Self::later(of, row)) % u64::from(of.max(1)) == u64::from(part)
+    }
+
+    /// By how many tiles a row begins later than the first: by the golden ratio of a period more than the row before, so that no part is a few columns.
+    fn later(of: u32, row: u32) -> u64 {
+        (u64::from(of.max(1)) * 618 / 1000).max(1) * u64::from(row)
+    }
+
+    /// Of the tiles of a row, of so many columns, the first that it has and how many it has, each a period behind the one before.
+    fn in_row(part: u32, of: u32, columns: u32, row: u32) -> [u32; 2] {
         let of = u64::from(of.max(1));
-        let later = (of * 618 / 1000).max(1);
-        (u64::from(column) + later * u64::from(row)) % of == u64::from(part)
+        let first = (u64::from(part) + of - Self::later(of as u32, row) % of) % of;
+        let count = if u64::from(part) < of { u64::from(columns).saturating_sub(first).div_ceil(of) } else { 0 };
+        [first, count].map(|number| number as u32)
+    }
+}
+
+impl<Q, C> Tiles<'_, Q, C> {
+    /// Jobs of a pass.
+    pub(super) fn job_count(&self) -> u32 {
+        let Share::Tiles { part, of } = self.share else { return self.settings.pixels().div_ceil(self.pixels_per_job) };
+        let [columns, rows] = self.settings.grid();
+        let tiles: u32 = (0..rows).map(|row| Share::in_row(part, of, columns, row)[1]).sum();
+        tiles * self.jobs_of_tile()
+    }
+
+    /// Jobs of a tile of a part: pieces of rows of pixels.
+    fn jobs_of_tile(&self) -> u32 {
+        let side = self.settings.tile.max(1);
+        side * side.div_ceil(self.pixels_per_job)
+    }
+
+    /// The pixels of a job: their numbers, row by row. None beyond the edge of the picture.
+    pub(super) fn pixels_of(&self, job: u32) -> Range<u32> {
+        let Share::Tiles { part, of } = self.share else {
+            let from = job * self.pixels_per_job;
+            return from..(from + self.pixels_per_job).min(self.settings.pixels());
+        };
+        let ([columns, rows], [width, height], side) =
+            (self.settings.grid(), self.settings.size, self.settings.tile.max(1));
+        let (mut tile, piece) = (job / self.jobs_of_tile(), job % self.jobs_of_tile());
+        for row in 0..rows {
+            let [first, count] = Share::in_row(part, of, columns, row);
+            if tile >= count {
+                tile -= count;
+                continue;
+            }
+            let pieces = side.div_ceil(self.pixels_per_job);
+            let [left, y] = [(first + tile * of) * side, row * side + piece / pieces];
+            let from = left + piece % pieces * self.pixels_per_job;
+            let until = (from + self.pixels_per_job).min(left + side).min(width);
+            return if y < height && from < until { y * width + from..y * width + until } else { 0..0 };
+        }
+        0..0
     }
 }
 
@@ -175,5 +227,34 @@ impl<Q, C> Tiles<'_, Q, C> {
     #[must_use]
     pub fn pixel_count(&self) -> u32 {
         (0..self.settings.pixels()).filter(|&pixel| self.has(self.place(pixel))).count() as u32
+    }
+}
+
+#[cfg(all(test, feature = "alloc"))]
+mod tests {
+    use super::*;
+    use crate::picture::Settings;
+    use crate::sampling::Independent;
+
+    #[test]
+    fn jobs_of_all_parts_have_every_pixel_once() {
+        for (size, tile, of) in [([40, 28], 8, 16), ([19, 9], 4, 3), ([5, 4], 2, 2), ([70, 3], 8, 5), ([16, 16], 5, 1)]
+        {
+            for samples in [1, 7, 64] {
+                let settings = Settings { size, layers: 1, samples, goal: None, seed: 0, tile };
+                let mut seen = alloc::vec![0; (size[0] * size[1]) as usize];
+                for part in 0..of {
+                    let mut tiles: Tiles<'_, _, ()> =
+                        Tiles::new(settings, Independent).of_share(Share::Tiles { part, of }, 1);
+                    tiles.begin(samples);
+                    for pixel in (0..tiles.job_count()).flat_map(|job| tiles.pixels_of(job)) {
+                        assert!(tiles.has(tiles.place(pixel)));
+                        seen[pixel as usize] += 1;
+                    }
+                    assert!(tiles.job_count() > 0 || tiles.is_done(), "nothing to do is done");
+                }
+                assert!(seen.iter().all(|&count| count == 1), "{size:?} {tile} {of} {samples}: {seen:?}");
+            }
+        }
     }
 }

@@ -334,7 +334,7 @@ impl Settings {
     }
 
     /// Columns and rows of tiles.
-    const fn grid(&self) -> [u32; 2] {
+    pub(super) const fn grid(&self) -> [u32; 2] {
         let side = if self.tile == 0 { 1 } else { self.tile };
         [self.size[0].div_ceil(side), self.size[1].div_ceil(side)]
     }
@@ -481,12 +481,6 @@ impl<Q, C> Tiles<'_, Q, C> {
         &self.total
     }
 
-    /// The pixels of a job: their numbers, row by row.
-    fn pixels_of(&self, job: u32) -> Range<u32> {
-        let from = job * self.pixels_per_job;
-        from..(from + self.pixels_per_job).min(self.settings.pixels())
-    }
-
     /// Column and row of a pixel.
     pub(super) fn place(&self, pixel: u32) -> [u32; 2] {
         [pixel % self.settings.size[0], pixel / self.settings.size[0]]
@@ -529,10 +523,6 @@ impl<Q, C> Tiles<'_, Q, C> {
 
     fn is_running(&self) -> bool {
         !self.is_enough && self.taken < self.job_count()
-    }
-
-    fn job_count(&self) -> u32 {
-        self.settings.pixels().div_ceil(self.pixels_per_job)
     }
 }
 
