@@ -65,6 +65,18 @@ impl ProbeBasis {
         }
     }
 
+    /// What [`ProbeBasis::level`] is where the mean over directions is 1.
+    pub(super) fn number_of_mean(self, quantity: Quantity) -> f64 {
+        match (self, quantity) {
+            // 1 / Y₀₀
+            (Self::SphericalHarmonics { .. }, _) => libm::sqrt(4.0 * core::f64::consts::PI),
+            (Self::AmbientCube, _) => 1.0,
+            (Self::Fluence, Quantity::InScattered) => 4.0 * core::f64::consts::PI,
+            // A quarter of fluence is the mean of irradiance.
+            (Self::Fluence, Quantity::Irradiance) => 4.0,
+        }
+    }
+
     /// How bright a probe is, whatever the direction: what errors are compared with.
     pub(super) fn level(self, held: &[Spectrum]) -> f32 {
         match self {

@@ -415,7 +415,8 @@ impl<'s, 'c> Bake<'s, 'c> {
 
     /// Which bricks have one more pass.
     fn plan(&mut self) {
-        let level = self.settings.level.map_or_else(|| self.grid.level(), f64::from);
+        let of_mean = |mean: f32| f64::from(mean) * self.grid.basis.number_of_mean(self.grid.quantity);
+        let level = self.settings.level.map_or_else(|| self.grid.level_of_numbers(), of_mean);
         let times = self.photons.is_some().then(|| self.grid.relative_error() / self.settings.error);
         let bricks = self.grid.memory.bricks.as_slice();
         let most = bricks.iter().map(|brick| brick.passes).max().unwrap_or(0);

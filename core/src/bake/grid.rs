@@ -306,12 +306,12 @@ impl ProbeGrid<'_> {
     #[must_use]
     pub fn relative_error(&self) -> f32 {
         let (sum, numbers) = self.squared_errors(0..self.lattice.cell_count());
-        let error = libm::sqrt(sum / f64::from(numbers.max(1))) / self.level();
+        let error = libm::sqrt(sum / f64::from(numbers.max(1))) / self.level_of_numbers();
         // In the dark there is nothing to be in proportion to.
         if error.is_nan() { 0.0 } else { error as f32 }
     }
 
-    /// Mean light of valid probes, whatever the direction: what errors are in proportion to.
+    /// Mean light of valid probes over all directions (W·m⁻²·sr⁻¹, of irradiance W·m⁻²): what errors are in proportion to, whatever the basis.
     ///
     /// ```
     /// # use fogbow::{host::Empty, light::Light, math::{Bounds, Vec3}, medium::{Homogeneous, Placed, Region}, phase::Phase};
@@ -332,6 +332,11 @@ impl ProbeGrid<'_> {
     /// ```
     #[must_use]
     pub fn level(&self) -> f64 {
+        self.level_of_numbers() / self.basis.number_of_mean(self.quantity)
+    }
+
+    /// The same as probes hold it: the mean of first coefficients, of fluence.
+    pub(super) fn level_of_numbers(&self) -> f64 {
         let (mut sum, mut count) = (0.0_f64, 0_u32);
         for (index, _) in self.probes().iter().enumerate().filter(|(_, probe)| probe.is_valid()) {
             sum += f64::from(self.basis.level(self.held(index)));
@@ -406,7 +411,7 @@ impl ProbeGrid<'_> {
             let off = f64::from(self.coarseness(index));
             (squares, most, count) = (squares + off * off, most.max(off), count + 1);
         }
-        let level = self.level();
+        let level = self.level_of_numbers();
         let over = |off: f64| if level > 0.0 { (off / level) as f32 } else { 0.0 };
         [over(libm::sqrt(squares / f64::from(count.max(1)))), over(most)]
     }

@@ -35,7 +35,7 @@ pub struct BakeSettings {
     /// Standard error at which a brick of probes has enough passes, in proportion to the mean of the whole grid: a root mean square over
     /// its probes and their numbers, of degree 1 and more compared with degree 0.
     pub error: f32,
-    /// The mean that errors are in proportion to, if it is known beforehand ([`ProbeGrid::level`](super::ProbeGrid::level) of a coarse grid, for instance): then no brick
+    /// The mean that errors are in proportion to (W·m⁻²·sr⁻¹, of irradiance W·m⁻²), if it is known beforehand, as [`ProbeGrid::level`](super::ProbeGrid::level) of a coarse grid: then no brick
     /// depends on any other, and several machines may bake some of them each ([`Bake::of_part`](super::Bake::of_part)). `None`: that of all probes, as far as
     /// they are baked. Photons take no notice of it.
     pub level: Option<f32>,

@@ -84,9 +84,13 @@ fn a_furnace_is_as_bright_as_its_sky_from_everywhere() {
         (ProbeBasis::AmbientCube, Quantity::InScattered, 1.0),
         (ProbeBasis::AmbientCube, Quantity::Irradiance, PI),
         (ProbeBasis::Fluence, Quantity::InScattered, 4.0 * PI),
+        (ProbeBasis::Fluence, Quantity::Irradiance, 4.0 * PI),
     ] {
         let settings = BakeSettings { basis, quantity, ..settings(&world, [4, 4, 4]) };
         let grid = baked(settings, &world);
+        // A mean over colours of 3.5 / 3, whatever holds it.
+        let level = grid.level() / if quantity == Quantity::Irradiance { f64::from(PI) } else { 1.0 };
+        assert!((level - 3.5 / 3.0).abs() < 0.02, "{basis:?} {quantity:?}: {level}");
         let (mut missed, mut count) = (0, 0);
         for (index, probe) in grid.probes().iter().enumerate() {
             assert_eq!(probe.state(), ProbeState::Valid, "the corners' cells touch the ball");

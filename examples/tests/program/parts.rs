@@ -1,6 +1,7 @@
 //! Pictures in parts: whatever the method, the number of parts, their order and what they are of, merged they are the bits of the whole; and nothing
 //! that does not belong to a picture gets into it.
 
+use fogbow::bake::{BakeMemory, bytes};
 use fogbow::bytes::Crc;
 use serde_json::{Value, json};
 
@@ -224,6 +225,10 @@ fn parts_of_a_bake_merge_to_the_bits_of_the_whole() {
     let bake =
         |more: &[&str]| done(&folder, &[&["bake", SCENE, "-q", "--level", "level.bake"], &BAKE[..], more].concat());
     bake(&["-o", "whole.bake"]);
+    let whole = read(&folder, "whole.bake");
+    let grid = bytes::read(&whole, bytes::tag(&whole).unwrap(), BakeMemory::default()).unwrap();
+    // A level of another basis is the same light, and errors are in proportion to it.
+    assert!((0.05..0.2).contains(&grid.relative_error()), "{}", grid.relative_error());
     for part in ["1", "2", "3"] {
         bake(&["--part", &format!("{part}/3"), "--threads", "1", "-o", &format!("{part}.fogbow")]);
     }

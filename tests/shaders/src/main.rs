@@ -96,9 +96,22 @@ fn matter(grid: &ProbeGrid<'_>, point: Vec3) -> (Spectrum, f32) {
 /// Valid probes with less weight than this may have none by rounding: then light jumps to what dilation has left.
 const LEAST_SHARE: f32 = 1e-5;
 
+/// The same of probes that see the point: then it jumps to those behind surfaces, which count for a millionth.
+const LEAST_SEEN: f32 = 1e-4;
+
 fn jumps(grid: &ProbeGrid<'_>, point: Vec3) -> bool {
     let mut held = [Spectrum::ZERO; 16];
+    let (lattice, bounds) = (grid.lattice(), grid.lattice().bounds());
+    let half = 0.5 * lattice.cell();
+    let inside = point.clamp(bounds.min + half, bounds.max - half);
+    let seen = |(index, weight): (usize, f32)| {
+        let probe = &grid.probes()[index];
+        let is_valid = probe.state() == ProbeState::Valid;
+        if is_valid { weight * probe.sees((inside - lattice.centre(index)) / lattice.cell()) } else { 0.0 }
+    };
+    let around = lattice.around(point.clamp(bounds.min, bounds.max)).unwrap_or_default();
     grid.look_up(point, &mut held[..grid.basis().count()]) < LEAST_SHARE
+        || around.into_iter().map(seen).sum::<f32>() < LEAST_SEEN
 }
 
 /// Light scattered towards the eye, and transmittance; `None` where light jumps.

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use fogbow::bake::{ProbeGrid, bytes};
+use fogbow::bake::{Probe, ProbeGrid, ProbeState, bytes};
 use fogbow_std::image::{Layer, write as write_picture};
 
 use super::{BakeArguments, Made};
@@ -77,16 +77,31 @@ pub(super) fn all(arguments: &BakeArguments, made: Made, files: &[&PathBuf]) -> 
             "{pairs} pairs of neighbours have a surface between them: light leaks through it where engines mix all probes, and not where they read planes of surfaces\n"
         ),
     };
+    let near = match near_surfaces(&baked) {
+        0 => String::new(),
+        probes => format!(
+            "{probes} probes are nearer than a twentieth of a cell to a surface, and photons blur what it sends to them; --method path does not\n"
+        ),
+    };
     let [usual, worst] = baked.grid.relative_coarseness().map(|share| 100.0 * share);
     let apart = baked.deviation.map_or(String::new(), |d| {
         let [bias, error, spread] = [d.bias, d.bias_error, d.spread].map(|share| 100.0 * share);
         format!("against path tracing of {} probes: {bias:+.2} % ± {error:.2} %, single numbers off by {spread:.1} % of the mean\n", d.probes)
     });
     Ok(format!(
-        "{x} x {y} x {z} probes: {valid} valid, {in_wall} in walls, {empty} far from any medium; standard error of what was sampled {:.2} % of the mean\nbetween probes off by about {usual:.1} % of the mean, {worst:.0} % where light varies most\n{leaks}{apart}wrote {}",
+        "{x} x {y} x {z} probes: {valid} valid, {in_wall} in walls, {empty} far from any medium; standard error of what was sampled {:.2} % of the mean\nbetween probes off by about {usual:.1} % of the mean, {worst:.0} % where light varies most\n{leaks}{near}{apart}wrote {}",
         100.0 * error,
         names.join(", ")
     ))
+}
+
+/// Valid probes of a bake by photons that a surface is next to: what it sends to them changes within less than the part of the cell that photons count in.
+fn near_surfaces(baked: &Baked) -> usize {
+    /// One over the distance in cells.
+    const NEAR: f32 = 20.0;
+    let is_near = |probe: &&Probe| probe.planes().iter().any(|plane| plane.length() > NEAR);
+    let valid = baked.grid.probes().iter().filter(|probe| probe.state() == ProbeState::Valid);
+    if baked.method == Some("photons") { valid.filter(is_near).count() } else { 0 }
 }
 
 /// Writes the textures of a file, and a description beside it; their names.
