@@ -133,7 +133,13 @@ def is_off(audit, error):
     # As many regions as there are may be off by chance.
     by_region = np.sqrt(9 + 2 * np.log(max(len(regions), 1)))
     found = [(audit["cached"], 3), (audit["all"], 3), *((region, by_region) for region in regions)]
-    return any(f["error"] is not None and abs(f["bias"]) - sure * f["error"] > error for f, sure in found)
+    return has_blotches(audit, error) or any(f["error"] is not None and abs(f["bias"]) - sure * f["error"] > error for f, sure in found)
+
+
+def has_blotches(audit, error):
+    """Whether it says that what is cached has a greater error, with or without a mean."""
+    squared = audit["squared"]
+    return squared["error"] is not None and squared["mean"] - 3 * squared["error"] > error**2
 
 
 def broken(scenes, arguments):
@@ -162,15 +168,16 @@ def broken(scenes, arguments):
                     images.append(off(image))
                 audit = statistics["audit"]
                 is_left = is_off(audit, error)
-                first = (audit["repaired"] or [audit])[0]["cached"]
+                told = (audit["repaired"] or [audit])[0]
+                first, root = told["cached"], np.sqrt(max(told["squared"]["mean"], 0))
                 # Also of what is less than the error asked for it tells the bias.
                 is_said = bool(audit["repaired"]) or is_left or abs(first["bias"]) > 3 * first["error"]
                 is_true, bound = images[0] > WORSE * least, max(WORSE * least, 1.25 * error)
                 passes = (not is_said) if what == "nothing" else (is_said or not is_true) and not is_left and images[1] <= bound
                 failures += not passes
                 print(f"{os.path.basename(scene):24s} {verdict(passes)} {what:24s} error {100 * images[0]:.1f} % instead of {100 * least:.1f} %; "
-                      f"{'said' if is_said else 'not said'}: bias {100 * first['bias']:+.2f} ± {100 * first['error']:.2f} %; after {len(audit['repaired'])} repairs "
-                      f"{100 * audit['cached']['bias']:+.2f} ± {100 * audit['cached']['error']:.2f} %, error {100 * images[1]:.1f} %", flush=True)
+                      f"{'said' if is_said else 'not said'}: bias {100 * first['bias']:+.2f} ± {100 * first['error']:.2f} %, error {100 * root:.1f} %; after {len(audit['repaired'])} repairs "
+                      f"{100 * audit['cached']['bias']:+.2f} ± {100 * audit['cached']['error']:.2f} %, error {100 * images[1]:.1f} % (stated {100 * np.sqrt(max(audit['squared']['mean'], 0)):.1f} ± {100 * np.sqrt(audit['squared']['error']) if audit['squared']['error'] else 0:.1f} %)", flush=True)
     return failures
 
 

@@ -10,6 +10,17 @@
 //!
 //! over `J` groups of rays, of which `d_j` is the sum of the differences and `t_j` that of the light of paths: a ratio
 //! estimate with its standard error (Cochran 1977, *Sampling Techniques*, § 6.4).
+//!
+//! What is too bright here and too dark there has no mean and is an error all the same. The rays of a group lie next to each other, where caches
+//! have one error, and estimates of different rays have nothing in common. So the mean of the products of their differences is, without bias,
+//! the square of that error:
+//!
+//! ```text
+//! u = ((Σ d)² − Σ d²)/(k (k − 1))
+//! ```
+//!
+//! over the `k` rays of a group (a U-statistic, Hoeffding 1948). Noise of single estimates, whatever its size, has no part in its mean, and one
+//! wild estimate little in its value. So that its spread is small, these estimates end where walks of records do.
 
 use core::ops::Range;
 
@@ -25,11 +36,16 @@ use crate::multiple_scatter;
 use crate::path;
 use crate::sampling::uniform::mix;
 use crate::sampling::{even2, independent, uniform2};
+use crate::spectrum::Spectrum;
 use crate::work::Rounds;
 use crate::world::World;
 
-/// Eye rays of a group, and of a job.
-const GROUP: u32 = 16;
+/// Eye rays of a group, and of a job. More: fewer places; fewer: more noise in squares of errors, which falls with the root of it.
+const GROUP: u32 = 32;
+
+/// Groups fill one of so many parts of a picture along each side. Fewer: errors that change within a part go unseen; more: edges of shadows, of the
+/// width of a pixel, count.
+const PARTS: u32 = 64;
 
 /// Walks and directions of a fill for each eye ray of an audit. An audited ray is compared at some eight points by whole walks and with a
 /// whole path, which takes as long as some sixty of those that end at records, and a twentieth of the time is to be spent. In dense
@@ -87,6 +103,53 @@ impl Deviation {
     }
 }
 
+/// The square of a relative error and how well it is known: without bias, so that it may be a bit less than 0 where there is hardly any error.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Squared {
+    /// Mean of squares: 0.0004 is an error of two per cent.
+    pub mean: f64,
+    /// Its standard error.
+    pub error: f64,
+}
+
+impl Squared {
+    /// The relative error, the root of the mean; 0 where that is negative.
+    ///
+    /// ```
+    /// # use fogbow::cache::Squared;
+    /// assert_eq!(Squared { mean: 0.0004, error: 0.0 }.root(), 0.02);
+    /// assert_eq!(Squared { mean: -1e-6, error: 1e-5 }.root(), 0.0);
+    /// ```
+    #[must_use]
+    pub fn root(&self) -> f64 {
+        libm::sqrt(self.mean.max(0.0))
+    }
+
+    /// Roots of what lies one standard error below the mean and above it.
+    ///
+    /// ```
+    /// # use fogbow::cache::Squared;
+    /// let [least, most] = Squared { mean: 0.0005, error: 0.0004 }.range();
+    /// assert!((least - 0.01).abs() < 1e-9 && (most - 0.03).abs() < 1e-9);
+    /// ```
+    #[must_use]
+    pub fn range(&self) -> [f64; 2] {
+        [self.mean - self.error, self.mean + self.error].map(|square| libm::sqrt(square.max(0.0)))
+    }
+
+    /// Whether the error is certainly more than `most`: by three standard errors of its square.
+    ///
+    /// ```
+    /// # use fogbow::cache::Squared;
+    /// let blotched = Squared { mean: 0.0016, error: 0.0003 };
+    /// assert!(blotched.exceeds(0.02) && !blotched.exceeds(0.03));
+    /// ```
+    #[must_use]
+    pub fn exceeds(&self, most: f64) -> bool {
+        self.mean - SURE * self.error > most * most
+    }
+}
+
 /// What an [`Audit`] has found.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Findings {
@@ -96,6 +159,11 @@ pub struct Findings {
     pub all: Deviation,
     /// Of the light that is cached, as a part of all light, against estimates without caches at the same points: better known.
     pub cached: Deviation,
+    /// The error of the picture that comes from records, blotches that have no mean included, as a part of its light (root of the mean of squares):
+    /// against estimates as records are made of, which end in cells that photons have lit ([`Settings::photons`](super::Settings::photons)), if these are there.
+    pub squared: Squared,
+    /// Parts of kinds in that, in the order of [`Kind::FINAL`]; what they have together is in none.
+    pub(super) squared_parts: [f64; 4],
     /// Of the light that one cache holds, as a part of all light; `None` for a kind that is not cached.
     parts: ByKind<Option<Deviation>>,
 }
@@ -144,7 +212,7 @@ impl Moments {
 }
 
 /// What a job leaves.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Compared {
     /// Rays, and the sum of the light of their paths.
     rays: u32,
@@ -155,7 +223,13 @@ pub struct Compared {
     samples: [Sample; GROUP as usize],
 }
 
-/// Compares [`RadianceCaches`] with path tracing, as [`Rounds`] of jobs of 16 eye rays: any number of them can be run, and what was
+impl Default for Compared {
+    fn default() -> Self {
+        Self { rays: 0, truth: 0.0, all: 0.0, parts: [0.0; 4], samples: [Sample::default(); GROUP as usize] }
+    }
+}
+
+/// Compares [`RadianceCaches`] with path tracing, as [`Rounds`] of jobs of 32 eye rays that lie next to each other: any number of them can be run, and what was
 /// found so far read at any time.
 ///
 /// ```
@@ -235,7 +309,8 @@ impl<'c, 's, F: Fn([f32; 2]) -> Ray> Audit<'c, 's, F> {
             parts[kind] = is_cached.then(|| moments.deviation(t, tt, groups));
         }
         let [all, cached] = [self.all, self.cached].map(|moments| moments.deviation(t, tt, groups));
-        Findings { rays: self.rays, all, cached, parts }
+        let (squared, squared_parts) = self.regions.squared();
+        Findings { rays: self.rays, all, cached, squared, squared_parts, parts }
     }
 }
 
@@ -258,41 +333,48 @@ where
         // Whole walks, whatever caches were made of.
         let walk = multiple_scatter::Settings { max_vertices: u32::MAX, ..cached.walk };
         let alone = Estimator { surfaces: None, photons: None, walk, ..cached };
+        // As records were made: little noise, and what cells have wrong is nothing that records could be blamed for.
+        let ended = Estimator { walk, ..self.caches.making(world) };
         let seed = mix(settings.seed ^ 0x6175_6469_7421_0b5e);
         let shift = uniform2(&mut independent(seed, 0, 2)).to_array();
+        // Shifted: the sequence begins in the very middle, where symmetric worlds have their lamps.
+        let wrapped = |at: [f32; 2]| {
+            [0, 1].map(|axis| {
+                let moved = f64::from(at[axis]) + f64::from(shift[axis]);
+                moved - libm::floor(moved)
+            })
+        };
+        let part = wrapped(even2(job)).map(|at| libm::floor(at * f64::from(PARTS)));
         for i in 0..GROUP {
             let number = job * GROUP + i;
-            // Shifted: the sequence begins in the very middle, where symmetric worlds have their lamps.
-            let at = even2(number).map(f64::from);
-            let at = [0, 1].map(|axis| {
-                let moved = at[axis] + f64::from(shift[axis]);
-                ((moved - libm::floor(moved)) as f32).min(1.0 - f32::EPSILON)
-            });
+            let within = wrapped(even2(number));
+            let at =
+                [0, 1].map(|axis| (((part[axis] + within[axis]) / f64::from(PARTS)) as f32).min(1.0 - f32::EPSILON));
             let ray = (self.ray)(at);
             // Both meet the same points, as they draw the same numbers.
             let rng = |stream| independent(seed, u64::from(number), stream);
             let told = radiance(&ray, &cached, &self.caches.reader(), &settings.eye, &mut rng(0));
             let known = radiance(&ray, &alone, &Caches::default(), &settings.eye, &mut rng(0));
+            let near = radiance(&ray, &ended, &Caches::default(), &settings.eye, &mut rng(0));
             let truth = path::radiance(&ray, world, &settings.paths, &mut rng(1)).total();
             // A sample that is no number says nothing.
-            if !(told.total().is_finite() && known.total().is_finite() && truth.is_finite()) {
+            if ![told.total(), known.total(), near.total(), truth].iter().all(|light| light.is_finite()) {
                 continue;
             }
             let [all, truth] = [told.total(), truth].map(|light| f64::from(light.mean()));
             output.truth += truth;
             output.all += all - truth;
-            let mut parts = [0.0; 4];
-            for ((kind, part), (told, known)) in
-                Kind::FINAL.into_iter().zip(&mut parts).zip(told.by_kind().into_iter().zip(known.by_kind()))
-            {
-                // Both estimate what is not cached, each with noise of its own.
-                if settings.effort(kind).is_some() {
-                    *part = f64::from(told.mean()) - f64::from(known.mean());
-                }
-            }
+            // All estimate what is not cached, each with noise of its own.
+            let is_cached = Kind::FINAL.map(|kind| settings.effort(kind).is_some());
+            let told = told.by_kind();
+            let beyond = |other: [Spectrum; 4]| -> [f64; 4] {
+                let difference = |k: usize| f64::from(told[k].mean()) - f64::from(other[k].mean());
+                core::array::from_fn(|k| if is_cached[k] { difference(k) } else { 0.0 })
+            };
+            let (parts, near) = (beyond(known.by_kind()), beyond(near.by_kind()));
             output.parts.iter_mut().zip(parts).for_each(|(sum, part)| *sum += part);
             let cached = parts.iter().sum();
-            output.samples[output.rays as usize] = Sample { at, told: all, traced: truth, cached, parts };
+            output.samples[output.rays as usize] = Sample { at, told: all, traced: truth, cached, parts, near };
             output.rays += 1;
         }
     }
@@ -310,7 +392,7 @@ where
         for (moments, part) in self.parts.iter_mut().zip(output.parts) {
             moments.add(part, output.truth);
         }
-        output.samples[..output.rays as usize].iter().for_each(|sample| self.regions.add(sample));
+        self.regions.add_group(&output.samples[..output.rays as usize]);
     }
 
     fn stage(&self) -> &'static str {

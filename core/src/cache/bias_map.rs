@@ -25,7 +25,7 @@
 //! Hall's transformation needs a variance. Path tracing may have none, near a point light in a medium, so that what is certain of a region is taken from estimates
 //! at the same points alone.
 
-use super::audit::{Deviation, SURE};
+use super::audit::{Deviation, SURE, Squared};
 use super::presets::{REGION_RAYS, SIDE};
 
 /// A mean and how well it is known.
@@ -52,6 +52,8 @@ pub struct AuditedRegion {
     pub all: Deviation,
     /// Light that is cached against estimates without caches at the same points: much better known. Both are parts of the light by those estimates.
     pub cached: Deviation,
+    /// The error of records here, blotches that have no mean included, as a part of the light that was told: see [`Findings::squared`](super::Findings::squared).
+    pub squared: Squared,
     /// Skewness of the rays' differences of what is cached.
     skewness: f64,
     /// The parts of kinds in the sum of these differences, in the order of [`Kind::FINAL`](super::Kind::FINAL).
@@ -203,6 +205,8 @@ pub(super) struct Sample {
     pub(super) cached: f64,
     /// The latter by kind, in the order of [`Kind::FINAL`](super::Kind::FINAL).
     pub(super) parts: [f64; 4],
+    /// As these, by the difference from estimates that end where walks of records do.
+    pub(super) near: [f64; 4],
 }
 
 /// Sums over the rays of a region.
@@ -219,6 +223,17 @@ struct Sums {
     /// `d³`, `d² b` and `d b²` of what is cached.
     cubes: [f64; 3],
     parts: [f64; 4],
+    /// Of groups of rays that lie next to each other: how many, and squares of their error with squares of these.
+    groups: f64,
+    squares: [f64; 2],
+    /// The former by kind.
+    squared_parts: [f64; 4],
+}
+
+/// The mean of products of two different ones of some numbers: the square of their mean, without what their noise has in it.
+fn pairs(numbers: impl Iterator<Item = f64>) -> f64 {
+    let (n, sum, squares) = numbers.fold((0.0, 0.0, 0.0), |(n, sum, squares), x| (n + 1.0, sum + x, squares + x * x));
+    (sum * sum - squares) / (n * (n - 1.0))
 }
 
 /// How many regions on each side tell how much rays differ. More: where light is even, what is wrong is lost in the noise of places where it
@@ -253,6 +268,33 @@ impl RegionSums {
         let d = sample.cached;
         add(&mut sums.cubes, [d * d * d, d * d * base, d * base * base]);
         add(&mut sums.parts, sample.parts);
+    }
+
+    /// Adds rays that lie next to each other.
+    pub(super) fn add_group(&mut self, samples: &[Sample]) {
+        samples.iter().for_each(|sample| self.add(sample));
+        let Some(first) = samples.first().filter(|_| samples.len() > 1) else { return };
+        let sums = &mut self.sums[index(self.side, first.at)];
+        let square = pairs(samples.iter().map(|sample| sample.near.iter().sum()));
+        sums.groups += 1.0;
+        add(&mut sums.squares, [square, square * square]);
+        add(&mut sums.squared_parts, core::array::from_fn(|k| pairs(samples.iter().map(|sample| sample.near[k]))));
+    }
+
+    /// The square of the error of records over that of the light, both in the mean of the picture, and the parts of kinds in it; nothing is known of less than
+    /// two groups.
+    pub(super) fn squared(&self) -> (Squared, [f64; 4]) {
+        let (mut all, mut light) = (Sums::default(), 0.0);
+        for sums in &self.sums[..(self.side * self.side) as usize] {
+            all.rays += sums.rays;
+            all.groups += sums.groups;
+            add(&mut all.squares, sums.squares);
+            add(&mut all.squared_parts, sums.squared_parts);
+            light += sums.told[0] * sums.told[0] / f64::from(sums.rays.max(1));
+        }
+        let light = light / f64::from(all.rays);
+        let (known, parts) = (all.squared(light), all.squared_parts.map(|part| part / (all.groups * light)));
+        (known, if known.error.is_finite() { parts } else { [0.0; 4] })
     }
 
     pub(super) fn map(&self) -> BiasMap {
@@ -325,6 +367,17 @@ impl Sums {
         Spread { variance, third: cubed - mean * (3.0 * variance + mean * mean) }
     }
 
+    /// The mean square of the error of groups over that of light, and its standard error; infinite where there are less than two, or is no light.
+    fn squared(&self, light: f64) -> Squared {
+        let (n, mean) = (self.groups, self.squares[0] / self.groups);
+        let error = libm::sqrt((self.squares[1] / n - mean * mean).max(0.0) / (n - 1.0)) / light;
+        if n >= 2.0 && light > 0.0 && error.is_finite() {
+            Squared { mean: mean / light, error }
+        } else {
+            Squared { mean: 0.0, error: f64::INFINITY }
+        }
+    }
+
     /// The same over the light that was told; `None` where there is none, or less than two rays.
     fn spread(&self) -> Option<Spread> {
         let per_light = f64::from(self.rays) / self.told[0];
@@ -353,6 +406,7 @@ impl Sums {
         let own = self.spread().map(|own| own.times(scale)).unwrap_or_else(|| self.own());
         let spread =
             around.map(|around| around.times(scale)).filter(|around| around.variance > own.variance).unwrap_or(own);
+        let squared = self.squared(scale * scale);
         let skewness = spread.third / (spread.variance * libm::sqrt(spread.variance));
         AuditedRegion {
             corners,
@@ -361,6 +415,7 @@ impl Sums {
             traced: mean(self.traced),
             all: deviation(self.all, self.variance(self.all)),
             cached: deviation(self.cached, spread.variance),
+            squared,
             skewness: if skewness.is_finite() { skewness } else { 0.0 },
             parts: self.parts,
         }
@@ -436,6 +491,41 @@ mod tests {
             let off = map.regions().iter().filter(|region| region.is_off(0.02, 64)).count();
             assert_eq!(off, 1);
         }
+    }
+
+    /// Blotches of 6 % that are too bright here and as much too dark there, seen by estimates whose noise is seven times as much.
+    #[test]
+    fn blotches_without_a_mean_are_told_by_their_squares() {
+        let found = |blotches: f64, seed: u64| {
+            let rng = &mut Generator::new(seed);
+            let mut sums = RegionSums::new(1 << 15);
+            for group in 0..1024_u32 {
+                let (x, y) = (group % 32, group / 32);
+                let told = 1.0 + if (x + y) % 2 == 0 { blotches } else { -blotches };
+                let sample = |_| {
+                    let at = [x, y].map(|k| (k as f32 + uniform(rng)) / 32.0);
+                    let d = told - skewed(0.4, rng);
+                    Sample { at, told, cached: d, near: [0.0, 0.0, d, 0.0], ..Sample::default() }
+                };
+                sums.add_group(&core::array::from_fn::<_, 32, _>(sample));
+            }
+            (sums.squared(), sums.map())
+        };
+        let (mut alarms, mut off) = (0, 0.0);
+        for seed in 0..40 {
+            let (right, _) = found(0.0, seed).0;
+            alarms += u32::from(right.exceeds(0.01));
+            let ((squared, parts), map) = found(0.06, seed);
+            let sigmas = (squared.mean - 0.06 * 0.06) / squared.error;
+            assert!(sigmas.abs() < 4.5 && squared.exceeds(0.02), "{squared:?}");
+            off += sigmas / 40.0;
+            assert!((parts[2] - squared.mean).abs() < 1e-9 && parts[0] == 0.0);
+            let regions = map.regions().iter().map(|region| region.squared.mean);
+            assert!((regions.sum::<f64>() / 64.0 - 0.06 * 0.06).abs() < 5.0 * squared.error);
+        }
+        // Chance is a sixth of this.
+        assert!(alarms == 0 && off.abs() < 1.0, "{alarms} {off}");
+        assert!(RegionSums::new(1 << 15).squared().0.error.is_infinite());
     }
 
     #[test]

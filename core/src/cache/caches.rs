@@ -6,7 +6,7 @@ use super::bias_map::{Apart, BiasMap};
 use super::eye::{CachedRadiance, Caches, Reader, radiance, radiance_beyond, straight};
 use super::kind::Kind;
 use super::photons::{PhotonEffort, PhotonGrid};
-use super::presets::{BLAMED, finer_by};
+use super::presets::{BLAMED, MENDED, finer_by};
 use super::record::Record;
 use super::room::{chunks_of, stride_of};
 use super::settings::Settings;
@@ -223,6 +223,13 @@ impl RadianceCaches<'_> {
         }
     }
 
+    /// An estimator in `world` as records are made by it: walks end at coarse irradiance, and in cells that photons have lit if they are there.
+    pub(super) fn making<'a, M: ?Sized, S: ?Sized>(&'a self, world: &World<'a, M, S>) -> Estimator<'a, M, S> {
+        let surfaces = self.surface(Kind::CoarseIrradiance).map(|reader| (reader.cache, reader.reading));
+        let photons = Some(&self.photons).filter(|photons| photons.is_made());
+        Estimator { surfaces, photons, ..self.estimator(world) }
+    }
+
     /// Radiance that arrives at the origin of `ray`: a sample of a pixel. See [`radiance`].
     #[must_use]
     pub fn radiance<M: Medium + ?Sized, S: Scene + ?Sized>(
@@ -277,8 +284,8 @@ impl RadianceCaches<'_> {
         straight(ray, world, Marching { steps: walk.steps, offset: uniform(rng) })
     }
 
-    /// Drops the records that an [`Audit`](super::Audit) has found off by certainly more than `error`, to be made anew by the next fill: finer by
-    /// what they are off, with four times the samples. If regions are off, and the others together are not, those go that are seen in them along
+    /// Drops the records that an [`Audit`](super::Audit) has found off by certainly more than `error`, or, in the mean of the picture, certainly off and by more than
+    /// half of it, to be made anew by the next fill: finer by what they are off, with four times the samples. If regions are off, and the others together are not, those go that are seen in them along
     /// `ray`, of the kinds that are off there; else all of the kinds that are to blame, or of every kind if none is alone. Returns whether any were
     /// dropped.
     ///
@@ -305,13 +312,18 @@ impl RadianceCaches<'_> {
         world: &World<'_, M, S>,
     ) -> bool {
         let most = f64::from(error);
-        let to_blame = |kind: Kind| findings.of(kind).filter(|found| found.exceeds(most));
+        // In the whole picture what is certain is mended before it is all of the error.
+        let is_off = |found: &Deviation| found.exceeds(most) || found.exceeds(0.0) && found.bias.abs() > MENDED * most;
+        let to_blame = |kind: Kind| findings.of(kind).filter(is_off);
         let none_alone = Kind::FINAL.into_iter().all(|kind| to_blame(kind).is_none());
-        let together = Some(findings.cached).filter(|found| found.exceeds(most));
-        let places = map.apart(most).filter(|apart| !apart.rest.exceeds(most));
+        let together = Some(findings.cached).filter(is_off);
+        let places = map.apart(most).filter(|apart| !is_off(&apart.rest));
+        // Blotches without a mean are off by the root of their mean square.
+        let blotched = findings.squared.exceeds(most).then(|| Deviation { bias: findings.squared.root(), error: 0.0 });
+        let is_blotched = |number: usize| findings.squared_parts[number] > BLAMED * findings.squared.mean;
         let found_of = |(kind, number): (Kind, usize)| match places {
             Some(Apart { worst, parts, .. }) => Some(worst).filter(|_| parts[number].abs() > BLAMED),
-            None if none_alone => together,
+            None if none_alone => together.or(blotched.filter(|_| is_blotched(number))),
             None => to_blame(kind),
         };
         let is_cached = |kind: Kind| self.settings.effort(kind).is_some();
@@ -332,7 +344,7 @@ impl RadianceCaches<'_> {
             if matches!(kind, Kind::Surface | Kind::Irradiance) && places.is_none() {
                 self.forget(Kind::CoarseIrradiance);
             }
-            let finer = finer_by(most, found.bias);
+            let finer = finer_by(if found.bias.abs() > most { most } else { MENDED * most }, found.bias);
             if let Some(effort) = self.settings.effort_mut(kind) {
                 *effort = effort.finer(finer);
             }

@@ -83,7 +83,7 @@ mod smooth;
 mod store;
 
 pub use asked::{Asked, Wanted};
-pub use audit::{Audit, Compared, Deviation, Findings};
+pub use audit::{Audit, Compared, Deviation, Findings, Squared};
 pub use bias_map::{AuditedRegion, BiasMap, MeanLight};
 pub use caches::RadianceCaches;
 pub use estimate::Estimator;

@@ -40,6 +40,10 @@ const KNOWN: f64 = 0.9;
 /// sharply forward lands in the wrong place, by some 5 % of a picture at 0.5; less: memory for cells, and longer walks.
 pub(super) const SHARPEST: f32 = 0.3;
 
+/// The same up to which cells have higher degrees, as far as there are any: light that was scattered forward and goes on to the side or back is weak, and what an
+/// expansion leaves out is as large there. More: what is lit from behind, or from beside, is some per cent too bright (decision 74); less: memory for cells.
+const RESOLVED: f32 = 0.1;
+
 /// Photons of the first round.
 const FIRST: u32 = 4096;
 
@@ -525,12 +529,12 @@ fn unresolved(phase: &Phase, degree: usize) -> f32 {
 /// The least degree of cells at which light may be scattered unevenly at all.
 const LEAST_DEGREE: usize = 2;
 
-/// The least degree of cells where walks may end at their first vertex, and the highest there is if none is.
+/// The least degree of cells that resolves nearly all that is scattered, and the highest there is if none does.
 pub(super) fn degree_for(phase: &Phase) -> usize {
     if phase.is_isotropic() {
         return 0;
     }
-    (LEAST_DEGREE..MAX_DEGREE).find(|&degree| unresolved(phase, degree) <= SHARPEST).unwrap_or(MAX_DEGREE)
+    (LEAST_DEGREE..MAX_DEGREE).find(|&degree| unresolved(phase, degree) <= RESOLVED).unwrap_or(MAX_DEGREE)
 }
 
 /// Variance of what such cells say, over that of their fluence: `Σ (2l + 1) p_l²` for light that comes from one direction.

@@ -126,6 +126,9 @@ pub(super) fn record_noise(error: f32) -> f64 {
 /// Part of what is off in regions from which on a kind is to blame. Larger: what several kinds have wrong stays; smaller: records are made anew that are right.
 pub(super) const BLAMED: f64 = 0.25;
 
+/// Part of the error asked for from which on a bias of the picture is mended, if there certainly is one. Larger: it stays, and noise is added to it; smaller: time.
+pub(super) const MENDED: f64 = 0.5;
+
 /// Samples of records, and photons, that take the place of wrong ones, as a multiple. More: time; fewer: noise that made them wrong stays.
 const REPAIR_SAMPLES: u32 = 4;
 

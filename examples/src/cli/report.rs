@@ -5,7 +5,7 @@ use core::fmt::Write;
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 
-use fogbow::cache::{AuditedRegion, BiasMap, Deviation, Findings, Kind, MeanLight};
+use fogbow::cache::{AuditedRegion, BiasMap, Deviation, Findings, Kind, MeanLight, Squared};
 use fogbow_std::progress::Progress;
 use fogbow_std::stats::{Seconds, Stopwatch};
 use fogbow_std::tiles::{Outcome, Reason};
@@ -213,17 +213,27 @@ impl Report<'_> {
             };
             for (found, map) in repaired {
                 let places = in_places(map).map_or_else(String::new, |places| format!("; {places}"));
-                say!("repaired: bias was {} of what is cached{}{places}", percent(&found.cached), blamed(found));
+                let error = rooted(&found.squared);
+                say!(
+                    "repaired: bias was {} of what is cached{}, error {error}{places}",
+                    percent(&found.cached),
+                    blamed(found)
+                );
             }
             say!(
-                "bias {} of what is cached{}; {} of all light, by path tracing along {} eye rays",
+                "bias {} of what is cached{}, error {}; {} of all light, by path tracing along {} eye rays",
                 percent(&findings.cached),
                 blamed(findings),
+                rooted(&findings.squared),
                 percent(&findings.all),
                 findings.rays,
             );
             if findings.all.exceeds(f64::from(most)) || findings.cached.exceeds(f64::from(most)) {
                 say!("warning: the picture is off by more than the {due}");
+            } else if findings.squared.exceeds(f64::from(most)) {
+                say!(
+                    "warning: what is cached has an error of more than the {due}, in blotches that are too bright and too dark"
+                );
             } else if findings.cached.is_unknown() {
                 say!(
                     "warning: how far the picture is off is not known: what is cached, or paths, vary too much; take more --audit rays"
@@ -286,9 +296,13 @@ impl Report<'_> {
             let entry = |name: &str, found: &Deviation| {
                 format!("{}: {{\"bias\": {}, \"error\": {}}}", quoted(name), number(found.bias), number(found.error))
             };
+            let square = |found: &Squared| {
+                let Squared { mean, error } = *found;
+                format!("\"squared\": {{\"mean\": {}, \"error\": {}}}", number(mean), number(error))
+            };
             let entries = |findings: &Findings| {
                 let parts = Kind::FINAL.into_iter().filter_map(|kind| Some(entry(kind.name(), &findings.of(kind)?)));
-                let all = [entry("all", &findings.all), entry("cached", &findings.cached)];
+                let all = [entry("all", &findings.all), entry("cached", &findings.cached), square(&findings.squared)];
                 all.into_iter().chain(parts).collect::<Vec<_>>().join(", ")
             };
             let repaired: Vec<String> = repaired.iter().map(|(found, _)| format!("{{{}}}", entries(found))).collect();
@@ -301,6 +315,7 @@ impl Report<'_> {
                     light("traced", &region.traced),
                     entry("all", &region.all),
                     entry("cached", &region.cached),
+                    square(&region.squared),
                 ];
                 format!("{{\"rays\": {}, {}}}", region.rays, parts.join(", "))
             });
@@ -348,6 +363,15 @@ fn percent(found: &Deviation) -> String {
         return "unknown".to_owned();
     }
     format!("{:+.1} ± {:.1} %", 100.0 * found.bias, 100.0 * found.error).replace('-', "−")
+}
+
+/// An error by its square, with what it may be within a standard error.
+fn rooted(found: &Squared) -> String {
+    if !found.error.is_finite() {
+        return "unknown".to_owned();
+    }
+    let [least, most] = found.range();
+    format!("{:.1} % ({:.1} to {:.1} %)", 100.0 * found.root(), 100.0 * least, 100.0 * most)
 }
 
 /// Columns and rows of a region, as `0-31`, from the upper left pixel on.
