@@ -213,6 +213,17 @@ fn nodes_move_what_hangs_on_them() {
 }
 
 #[test]
+fn a_camera_may_be_placed_anywhere() {
+    // With a camera in the file, whose far plane was meant for its own place, and without.
+    let camera = ",\"nodes\":[{\"mesh\":0,\"children\":[1]},{\"camera\":0,\"translation\":[0,0,5]}],\
+        \"cameras\":[{\"type\":\"perspective\",\"perspective\":{\"yfov\":0.5,\"znear\":0.1,\"zfar\":100}}]";
+    for rest in [camera, ",\"nodes\":[{\"mesh\":0}]"] {
+        let scene = read(&triangle("", rest)).scene.unwrap();
+        assert!(scene.seen_from([0.0, 1.0, 1e7], [0.0; 3]).is_ok());
+    }
+}
+
+#[test]
 fn lights_and_materials_mean_what_they_say() {
     let rest = ",\"nodes\":[{\"mesh\":0,\"rotation\":[0,1,0,0],\"extensions\":{\"KHR_lights_punctual\":{\"light\":0}},\"children\":[1]},\
         {\"extensions\":{\"KHR_lights_punctual\":{\"light\":1}}}],\

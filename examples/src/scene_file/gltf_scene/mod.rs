@@ -307,7 +307,7 @@ fn default_sensor(bounds: Bounds) -> Sensor {
         fov,
         fov_axis: FovAxis::Y,
         near: 1e-3 * distance,
-        far: 1e3 * distance,
+        far: f64::INFINITY,
         to_world,
         width: WIDTH,
         height: HEIGHT,
@@ -324,13 +324,6 @@ fn sensor(
 ) -> Result<Sensor, SceneError> {
     let shapes = scene.shapes.iter().map(|shape| bounds_of(&shape.geometry));
     let bounds = shapes.chain(scene.media.iter().flat_map(fog::bounds)).fold(Bounds::EMPTY, Bounds::union);
-    let reach = |eye: [f64; 3]| {
-        let corner = [0, 1, 2].map(|axis| {
-            let at = eye[axis];
-            (f64::from(bounds.min[axis]) - at).abs().max((f64::from(bounds.max[axis]) - at).abs())
-        });
-        corner.iter().map(|c| c * c).sum::<f64>().sqrt()
-    };
     let Some((camera, to_world)) = found.cameras.get(options.sensor) else {
         if !found.cameras.is_empty() || options.sensor > 0 {
             let reason = format!("camera {} of {}, counted from 0", options.sensor, found.cameras.len());
@@ -366,12 +359,12 @@ fn sensor(
         return Err(error("it is sheared".to_owned()));
     }
     let width = ((f64::from(HEIGHT) * aspect).round() as u32).max(1);
-    let far = 2.0 * reach(eye).max(near) + 1.0;
     let sensor = Sensor {
         fov,
         fov_axis: FovAxis::Y,
         near,
-        far,
+        // Nothing is cut off, wherever `--camera` puts it.
+        far: f64::INFINITY,
         to_world,
         width,
         height: HEIGHT,
