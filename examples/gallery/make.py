@@ -18,7 +18,7 @@ FOLDER = pathlib.Path("examples/gallery")
 PICTURES = [
     ("atrium", "examples/scenes/atrium.xml --size 1280x720 --spp 4", "Sunlight in a hazy atrium."),
     ("smoke", "examples/scenes/noise-box.xml --size 1280x720 --spp 8", "Patchy smoke from a voxel grid, between a red and a green wall."),
-    ("statue", "examples/scenes/statue-forward.xml --size 1280x720 --spp 4", "A statue of smoke that scatters forwards."),
+    ("statue", "examples/scenes/statue-forward.xml --size 1280x720 --spp 4", "A statue in fog that scatters forwards."),
     ("room", "examples/scenes/room.glb --size 1280x720 --spp 4 --exposure -1", "A room from a modelling program, with fog from the file beside it."),
     ("plume", "examples/scenes/room-plume.xml --size 1280x720 --spp 4", "A plume of smoke in a room."),
     ("lantern", "examples/scenes/lantern.xml --size 1280x720 --spp 4", "A lantern's bars throw shadows into fog."),
