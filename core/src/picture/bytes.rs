@@ -317,10 +317,10 @@ pub fn described(bytes: &[u8]) -> Result<Described, PictureBytesError> {
         2 => Share::Samples { part, of },
         _ => return Err(PictureBytesError::Content),
     };
-    // Before anybody asks for the memory. A part of tiles has a tile at least, which at a corner may be a pixel.
+    // Before anybody asks for the memory. A part of tiles has a tile at least, which at a corner may be a pixel, or none.
     let parts = if kind == 1 { u64::from(of.max(1)).saturating_mul(u64::from(tile) * u64::from(tile)) } else { 1 };
     let least = least_bytes(&settings).map(|least| least as u64 / parts.max(1));
-    if least.is_none_or(|least| least > (bytes.len() - HEADER_BYTES) as u64) {
+    if least.is_none_or(|least| least > (bytes.len() - HEADER_BYTES) as u64 && !share.is_empty(&settings)) {
         return Err(PictureBytesError::Content);
     }
     let counts = Counts { samples: all, non_finite };

@@ -2,7 +2,7 @@
 
 use core::ops::Range;
 
-use super::tiles::Tiles;
+use super::tiles::{Settings, Tiles};
 
 /// The part of a picture that [`Tiles`](super::Tiles) take.
 ///
@@ -79,6 +79,17 @@ impl Share {
         let first = (u64::from(part) + of - Self::later(of as u32, row) % of) % of;
         let count = if u64::from(part) < of { u64::from(columns).saturating_sub(first).div_ceil(of) } else { 0 };
         [first, count].map(|number| number as u32)
+    }
+}
+
+impl Share {
+    /// Whether it has no tile of a picture at all, as one of more parts than a row has tiles may.
+    pub(super) fn is_empty(self, settings: &Settings) -> bool {
+        /// Rows of tiles beyond which every part has some, and bytes are not worth a look.
+        const MOST_ROWS: u32 = 1 << 16;
+        let Self::Tiles { part, of } = self else { return false };
+        let [columns, rows] = settings.grid();
+        columns < of && rows <= MOST_ROWS && (0..rows).all(|row| Self::in_row(part, of, columns, row)[1] == 0)
     }
 }
 
@@ -233,7 +244,7 @@ impl<Q, C> Tiles<'_, Q, C> {
 #[cfg(all(test, feature = "alloc"))]
 mod tests {
     use super::*;
-    use crate::picture::Settings;
+    use crate::picture::bytes::described;
     use crate::sampling::Independent;
 
     #[test]
@@ -251,7 +262,13 @@ mod tests {
                         assert!(tiles.has(tiles.place(pixel)));
                         seen[pixel as usize] += 1;
                     }
-                    assert!(tiles.job_count() > 0 || tiles.is_done(), "nothing to do is done");
+                    let is_empty = tiles.job_count() == 0;
+                    assert!(!is_empty || tiles.is_done(), "nothing to do is done");
+                    // Of 16 parts of 5 × 4 tiles, two have none.
+                    let found = described(&tiles.to_bytes(7)).unwrap();
+                    assert_eq!((found.is_done, found.share.is_empty(&settings)), (is_empty, is_empty));
+                    let read = Tiles::<'_, _, ()>::read(settings, Independent, 7, &tiles.to_bytes(7));
+                    assert_eq!(read.unwrap().to_bytes(7), tiles.to_bytes(7));
                 }
                 assert!(seen.iter().all(|&count| count == 1), "{size:?} {tile} {of} {samples}: {seen:?}");
             }
