@@ -1,8 +1,8 @@
 //! What the radiance cache is filled with, where the light is known.
 
 use fogbow::cache::{
-    Cache, Caches, Estimator, Extrapolation, Looks, PhotonEffort, PhotonGrid, RaySettings, Reader, Reading, Record,
-    VolumeCache, clearance, radiance,
+    Basis, Cache, Caches, Estimator, Extrapolation, Looks, PhotonEffort, PhotonGrid, RaySettings, Reader, Reading,
+    Record, VolumeCache, clearance, radiance,
 };
 use fogbow::host::{Empty, Hit, Medium, Scene};
 use fogbow::light::{EnvironmentMap, Light, PointLight, QuadLight, SphereLight, Sun};
@@ -464,5 +464,38 @@ fn sharply_scattered_light_is_that_of_traced_paths_and_steadier_towards_an_eye()
             assert!(mean.abs() < 4.0 * error + 0.01 * walked.mean[0], "{lamp:?}: {made:?} {walked:?}");
         }
         assert!(aimed.error[0] < 0.8 * even.error[0], "{lamp:?}: {aimed:?} {even:?}");
+    }
+}
+
+/// A record with a short expansion tells the light towards the eye that it was made for all the same, and that a little beside; from elsewhere it does not answer.
+#[test]
+fn records_of_low_degree_hold_the_light_towards_an_eye() {
+    let phase = Phase::from(Lobe::HenyeyGreenstein { g: 0.85 });
+    let medium = fog(0.1, 0.9, phase);
+    let (point, to_eye) = (Vec3::new(0.3, 0.2, 0.0), Vec3::new(0.1, 0.3, -1.0).normalize());
+    let beside = (to_eye + 0.1 * Vec3::X).normalize();
+    let (degree, lobe) = (2, 2);
+    let [lamp, _] = panel_and_ball();
+    let (scene, lights) = (Lamp(lamp), [lamp]);
+    let make = estimator(&medium, &scene, &lights);
+    let read = |towards: Vec3, looks: u32, rng: &mut Generator| {
+        let mut attached = vec![Coefficient::ZERO; sh::coefficient_count(degree) - 1 + lobe];
+        let looks = Looks { to_eye: Some(to_eye), ..Looks::from(looks) };
+        let sums = make.multiple(point, &phase, looks, &mut attached, rng);
+        let mut cache: VolumeCache<'_> = Cache::growing(attached.len());
+        let record = Record { position: point, radius: 0.1, value: sums.value, gradient: sums.gradient };
+        cache.insert(record, &attached).unwrap();
+        assert_eq!(cache.degree(), degree);
+        cache.lookup(point, &Basis::new(towards, degree), &Reading::new(0.5))
+    };
+    assert!(read(-to_eye, 8, &mut Generator::new(1)).is_none());
+    for towards in [to_eye, beside] {
+        let walked = estimate(60_000, |rng| make.multiple_towards(point, towards, &phase, rng));
+        let made = estimate(600, |rng| read(towards, 64, rng).unwrap());
+        let (mean, error) = (made.mean[0] - walked.mean[0], made.error[0].hypot(walked.error[0]));
+        // Beside the eye what bends is missing.
+        let bent = if towards == to_eye { 0.0 } else { 0.03 };
+        assert!(mean.abs() < 4.0 * error + bent * walked.mean[0], "{towards}: {made:?} {walked:?}");
+        assert!(error < 0.02 * walked.mean[0], "{made:?} {walked:?}");
     }
 }

@@ -7,7 +7,7 @@
 //! | 0 | 8 | [`MAGIC`] |
 //! | 8 | 4 | [`VERSION`] |
 //! | 12 | 4 | [`RecordKind`]: 1 in a medium, 2 on surfaces |
-//! | 16 | 4 | stride `s`: attachments per record, `(degree + 1)² − 1` in a medium, 1 on surfaces |
+//! | 16 | 4 | stride `s`: attachments per record, `(degree + 1)² − 1` in a medium, two more with light towards an eye, 1 on surfaces |
 //! | 20 | 4 | number of records `n` |
 //! | 24 | 8 | tag: what the cache was made for, a number of the host's choice |
 //! | 32 | 8 | [`Crc`] of bytes 0 to 32 and of all from 40 on |

@@ -5,6 +5,7 @@ use glam::{Vec2, Vec3};
 use super::aim::Aims;
 use super::evidence::{Halves, Openings};
 use super::guide::{Guided, Looks};
+use super::lobe::{self, Lobe, coefficients_of};
 use super::lookup::Reading;
 use super::photons::{PhotonGrid, SHARPEST};
 use super::record::Facing;
@@ -16,7 +17,7 @@ use crate::multiple_scatter::{self, Cones, Incoming, Start, Walk};
 use crate::path;
 use crate::phase::{Phase, deflection};
 use crate::sampling::{Generator, mis, uniform, uniform2, warp};
-use crate::sh::{Coefficient, MAX_DEGREE};
+use crate::sh::Coefficient;
 use crate::single_scatter::{self, Arrival, Contribution, Directional, Sums, Towards};
 use crate::spectrum::{Gradient, Spectrum};
 use crate::surface::{Surface, lambert};
@@ -26,6 +27,12 @@ use crate::world::{World, leave, nearest_surface, shadow_ray};
 /// Least cosine in the gradient of an irradiance sample: at grazing directions `1/cos` has a
 /// variance without bound.
 const MIN_COSINE: f32 = 0.05;
+
+/// How often the phase function has been applied to what a lobe holds, at least: light of surfaces comes from everywhere, but not evenly.
+const SURFACE_POWER: u32 = 1;
+
+/// See [`SURFACE_POWER`].
+const MULTIPLE_POWER: u32 = 2;
 
 /// How much light that is not scattered to the eye counts for what is learnt of directions: mirrors and other views look
 /// from elsewhere.
@@ -54,10 +61,19 @@ struct Mixture<'a> {
 }
 
 impl Mixture<'_> {
+    fn parts(&self) -> u32 {
+        1 + u32::from(!self.aims.is_empty()) + u32::from(self.eye.is_some()) + u32::from(self.guide.is_some())
+    }
+
+    /// Which half of the samples one belongs to: each has as many of every density.
+    fn half(&self, j: u32) -> usize {
+        let neighbours = if self.parts() == 4 { j >> 2 } else { j >> 1 };
+        (neighbours & 1) as usize
+    }
+
     /// Direction `j` with the density (sr⁻¹) of the mixture.
     fn direction(&self, j: u32, sample: impl Fn(Vec2) -> Vec3, pdf: impl Fn(Vec3) -> f32) -> (Vec3, f32) {
-        let (has_aims, has_eye) = (!self.aims.is_empty(), self.eye.is_some());
-        let parts = 1 + u32::from(has_aims) + u32::from(has_eye) + u32::from(self.guide.is_some());
+        let (has_aims, parts) = (!self.aims.is_empty(), self.parts());
         let of_part = |part: u32| (self.count + parts - 1 - part) / parts;
         let at = single_scatter::lattice(j / parts, of_part(j % parts), self.shift);
         let (to_aims, to_eye) = (1, 1 + u32::from(has_aims));
@@ -167,7 +183,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
     /// Light from the lights but a sky, scattered once at `point`: mean over directions (W·m⁻²·sr⁻¹), with
     /// the expansion of `phase` of degree 1 and more added to `higher`.
     pub fn single(&self, point: Vec3, phase: &Phase, higher: &mut [Coefficient], rng: &mut impl Rng) -> Sums {
-        self.expanded(phase, higher, |into| {
+        self.expanded(phase, higher, None, |into, _| {
             let settings = single_scatter::Settings { samples: self.light_samples, steps: self.walk.steps };
             let mut sums = Sums::default();
             for lights in self.world.lights.but_sky() {
@@ -195,7 +211,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
         let aims = Aims::new(point, &lights, scene, |light| !matches!(light, Light::Quad(_)));
         let eye = to_eye.filter(|_| !phase.is_isotropic()).map(|to_eye| (to_eye, phase));
         let mixture = Mixture { aims, eye, guide, count, shift };
-        self.expanded(phase, higher, |into| {
+        self.expanded(phase, higher, to_eye.map(|eye| (eye, SURFACE_POWER)), |into, seen| {
             let (mut sums, mut openings) = (Sums::default(), Openings::default());
             for j in 0..count {
                 let (direction, pdf) = mixture.direction(j, warp::uniform_sphere, |_| warp::uniform_sphere_pdf());
@@ -212,6 +228,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
                 if let Some(arrival) = arrival {
                     let arrival = self.steadied(arrival);
                     let light = arrival.scatter_directional(into.moments, 1.0, into.coefficients);
+                    seen.add(&arrival, phase);
                     openings.add_sky(end.as_ref(), light.radiance);
                     sums.add(&light, true);
                 }
@@ -238,7 +255,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
         let aims = Aims::new(point, &self.world.lights, self.world.scene, |_| true);
         let eye = to_eye.filter(|_| !phase.is_isotropic()).map(|to_eye| (to_eye, phase));
         let mixture = Mixture { aims, eye, guide, count, shift };
-        self.expanded(phase, higher, |into| {
+        self.expanded(phase, higher, to_eye.map(|eye| (eye, MULTIPLE_POWER)), |into, towards| {
             let (mut cones, mut halves) = (Cones::default(), Halves::default());
             let mut seen = Cones::default();
             for j in 0..count {
@@ -254,11 +271,11 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
                 let mean = incoming.scatter_directional(into.moments, 1.0, into.coefficients);
                 cones.add(to_light, &mean);
                 match eye {
-                    None => halves.add(j, &mean.gradient),
+                    None => halves.add(mixture.half(j), &mean.gradient),
                     Some((to_eye, phase)) => {
-                        let light = incoming.scatter(to_eye, phase);
+                        let light = towards.add(&incoming, phase).unwrap_or_else(|| incoming.scatter(to_eye, phase));
                         seen.add(to_light, &light);
-                        halves.add(j, &light.gradient);
+                        halves.add(mixture.half(j), &light.gradient);
                     }
                 }
             }
@@ -277,6 +294,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
             }
             sums.gradient = sums.gradient * trust;
             into.coefficients.iter_mut().for_each(|c| c.gradient = c.gradient * trust);
+            towards.light.gradient = towards.light.gradient * trust;
             sums
         })
     }
@@ -364,7 +382,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
             if let Some(learnt) = &mut learnt {
                 learnt.add(to_light, total.radiance.mean() * count as f32, pdf, count);
             }
-            halves.add(j, &total.gradient);
+            halves.add(mixture.half(j), &total.gradient);
             turn += Gradient::outer(total.radiance, to_light / cosine.max(MIN_COSINE));
         }
         sums.add_norm(openings.norm());
@@ -537,23 +555,79 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
         Walk { world: self.world, settings: self.walk }
     }
 
-    /// Runs a directional estimate and cuts off its degree 0, which the record itself holds.
+    /// Runs a directional estimate and cuts off its degree 0, which the record itself holds. Where there is room for it and an eye that looks from a direction, what
+    /// the expansion leaves out of the light that was scattered so many times towards it becomes a lobe.
     fn expanded(
         &self,
         phase: &Phase,
-        higher: &mut [Coefficient],
-        estimate: impl FnOnce(&mut Directional<'_>) -> Sums,
+        attached: &mut [Coefficient],
+        eye: Option<(Vec3, u32)>,
+        estimate: impl FnOnce(&mut Directional<'_>, &mut Seen) -> Sums,
     ) -> Sums {
+        attached.fill(Coefficient::ZERO);
+        let (higher, lobe) = attached.split_at_mut(coefficients_of(attached.len()));
         // What there is no degree for stays 0.
-        let degree = crate::sh::degree_of(higher.len() + 1).unwrap_or(0).min(MAX_DEGREE);
+        let degree = crate::sh::degree_of(higher.len() + 1).unwrap_or(0);
         let moments = single_scatter::moments(phase, degree);
         let mut all = [Coefficient::ZERO; crate::sh::MAX_COEFFICIENTS];
-        let count = crate::sh::coefficient_count(degree);
-        let mut into = Directional { moments: &moments[..=degree], coefficients: &mut all[..count] };
-        let sums = estimate(&mut into);
-        higher.fill(Coefficient::ZERO);
+        let all = &mut all[..crate::sh::coefficient_count(degree)];
+        let mut seen = Seen::default();
+        let mut sharpness = 0.0;
+        if let Some((to_eye, power)) = eye.filter(|_| !lobe.is_empty()) {
+            sharpness = lobe::sharpness(phase, degree, power);
+            seen.to_eye = (sharpness > 0.0).then_some(to_eye);
+        }
+        let sums = estimate(&mut Directional { moments: &moments[..=degree], coefficients: all }, &mut seen);
+        if let Some(to_eye) = seen.to_eye {
+            let known = Expanded::new(to_eye, all);
+            let (value, gradient) = (seen.light.radiance - known.value, seen.light.gradient - known.gradient);
+            let turn = seen.turn - known.turn;
+            lobe.copy_from_slice(&Lobe { to_eye, sharpness, value, gradient, turn }.attached());
+        }
         higher.iter_mut().zip(&all[1..]).for_each(|(slot, found)| *slot = *found);
         sums
+    }
+}
+
+/// Light towards an eye, and how it changes as that direction turns.
+#[derive(Debug, Default)]
+struct Seen {
+    to_eye: Option<Vec3>,
+    light: Contribution,
+    turn: Gradient,
+}
+
+impl Seen {
+    /// Adds what a phase function makes of light that arrives; the light that is seen of it.
+    #[inline]
+    fn add(&mut self, arrival: &Arrival, phase: &Phase) -> Option<Contribution> {
+        let to_eye = self.to_eye?;
+        let light = arrival.scatter(to_eye, phase);
+        self.light += light;
+        self.turn += arrival.turned(to_eye, phase);
+        Some(light)
+    }
+}
+
+/// What an expansion says of one direction.
+struct Expanded {
+    value: Spectrum,
+    gradient: Gradient,
+    turn: Gradient,
+}
+
+impl Expanded {
+    fn new(to_eye: Vec3, coefficients: &[Coefficient]) -> Self {
+        let (mut basis, mut slopes) = ([0.0; crate::sh::MAX_COEFFICIENTS], [Vec3::ZERO; crate::sh::MAX_COEFFICIENTS]);
+        let degree = crate::sh::degree_of(coefficients.len()).unwrap_or(0);
+        crate::sh::evaluate_with_gradients(to_eye, degree, &mut basis, &mut slopes);
+        let (mut value, mut gradient, mut turn) = (Spectrum::ZERO, Gradient::ZERO, Gradient::ZERO);
+        for ((c, y), slope) in coefficients.iter().zip(basis).zip(slopes) {
+            value += c.value * y;
+            gradient += c.gradient * y;
+            turn += Gradient::outer(c.value, slope);
+        }
+        Self { value, gradient, turn }
     }
 }
 

@@ -56,10 +56,10 @@ impl Openings {
 pub(super) struct Halves([Gradient; 2]);
 
 impl Halves {
-    /// Adds the gradient of sample `j`; of every four neighbours, two go to either half.
+    /// Adds the gradient of a sample of the first half or the second: 0 or 1.
     #[inline]
-    pub(super) fn add(&mut self, j: u32, gradient: &Gradient) {
-        self.0[(j as usize >> 1) & 1] += *gradient;
+    pub(super) fn add(&mut self, half: usize, gradient: &Gradient) {
+        self.0[half] += *gradient;
     }
 
     pub(super) fn trust(&self) -> Spectrum {

@@ -3,6 +3,7 @@
 use glam::Vec3;
 
 use super::extrapolate::{Blend, Extrapolation, exponent_limit, weight};
+use super::lobe::{Lobe, coefficients_of};
 use super::record::{Facing, Record};
 use super::store::{SurfaceCache, VolumeCache, WIDE};
 use crate::math::float;
@@ -59,6 +60,7 @@ impl Reading {
 /// ```
 #[derive(Debug, Clone, Copy)]
 pub struct Basis {
+    to_eye: Vec3,
     values: [f32; MAX_COEFFICIENTS],
     count: usize,
 }
@@ -70,7 +72,7 @@ impl Basis {
         let mut values = [0.0; MAX_COEFFICIENTS];
         let count = sh::coefficient_count(degree.min(sh::MAX_DEGREE));
         sh::evaluate(to_eye, degree.min(sh::MAX_DEGREE), &mut values[..count]);
-        Self { values, count }
+        Self { to_eye, values, count }
     }
 
     /// Without that of degree 0.
@@ -79,9 +81,11 @@ impl Basis {
         self.values.get(1..self.count).unwrap_or(&[])
     }
 
-    /// An expansion in its direction: of this mean, and coefficients of degree 1 and more.
-    pub(super) fn expanded(&self, mean: Spectrum, higher: &[Coefficient]) -> Spectrum {
-        self.higher().iter().zip(higher).fold(mean, |sum, (&y, c)| sum + c.value * y)
+    /// An expansion in its direction, of this mean and coefficients of degree 1 and more, with the lobe attached.
+    pub(super) fn expanded(&self, mean: Spectrum, attached: &[Coefficient]) -> Spectrum {
+        let (higher, lobe) = attached.split_at(coefficients_of(attached.len()));
+        let light = self.higher().iter().zip(higher).fold(mean, |sum, (&y, c)| sum + c.value * y);
+        light + Lobe::read(lobe).map_or(Spectrum::ZERO, |lobe| lobe.seen(self.to_eye).0)
     }
 
     /// Whether it reaches up to `degree`.
@@ -127,7 +131,7 @@ impl TurningBasis {
     pub fn new(to_eye: Vec3, degree: usize) -> Self {
         let degree = degree.min(TURNING_DEGREE);
         let count = sh::coefficient_count(degree);
-        let mut basis = Basis { values: [0.0; MAX_COEFFICIENTS], count };
+        let mut basis = Basis { to_eye, values: [0.0; MAX_COEFFICIENTS], count };
         let mut slopes = [Vec3::ZERO; TURNING_COEFFICIENTS];
         sh::evaluate_with_gradients(to_eye, degree, &mut basis.values[..count], &mut slopes[..count]);
         Self { basis, slopes }
@@ -156,7 +160,7 @@ impl VolumeCache<'_> {
     /// Highest degree of the expansions held; 0 in isotropic media.
     #[must_use]
     pub fn degree(&self) -> usize {
-        sh::degree_of(self.stride() + 1).unwrap_or(0)
+        sh::degree_of(self.coefficients() + 1).unwrap_or(0)
     }
 
     /// In-scattered radiance (W·m⁻²·sr⁻¹) at `point` in the direction of `basis`; `None` where no
@@ -168,35 +172,54 @@ impl VolumeCache<'_> {
     #[must_use]
     pub fn lookup(&self, point: Vec3, basis: &Basis, reading: &Reading) -> Option<Spectrum> {
         let mut blend = reading.blend();
-        let higher = basis.higher();
         let mut add = |i, record: &Record, share| {
-            let d = 1.0 - share - reading.margin;
-            if d <= 0.0 {
-                return;
+            if let Some((d, value, gradient)) = self.expanded(i, record, share + reading.margin, basis) {
+                blend.add(weight(d), value, &gradient, point - record.position);
             }
-            let (value, gradient) = self.expanded(i, record, higher);
-            blend.add(weight(d), value, &gradient, point - record.position);
         };
         self.visit(point, &mut add);
         blend.value().or_else(|| self.gap(point, basis, reading)).map(|light| light.max(Spectrum::ZERO))
     }
 
-    /// Value and gradient of a record's expansion in one direction.
+    /// The coefficients of a record, and its lobe.
     #[inline]
-    fn expanded(&self, number: u32, record: &Record, higher: &[f32]) -> (Spectrum, Gradient) {
-        self.attached(number).iter().zip(higher).fold((record.value, record.gradient), |(value, gradient), (c, &y)| {
-            (value + c.value * y, gradient + c.gradient * y)
-        })
+    fn parts(&self, number: u32) -> (&[Coefficient], Option<Lobe>) {
+        let (higher, lobe) = self.attached(number).split_at_checked(self.coefficients()).unwrap_or_default();
+        (higher, Lobe::read(lobe))
+    }
+
+    /// Where the eye is that a record has a lobe for (unit).
+    pub(super) fn to_eye(&self, number: u32) -> Option<Vec3> {
+        self.parts(number).1.map(|lobe| lobe.to_eye)
+    }
+
+    /// What a record says in one direction: `d`, 1 at its middle, less what the point and the direction are `away`, its light and its gradient;
+    /// `None` if it does not reach.
+    #[inline]
+    fn expanded(&self, number: u32, record: &Record, away: f32, basis: &Basis) -> Option<(f32, Spectrum, Gradient)> {
+        let (higher, lobe) = self.parts(number);
+        let d = 1.0 - away - lobe.map_or(0.0, |lobe| lobe.apart(basis.to_eye));
+        // Written so that NaN fails, too.
+        if !(d > 0.0) {
+            return None;
+        }
+        let seen = lobe.map_or((Spectrum::ZERO, Gradient::ZERO), |lobe| lobe.seen(basis.to_eye));
+        let of_mean = (record.value + seen.0, record.gradient + seen.1);
+        let (value, gradient) = higher
+            .iter()
+            .zip(basis.higher())
+            .fold(of_mean, |(value, gradient), (c, &y)| (value + c.value * y, gradient + c.gradient * y));
+        Some((d, value, gradient))
     }
 
     /// Between the spheres, the nearest count.
     #[cold]
     fn gap(&self, point: Vec3, basis: &Basis, reading: &Reading) -> Option<Spectrum> {
         let mut blend = reading.blend();
-        let higher = basis.higher();
         self.visit_wide(point, |i, record, share| {
-            let (value, gradient) = self.expanded(i, record, higher);
-            blend.add(weight(1.0 - share), value, &gradient, point - record.position);
+            if let Some((d, value, gradient)) = self.expanded(i, record, share, basis) {
+                blend.add(weight(d), value, &gradient, point - record.position);
+            }
         });
         blend.value()
     }
@@ -212,28 +235,35 @@ impl VolumeCache<'_> {
     ) -> Option<(Contribution, Gradient)> {
         let mut blend = reading.blend();
         let (mut slope, mut mixed) = (Gradient::ZERO, [Spectrum::ZERO; TURNING_COEFFICIENTS]);
-        let higher = basis.basis.higher();
+        let mut turned = Gradient::ZERO;
         self.visit(point, |i, record, share| {
-            let d = 1.0 - share - reading.margin;
-            if d <= 0.0 {
-                return;
-            }
-            let (value, gradient) = self.expanded(i, record, higher);
+            let found = self.expanded(i, record, share + reading.margin, &basis.basis);
+            let Some((d, value, gradient)) = found else { return };
             let weight = weight(d);
             blend.add(weight, value, &gradient, point - record.position);
             slope += gradient * weight;
-            mixed.iter_mut().zip(self.attached(i)).for_each(|(sum, c)| *sum += c.value * weight);
+            let (higher, lobe) = self.parts(i);
+            mixed.iter_mut().zip(higher).for_each(|(sum, c)| *sum += c.value * weight);
+            turned += lobe.map_or(Gradient::ZERO, |lobe| lobe.turned(basis.basis.to_eye) * weight);
         });
         let radiance = blend.value()?;
         let share = 1.0 / blend.weight();
-        Some((Contribution { radiance, gradient: slope * share }, basis.turned(&mixed) * share))
+        Some((Contribution { radiance, gradient: slope * share }, (turned + basis.turned(&mixed)) * share))
     }
 
     /// Whether a record reaches `point`.
     #[must_use]
     pub fn covers(&self, point: Vec3, reading: &Reading) -> bool {
+        self.covers_towards(point, None, reading)
+    }
+
+    /// [`VolumeCache::covers`] where light is asked for towards an eye.
+    pub(super) fn covers_towards(&self, point: Vec3, to_eye: Option<Vec3>, reading: &Reading) -> bool {
         let mut covered = false;
-        self.visit(point, |_, _, share| covered |= share < 1.0 - reading.margin);
+        self.visit(point, |i, _, share| {
+            let apart = to_eye.and_then(|to_eye| Some(self.parts(i).1?.apart(to_eye))).unwrap_or(0.0);
+            covered |= share + apart < 1.0 - reading.margin;
+        });
         covered
     }
 }

@@ -37,6 +37,7 @@
 //! | `index` | [`Index`]: which spheres contain this point |
 //! | `store` | [`Cache`]: records, attachments, index |
 //! | `lookup` | look-ups in the medium and on surfaces |
+//! | `lobe` | light towards the eye, beside an expansion of low degree |
 //! | `aim` | where random walks start towards |
 //! | `guide` | [`Guide`], [`Guided`]: where light was found to come from; [`Looks`]: how samples are drawn |
 //! | `estimate` | [`Estimator`]: what records are made of |
@@ -63,6 +64,7 @@ mod fill;
 mod guide;
 mod index;
 mod kind;
+mod lobe;
 mod lookup;
 mod memory;
 mod noise;

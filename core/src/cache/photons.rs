@@ -529,12 +529,15 @@ fn unresolved(phase: &Phase, degree: usize) -> f32 {
 /// The least degree of cells at which light may be scattered unevenly at all.
 const LEAST_DEGREE: usize = 2;
 
-/// The least degree of cells that resolves nearly all that is scattered, and the highest there is if none does.
+/// The highest degree of cells that is worth its memory and its photons: beyond, walks are scattered some more times instead (decision 81). Lower: noisier walks.
+const MOST_DEGREE: usize = 5;
+
+/// The least degree of cells that resolves nearly all that is scattered, and [`MOST_DEGREE`] if none does.
 pub(super) fn degree_for(phase: &Phase) -> usize {
     if phase.is_isotropic() {
         return 0;
     }
-    (LEAST_DEGREE..MAX_DEGREE).find(|&degree| unresolved(phase, degree) <= RESOLVED).unwrap_or(MAX_DEGREE)
+    (LEAST_DEGREE..MOST_DEGREE).find(|&degree| unresolved(phase, degree) <= RESOLVED).unwrap_or(MOST_DEGREE)
 }
 
 /// Variance of what such cells say, over that of their fluence: `Σ (2l + 1) p_l²` for light that comes from one direction.

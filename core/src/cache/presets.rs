@@ -1,6 +1,7 @@
 //! Every tuned number of radiance caching, from an outline of the world.
 
 use super::kind::Kind;
+use super::lobe;
 use super::photons::{self, PhotonEffort};
 use super::radius::Limits;
 use super::settings::{Effort, LEAST_RAYS, MOST_RAYS, Settings};
@@ -298,7 +299,8 @@ impl Settings {
         self
     }
 
-    /// With as many eye rays that look for places as a picture of so many pixels needs: a quarter, because small things are seen in large pictures.
+    /// For a picture of so many pixels: with as many eye rays that look for places as it needs, a quarter, because small things are seen in large pictures; and with
+    /// short expansions in the medium, as records hold what an eye sees of them besides. Leave expansions as long as they are where caches light probes.
     ///
     /// ```
     /// # use fogbow::cache::Settings;
@@ -306,7 +308,13 @@ impl Settings {
     /// ```
     #[must_use]
     pub fn for_pixels(self, pixels: u32) -> Self {
-        Self { rays: (pixels / 4).clamp(LEAST_RAYS, MOST_RAYS), ..self }
+        let short = |effort: Effort| Effort { degree: effort.degree.min(lobe::DEGREE), ..effort };
+        Self {
+            rays: (pixels / 4).clamp(LEAST_RAYS, MOST_RAYS),
+            surface: self.surface.map(short),
+            multiple: self.multiple.map(short),
+            ..self
+        }
     }
 
     /// The effort of a final kind, to be changed.

@@ -91,7 +91,7 @@ impl VolumeCache<'_> {
             Extrapolation::Exponential => Extrapolation::Linear,
             other => other,
         };
-        let count = coefficients.len().min(self.stride() + 1);
+        let count = coefficients.len().min(self.coefficients() + 1);
         let mut reaches = false;
         for (block, sums) in coefficients[..count].chunks_mut(BLOCK).enumerate() {
             let coefficient = |record: u32, of: &Record, number: usize| match number.checked_sub(1) {

@@ -5,6 +5,7 @@ use glam::Vec3;
 
 use super::bytes::RecordKind;
 use super::index;
+use super::lobe;
 use super::radius::{self, Limits};
 use crate::sh::{self, Coefficient};
 use crate::single_scatter::Sums;
@@ -91,8 +92,8 @@ pub struct Facing {
     pub turn: Gradient,
 }
 
-/// Most attachments a record may have: those of an expansion of [`sh::MAX_DEGREE`].
-pub(super) const MAX_STRIDE: usize = sh::MAX_COEFFICIENTS - 1;
+/// Most attachments a record may have: those of an expansion of [`sh::MAX_DEGREE`] and a lobe.
+pub(super) const MAX_STRIDE: usize = sh::MAX_COEFFICIENTS - 1 + lobe::ATTACHED;
 
 mod sealed {
     /// The formats of caches know what is attached, and how large it is.

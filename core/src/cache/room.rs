@@ -3,6 +3,7 @@
 use super::fill::{MOST_PARTS, PLACES_OF_JOB, PLACES_PER_JOB, RAYS_PER_JOB};
 use super::guide::Guide;
 use super::kind::Kind;
+use super::lobe;
 use super::noise::{self, Glance};
 use super::photons::{DEPOSITS_OF_JOB, PhotonCell};
 use super::record::MAX_STRIDE;
@@ -91,7 +92,11 @@ pub fn room_for(settings: &Settings, places: usize, records: usize) -> Room {
 /// Attachments of each record of a kind; `None` if the settings do not use it.
 pub(super) fn stride_of(settings: &Settings, kind: Kind) -> Option<usize> {
     let effort = settings.asked(kind)?;
-    Some(if kind.is_on_surfaces() { 1 } else { (coefficient_count(effort.degree) - 1).min(MAX_STRIDE) })
+    if kind.is_on_surfaces() {
+        return Some(1);
+    }
+    let has_lobe = effort.degree > 0 && kind != Kind::Single;
+    Some((coefficient_count(effort.degree) - 1 + if has_lobe { lobe::ATTACHED } else { 0 }).min(MAX_STRIDE))
 }
 
 /// Chunks of a cache of a kind with room for so many records; none if the settings do not use it.

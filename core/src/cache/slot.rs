@@ -4,6 +4,7 @@ use super::guide::Guide;
 use super::kind::Kind;
 use super::lookup::{Basis, Reading};
 use super::radius::clamp_gradient;
+use super::record::MAX_STRIDE;
 use super::store::{Cache, InsertError};
 use super::{Attachment, Facing, Place, Record, SurfaceCache, VolumeCache};
 use crate::math::Vec3;
@@ -78,7 +79,7 @@ impl<'s> Slot<'s> {
     /// Whether a place has a record, or no such cache could have one there.
     pub(super) fn covers(&self, place: &Place, reading: &Reading) -> bool {
         match (self, place.normal) {
-            (Self::Volume(cache), None) => cache.covers(place.point, reading),
+            (Self::Volume(cache), None) => cache.covers_towards(place.point, place.to_eye, reading),
             (Self::Surface(cache), Some(normal)) => cache.covers(place.point, normal, reading),
             _ => true,
         }
@@ -124,7 +125,11 @@ impl<'s> Slot<'s> {
                 let normal = cache.attached(number as u32).first().map(|facing| facing.normal);
                 Place { point, normal, share: 1.0, ..Place::default() }
             }
-            Self::Off | Self::Volume(_) => Place { point, is_seen: true, share: 1.0, ..Place::default() },
+            Self::Off => Place { point, is_seen: true, share: 1.0, ..Place::default() },
+            Self::Volume(cache) => {
+                let to_eye = cache.to_eye(number as u32);
+                Place { point, is_seen: true, share: 1.0, to_eye, ..Place::default() }
+            }
         })
     }
 
@@ -163,7 +168,7 @@ impl<'s> Slot<'s> {
         let mix = |a: Spectrum, b: Spectrum| a * share + b * (1.0 - share);
         match (self, new) {
             (Self::Volume(cache), Attached::Higher(higher)) => {
-                let mut mixed = [Coefficient::ZERO; crate::sh::MAX_COEFFICIENTS];
+                let mut mixed = [Coefficient::ZERO; MAX_STRIDE];
                 let stride = higher.len().min(mixed.len());
                 for ((mixed, new), old) in mixed.iter_mut().zip(higher).zip(cache.attached(number as u32)) {
                     mixed.value = mix(new.value, old.value);

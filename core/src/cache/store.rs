@@ -5,6 +5,7 @@ use core::fmt;
 use glam::Vec3;
 
 use super::index::{Index, squared_share};
+use super::lobe::coefficients_of;
 use super::radius::neighbour_clamped;
 use super::record::{Attachment, Facing, MAX_STRIDE, Record};
 use crate::math::float;
@@ -58,6 +59,8 @@ pub struct Cache<'s, E> {
     index: Index<'s>,
     wide: Index<'s>,
     stride: usize,
+    /// Of these, coefficients of an expansion.
+    coefficients: usize,
 }
 
 /// Nodes and entries of the index of wider spheres, in those of the other: a sphere that is twice as large lies in more
@@ -169,7 +172,7 @@ pub type SurfaceCache<'s> = Cache<'s, Facing>;
 
 impl<'s, E: Attachment> Cache<'s, E> {
     /// An empty cache in lent memory, with `stride` attachments per record: for as many records as there is room, see
-    /// [`Cache::chunks`]. A stride is at most that of an expansion of [`MAX_DEGREE`](crate::sh::MAX_DEGREE); more are cut
+    /// [`Cache::chunks`]. A stride is at most that of an expansion of [`MAX_DEGREE`](crate::sh::MAX_DEGREE) and two; more are cut
     /// to as many.
     ///
     /// Lend more where records come in crowds within crowds: their index may want more. Without room for it, records
@@ -200,7 +203,8 @@ impl<'s, E: Attachment> Cache<'s, E> {
         let index = Index::lent(memory, records, 1);
         let wide = Index::lent(memory, records, WIDER);
         let attached = carve::<E>(memory, records * stride);
-        Self { records: carve::<Record>(memory, records).into(), attached: attached.into(), index, wide, stride }
+        let (records, attached) = (carve::<Record>(memory, records).into(), attached.into());
+        Self { records, attached, index, wide, stride, coefficients: coefficients_of(stride) }
     }
 
     /// Chunks of memory that `records` with `stride` attachments each take, their indices included.
@@ -249,6 +253,11 @@ impl<'s, E: Attachment> Cache<'s, E> {
     #[must_use]
     pub fn stride(&self) -> usize {
         self.stride
+    }
+
+    /// Coefficients of degree 1 and more among the attachments of a record in the medium.
+    pub(super) fn coefficients(&self) -> usize {
+        self.coefficients
     }
 
     /// Attachments of one record; empty where there is no such record.
@@ -533,12 +542,14 @@ impl<E: Attachment> Cache<'_, E> {
     pub fn growing(stride: usize) -> Self {
         use alloc::vec::Vec;
         let index = || Index::new(Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        let stride = stride.min(MAX_STRIDE);
         Self {
             records: List::default(),
             attached: List::default(),
             index: index(),
             wide: index(),
-            stride: stride.min(MAX_STRIDE),
+            stride,
+            coefficients: coefficients_of(stride),
         }
     }
 }

@@ -174,7 +174,11 @@ impl<F> Filling<'_, F> {
             return;
         };
         let guide = Guided::new(&around);
-        let to_eye = self.memory.guides[step.kind].as_slice().get(offset as usize).and_then(|guide| guide.to_eye);
+        let to_eye = self.memory.guides[step.kind]
+            .as_slice()
+            .get(offset as usize)
+            .and_then(|guide| guide.to_eye)
+            .or(place.to_eye);
         let count = samples / parts + u32::from(part < samples % parts);
         let mut rng = Generator::new(mix(self.seed() ^ mix(stream + 16)) ^ number as u64 ^ stream_of(part));
         let mut estimate = Estimate { number: offset, place, effort: more, ..Estimate::default() };
