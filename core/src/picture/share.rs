@@ -84,6 +84,7 @@ impl Share {
 
 impl Share {
     /// Whether it has no tile of a picture at all, as one of more parts than a row has tiles may.
+    #[cfg(feature = "alloc")]
     pub(super) fn is_empty(self, settings: &Settings) -> bool {
         /// Rows of tiles beyond which every part has some, and bytes are not worth a look.
         const MOST_ROWS: u32 = 1 << 16;
