@@ -2,7 +2,9 @@
 
 use core::ops::Range;
 
-use super::tiles::{Settings, Tiles};
+#[cfg(feature = "alloc")]
+use super::tiles::Settings;
+use super::tiles::Tiles;
 
 /// The part of a picture that [`Tiles`](super::Tiles) take.
 ///
