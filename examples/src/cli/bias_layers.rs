@@ -52,7 +52,8 @@ mod tests {
         for (number, region) in map.regions().iter().enumerate() {
             let (x, y) = (number as u32 % 4 * 6, number as u32 / 4 * 4);
             let found = region.cached;
-            assert!(found.error > 0.0 && found.error < 1.0 && region.rays > 200, "{region:?}");
+            // About 256 rays each, which come in groups of 32 neighbours.
+            assert!(found.error > 0.0 && found.error < 1.0 && region.rays > 100, "{region:?}");
             assert_eq!(bias.get(x, y).unwrap()[1], found.bias as f32);
             assert_eq!(error.get(x + 5, y + 3).unwrap()[2], found.error as f32);
         }
