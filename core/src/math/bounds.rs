@@ -83,8 +83,9 @@ impl Bounds {
             }
             let inverse = 1.0 / d;
             let (a, b) = ((self.min[axis] - o) * inverse, (self.max[axis] - o) * inverse);
-            near = float::max(near, float::min(a, b));
-            far = float::min(far, float::max(a, b));
+            // A ray in the plane of a face is neither before nor behind it: NaN, for which these give the second.
+            near = float::max(float::min(a, b), near);
+            far = float::min(float::max(a, b), far);
         }
         (near <= far).then_some((near, far))
     }

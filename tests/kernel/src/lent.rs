@@ -87,7 +87,9 @@ const RAYS: usize = 16;
 const RECORDS: usize = 32;
 const PLACES: usize = 1024;
 const DEGREE: usize = 1;
-const STRIDE: usize = coefficient_count(DEGREE) - 1;
+/// Attachments of a record: of its expansion, and where light is scattered more than once two of what that leaves out towards the eye.
+const EXPANDED: usize = coefficient_count(DEGREE) - 1;
+const STRIDE: usize = EXPANDED + 2;
 const ROUND: usize = 8;
 
 /// Coarse caches of all kinds, so that a browser fills them at once.
@@ -134,7 +136,9 @@ const DEPOSITS: usize = 2048;
 pub const ASKED: Asked = Asked::View { ray: eye_ray, pixel: 0.05 };
 
 /// Room for the caches of all kinds.
-const CHUNKS: usize = 3 * VolumeCache::chunks(RECORDS, STRIDE) + 2 * SurfaceCache::chunks(RECORDS, 1);
+const CHUNKS: usize = VolumeCache::chunks(RECORDS, EXPANDED)
+    + 2 * VolumeCache::chunks(RECORDS, STRIDE)
+    + 2 * SurfaceCache::chunks(RECORDS, 1);
 
 /// Fills caches in lent memory and calls `read` with them and with whether the memory was too small.
 fn filled(world: &Foggy<'_>, read: impl FnOnce(&RadianceCaches<'_>, bool)) {
