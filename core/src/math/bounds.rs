@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use super::{Ray, float};
+use super::Ray;
 
 /// An axis-aligned box.
 ///
@@ -83,9 +83,8 @@ impl Bounds {
             }
             let inverse = 1.0 / d;
             let (a, b) = ((self.min[axis] - o) * inverse, (self.max[axis] - o) * inverse);
-            // A ray in the plane of a face is neither before nor behind it: NaN, for which these give the second.
-            near = float::max(float::min(a, b), near);
-            far = float::min(float::max(a, b), far);
+            near = near.max(a.min(b));
+            far = far.min(a.max(b));
         }
         (near <= far).then_some((near, far))
     }
