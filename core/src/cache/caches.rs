@@ -132,8 +132,8 @@ impl<'s> RadianceCaches<'s> {
     /// # let limits = Limits { min: 0.1, max: 1.0 };
     /// # let effort = Effort { tolerance: 0.5, samples: 16, degree: 1, limits, clearance: f32::INFINITY, free_paths: f32::INFINITY };
     /// let settings = Settings { surface: Some(effort), rays: 16, ..Settings::default() };
-    /// // One cache of 48 records with three coefficients each.
-    /// let (mut memory, mut views) = ([Chunk::default(); VolumeCache::chunks(48, 3)], [0; 1]);
+    /// // One cache of 48 records with three coefficients each, and two numbers of what these leave out towards the eye.
+    /// let (mut memory, mut views) = ([Chunk::default(); VolumeCache::chunks(48, 3 + 2)], [0; 1]);
     /// assert_eq!(room_for(&settings, 1000, 48).chunks, memory.len());
     /// let caches = RadianceCaches::lent(settings, &mut views[..], &mut memory);
     ///

@@ -54,8 +54,8 @@ pub struct Room {
 /// let limits = Limits { min: 0.1, max: 1.0 };
 /// let effort = Effort { tolerance: 0.5, samples: 32, degree: 2, limits, clearance: f32::INFINITY, free_paths: f32::INFINITY };
 /// let room = room_for(&Settings { surface: Some(effort), ..Settings::default() }, 1000, 50);
-/// // One cache. Of nine coefficients the mean is the record itself.
-/// assert_eq!(room.chunks, VolumeCache::chunks(50, 8));
+/// // One cache. Of nine coefficients the mean is the record itself; two hold what the others leave out towards the eye.
+/// assert_eq!(room.chunks, VolumeCache::chunks(50, 8 + 2));
 /// assert_eq!((room.wanted, room.guides[Kind::Surface as usize], room.guides[Kind::Multiple as usize]), (1000, 50, 0));
 /// ```
 #[must_use]
