@@ -16,12 +16,12 @@ FOLDER = pathlib.Path("examples/gallery")
 
 # Name, scene and options, what is seen.
 PICTURES = [
-    ("atrium", "examples/scenes/atrium.xml --size 1280x720 --spp 4", "Sunlight in a hazy atrium."),
-    ("smoke", "examples/scenes/noise-box.xml --size 1280x720 --spp 8", "Patchy smoke from a voxel grid, between a red and a green wall."),
-    ("statue", "examples/scenes/statue-forward.xml --size 1280x720 --spp 4", "A statue in fog that scatters forwards."),
-    ("room", "examples/scenes/room.glb --size 1280x720 --spp 4 --exposure -1", "A room from a modelling program, with fog from the file beside it."),
-    ("plume", "examples/scenes/room-plume.xml --size 1280x720 --spp 4", "A plume of smoke in a room."),
-    ("lantern", "examples/scenes/lantern.xml --size 1280x720 --spp 4", "A lantern's bars throw shadows into fog."),
+    ("atrium", "examples/scenes/atrium.xml --size 1280x720", "Sunlight in a hazy atrium."),
+    ("smoke", "examples/scenes/noise-box.xml --size 1280x720", "Patchy smoke from a voxel grid, between a red and a green wall."),
+    ("statue", "examples/scenes/statue-forward.xml --size 1280x720", "A statue in fog that scatters forwards."),
+    ("room", "examples/scenes/room.glb --size 1280x720 --spp 32 --exposure -1", "A room from a modelling program, with fog from the file beside it."),
+    ("plume", "examples/scenes/room-plume.xml --size 1280x720", "A plume of smoke in a room."),
+    ("lantern", "examples/scenes/lantern.xml --size 1280x720", "A lantern's bars throw shadows into fog."),
 ]
 
 
@@ -52,7 +52,7 @@ def page():
             continue
         said = (FOLDER / f"{name}.log").read_text().splitlines()
         lines += [f"![{seen}]({name}.jpg)", "", seen, "", "```sh", f"fogbow render {what} -o {name}.png", "```", "", "```text", *said, "```", ""]
-    lines += ["Times are from a machine of two cores that was busy with other work: those on the clock are several times what they would be alone.", ""]
+    lines += ["Times are from a machine of two cores that was busy with other work: those on the clock are longer than they would be alone.", ""]
     lines += ["`python3 examples/gallery/make.py target/release/fogbow` makes all of it anew.", ""]
     (FOLDER / "README.md").write_text("\n".join(lines))
 
