@@ -38,9 +38,9 @@ pub(super) struct Lobe {
     pub(super) sharpness: f32,
     /// Towards the eye (W·m⁻²·sr⁻¹).
     pub(super) value: Spectrum,
-    /// As the point moves.
+    /// As the point moves (W·m⁻³·sr⁻¹).
     pub(super) gradient: Gradient,
-    /// As the direction turns: tangential (per radian).
+    /// As the direction turns: tangential (W·m⁻²·sr⁻¹ per radian).
     pub(super) turn: Gradient,
 }
 
@@ -61,7 +61,7 @@ impl Lobe {
         [Coefficient { value: self.value, gradient: self.gradient }, Coefficient { value: to_eye, gradient: self.turn }]
     }
 
-    /// How far a direction is from that of the eye, to be added to a distance over a radius.
+    /// How far a direction (unit) is from that of the eye, to be added to a distance over a radius: `sharpness (1 − cos)`.
     #[inline]
     pub(super) fn apart(&self, to_eye: Vec3) -> f32 {
         0.5 * TURN * self.sharpness * self.to_eye.distance_squared(to_eye)

@@ -122,11 +122,11 @@ fn projector(plugin: &Plugin<'_>) -> Result<Emitter, SceneError> {
     let to_world = plugin.to_world()?.map_or(Transform::IDENTITY, |(t, _)| t);
     let intensity = textures::property(plugin, "intensity")?;
     let cone = intensity.as_ref().map(|_| WHOLE);
-    let (texture, source) =
-        match intensity.map_or_else(|| textures::property(plugin, "irradiance"), |it| Ok(Some(it)))? {
-            Some(found) => found,
-            None => (Texture::Constant(Spectrum::ONE), plugin.element),
-        };
+    let shown = match intensity {
+        None => textures::property(plugin, "irradiance")?,
+        found => found,
+    };
+    let (texture, source) = shown.unwrap_or((Texture::Constant(Spectrum::ONE), plugin.element));
     let [width, height] = match &texture {
         Texture::Bitmap { picture, .. } => [picture.width, picture.height].map(|n| n as f64),
         _ => [1.0; 2],
