@@ -33,6 +33,17 @@ pub struct Wanted {
     pub(super) ray: u32,
 }
 
+impl Wanted {
+    /// What a record of a radius (m) at this place covers of a film that is seen under such angles: from, and to.
+    pub(super) fn on_film(&self, radius: f32, angles: [f32; 2]) -> [f32; 4] {
+        let [x, y] = Asked::at(self.ray);
+        let of = |angle: f32| radius / (self.distance * angle);
+        // All of it, where there is no film.
+        let [across, down] = angles.map(|angle| if of(angle).is_finite() { of(angle) } else { 1.0 });
+        [x - across, y - down, x + across, y + down]
+    }
+}
+
 impl Asked {
     /// [`Asked::Box`] where no eye rays tell the type of `F`.
     ///
@@ -85,6 +96,15 @@ impl<F: Fn([f32; 2]) -> Ray> Asked<F> {
             crc.add(&number.to_le_bytes());
         }
         crc.value()
+    }
+
+    /// Angles (rad) under which the film is seen from the eye, across and down, going by its middle; 0 without one.
+    pub(super) fn film(&self) -> [f32; 2] {
+        const PART: f32 = 1.0 / 16.0;
+        let Self::View { ray, .. } = self else { return [0.0; 2] };
+        let middle = ray([0.5; 2]).direction;
+        let to = |at: [f32; 2]| ray(at).direction.distance(middle) / PART;
+        [to([0.5 + PART, 0.5]), to([0.5, 0.5 + PART])]
     }
 
     /// Calls `visit(place, distance of the eye)` for the places that ray number `number` asks for.

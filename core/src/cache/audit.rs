@@ -21,10 +21,13 @@
 //!
 //! over the `k` rays of a group (a U-statistic, Hoeffding 1948). Noise of single estimates, whatever its size, has no part in its mean, and one
 //! wild estimate little in its value. So that its spread is small, these estimates end where walks of records do.
+//!
+//! Gradients are held to the records around them, which takes no estimates: see `agreement`.
 
 use core::ops::Range;
 
 use super::Estimator;
+use super::agreement;
 use super::bias_map::{BiasMap, RegionSums, Sample};
 use super::caches::RadianceCaches;
 use super::eye::{Caches, radiance};
@@ -164,6 +167,8 @@ pub struct Findings {
     pub squared: Squared,
     /// Parts of kinds in that, in the order of [`Kind::FINAL`]; what they have together is in none.
     pub(super) squared_parts: [f64; 4],
+    /// See [`Findings::gradients`].
+    gradients: ByKind<Option<Deviation>>,
     /// Of the light that one cache holds, as a part of all light; `None` for a kind that is not cached.
     parts: ByKind<Option<Deviation>>,
 }
@@ -182,6 +187,37 @@ impl Findings {
     #[must_use]
     pub fn of(&self, kind: Kind) -> Option<Deviation> {
         self.parts[kind]
+    }
+
+    /// By how much the slope of light between records of one kind ([`Kind::FINAL`]) deviates from what their gradients foretell: 0 where gradients are right; −1 where
+    /// they are nothing but noise; −2 where they are turned round. `None` if it is not cached, or has too few records.
+    ///
+    /// ```
+    /// # #[cfg(feature = "alloc")] {
+    /// # use fogbow::{cache::{Audit, Kind, RadianceCaches, Settings}, math::{Ray, Vec3}};
+    /// let caches = RadianceCaches::new(Settings::default()); // none at all
+    /// let audit = Audit::new(&caches, |_| Ray::new(Vec3::ZERO, Vec3::Z), 64);
+    /// assert!(audit.findings().gradients(Kind::Multiple).is_none());
+    /// # }
+    /// ```
+    #[must_use]
+    pub fn gradients(&self, kind: Kind) -> Option<Deviation> {
+        self.gradients[kind]
+    }
+
+    /// Whether the gradients of records of a kind certainly lead the wrong way: by three standard errors of [`Findings::gradients`].
+    ///
+    /// ```
+    /// # #[cfg(feature = "alloc")] {
+    /// # use fogbow::{cache::{Audit, Kind, RadianceCaches, Settings}, math::{Ray, Vec3}};
+    /// let caches = RadianceCaches::new(Settings::default()); // none at all
+    /// let audit = Audit::new(&caches, |_| Ray::new(Vec3::ZERO, Vec3::Z), 64);
+    /// assert!(!audit.findings().is_misled(Kind::Multiple));
+    /// # }
+    /// ```
+    #[must_use]
+    pub fn is_misled(&self, kind: Kind) -> bool {
+        self.gradients[kind].is_some_and(|slope| agreement::is_misled(&slope))
     }
 }
 
@@ -271,6 +307,7 @@ pub struct Audit<'c, 's, F> {
     cached: Moments,
     parts: [Moments; 4],
     regions: RegionSums,
+    gradients: ByKind<Option<Deviation>>,
 }
 
 impl<'c, 's, F: Fn([f32; 2]) -> Ray> Audit<'c, 's, F> {
@@ -279,6 +316,8 @@ impl<'c, 's, F: Fn([f32; 2]) -> Ray> Audit<'c, 's, F> {
     #[must_use]
     pub fn new(caches: &'c RadianceCaches<'s>, ray: F, rays: u32) -> Self {
         let jobs = rays.div_ceil(GROUP).max(2);
+        let mut gradients = ByKind([None; Kind::COUNT]);
+        Kind::FINAL.into_iter().for_each(|kind| gradients[kind] = agreement::of_gradients(&caches.slots[kind]));
         Self {
             caches,
             ray,
@@ -290,6 +329,7 @@ impl<'c, 's, F: Fn([f32; 2]) -> Ray> Audit<'c, 's, F> {
             cached: Moments::default(),
             parts: [Moments::default(); 4],
             regions: RegionSums::new(jobs * GROUP),
+            gradients,
         }
     }
 
@@ -310,7 +350,7 @@ impl<'c, 's, F: Fn([f32; 2]) -> Ray> Audit<'c, 's, F> {
         }
         let [all, cached] = [self.all, self.cached].map(|moments| moments.deviation(t, tt, groups));
         let (squared, squared_parts) = self.regions.squared();
-        Findings { rays: self.rays, all, cached, squared, squared_parts, parts }
+        Findings { rays: self.rays, all, cached, squared, squared_parts, gradients: self.gradients, parts }
     }
 }
 

@@ -286,8 +286,8 @@ impl RadianceCaches<'_> {
 
     /// Drops the records that an [`Audit`](super::Audit) has found off by certainly more than `error`, or, in the mean of the picture, certainly off and by more than
     /// half of it, to be made anew by the next fill: finer by what they are off, with four times the samples. If regions are off, and the others together are not, those go that are seen in them along
-    /// `ray`, of the kinds that are off there; else all of the kinds that are to blame, or of every kind if none is alone. Returns whether any were
-    /// dropped.
+    /// `ray`, of the kinds that are off there; else all of the kinds that are to blame, or of every kind if none is alone. Kinds whose gradients lead the wrong way ([`Findings::is_misled`]) go as a
+    /// whole. Returns whether any were dropped.
     ///
     /// What finer records do not mend (walks that are cut, lights without surfaces) stays as it is: audit again, and say so.
     ///
@@ -329,9 +329,12 @@ impl RadianceCaches<'_> {
         let is_cached = |kind: Kind| self.settings.effort(kind).is_some();
         let wrong: [Option<Deviation>; 4] = core::array::from_fn(|number| {
             let kind = Kind::FINAL[number];
-            found_of((kind, number)).filter(|_| is_cached(kind))
+            let is_misled = findings.is_misled(kind).then_some(Deviation { bias: most, error: 0.0 });
+            found_of((kind, number)).or(is_misled).filter(|_| is_cached(kind))
         });
         let wrong = || Kind::FINAL.into_iter().zip(wrong).filter_map(|(kind, found)| Some((kind, found?)));
+        // Gradients that lead the wrong way do so everywhere.
+        Kind::FINAL.into_iter().filter(|kind| findings.is_misled(*kind)).for_each(|kind| self.forget(kind));
         if places.is_some() {
             let is_wrong = |at| map.at(at).is_off(most, map.regions().len() as u32);
             self.drop_seen(|| wrong().map(|(kind, _)| kind), is_wrong, ray, world);

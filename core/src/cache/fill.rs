@@ -18,7 +18,7 @@ use super::guide::Guide;
 use super::kind::{Kind, Step, TURNS, Turn};
 use super::lookup::Reading;
 use super::memory::{FilledRecords, FillingMemory};
-use super::noise::{self, Noise};
+use super::noise::{self, Noise, REGIONS};
 use super::photons::PhotonGrid;
 use super::pilots::Pilots;
 use super::presets::noise_goal;
@@ -121,6 +121,8 @@ pub struct Filling<'s, F> {
     caches: RadianceCaches<'s>,
     asked: Asked<F>,
     view: u64,
+    /// Angles (rad) under which the film is seen, across and down.
+    film: [f32; 2],
     memory: FillingMemory<'s>,
     round: Round,
     jobs: u32,
@@ -141,10 +143,10 @@ pub struct Filling<'s, F> {
     /// What pilots have found, and how often radii have shrunk because of them.
     pilots: Pilots,
     shrunk: u32,
-    /// What glances have found: the noise of records, light that is dark, how often each kind is to be estimated once more, and what noise is left then.
+    /// What glances have found: the noise of records, light that is dark, how often each kind is to be estimated once more in each region, and what noise is left then.
     noise: Noise,
     dark: f64,
-    more: ByKind<u32>,
+    more: ByKind<[u32; REGIONS]>,
     /// Of second estimates, how many times the usual samples, in sum, and how many there are.
     efforts: ByKind<[f64; 2]>,
     left: Option<f32>,
@@ -153,8 +155,9 @@ pub struct Filling<'s, F> {
     /// How often [`Filling::refine`] was called, and what records there were then.
     level: u32,
     held: ByKind<Held>,
-    /// How often records of each kind have been estimated anew since.
-    estimated: ByKind<u32>,
+    /// How often records of each kind have been estimated anew since, in the mean, and the part of them in the round at hand.
+    estimated: ByKind<f32>,
+    part: f32,
     /// From these records on nothing is final.
     before: ByKind<usize>,
     /// All records computed, by kind.
@@ -204,7 +207,7 @@ impl<'s> RadianceCaches<'s> {
         if self.photon_effort().is_some_and(|(effort, seed)| self.photons.is_made_for(&effort, seed)) {
             memory.photons = core::mem::replace(&mut self.photons, PhotonGrid::none());
         }
-        let view = asked.mark(&self.settings);
+        let (view, film) = (asked.mark(&self.settings), asked.film());
         let (before, rays) = (self.settled, self.settings.rays);
         let is_known = self.views.as_slice().contains(&view);
         let mut is_cut = false;
@@ -233,13 +236,15 @@ impl<'s> RadianceCaches<'s> {
             shrunk: 0,
             noise: Noise::default(),
             dark: 0.0,
-            more: ByKind([0; Kind::COUNT]),
+            more: ByKind([[0; REGIONS]; Kind::COUNT]),
             efforts: ByKind([[0.0; 2]; Kind::COUNT]),
             left: None,
             again: 0,
             level: 0,
             held: ByKind([Held::NONE; Kind::COUNT]),
-            estimated: ByKind([0; Kind::COUNT]),
+            estimated: ByKind([0.0; Kind::COUNT]),
+            part: 1.0,
+            film,
             before,
             all_computed: ByKind([0; Kind::COUNT]),
             photons_before: 0,

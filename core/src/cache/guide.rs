@@ -30,6 +30,8 @@ pub struct Guide {
     pub(super) seen: f32,
     /// [`Place::to_eye`](super::Place::to_eye) of the record.
     pub(super) to_eye: Option<Vec3>,
+    /// What the record covers of the film: from, and to.
+    pub(super) film: [f32; 4],
 }
 
 packed!(Guide {
@@ -39,11 +41,23 @@ packed!(Guide {
     weight: f32,
     seen: f32,
     to_eye: Option<Vec3>,
+    film: [f32; 4],
 });
+
+/// Of a record of which it is not known where it is seen.
+const WHOLE_FILM: [f32; 4] = [0.0, 0.0, 1.0, 1.0];
 
 impl Default for Guide {
     fn default() -> Self {
-        Self { squares: [0.0; CELLS], sum: 0.0, sum_of_squares: 0.0, weight: 0.0, seen: 1.0, to_eye: None }
+        Self {
+            squares: [0.0; CELLS],
+            sum: 0.0,
+            sum_of_squares: 0.0,
+            weight: 0.0,
+            seen: 1.0,
+            to_eye: None,
+            film: WHOLE_FILM,
+        }
     }
 }
 

@@ -43,11 +43,13 @@
 //! | `estimate` | [`Estimator`]: what records are made of |
 //! | `evidence` | how far gradients can be believed; edges of the sky |
 //! | `eye` | [`places`] and [`radiance`] of eye rays |
+//! | `agreement` | whether gradients of records agree with the records around them |
 //! | `audit`, `bias_map` | [`Audit`]: how far pictures from caches are off; [`BiasMap`]: where |
 //! | `refine` | levels of falling error, where time is limited |
 //! | `room` | [`Slots`] and [`room_for`]: lent memory, and how much of it is needed |
 //! | [`bytes`] | caches as bytes, to be saved |
 
+mod agreement;
 mod aim;
 mod asked;
 mod audit;

@@ -2,7 +2,8 @@
 //!
 //! The same eye rays read all caches before their records are estimated anew and after. The direct light of both readings has the same random
 //! numbers, so that what differs is the noise of records, mixed and carried as pictures have them, and nothing else. A kind whose noise
-//! weighs much, for its light or for how hard it is to find, is estimated anew more often; one that the picture hardly shows is not.
+//! weighs much, for its light or for how hard it is to find, is estimated anew more often; one that the picture hardly shows is not. So it is region by region:
+//! what is dark is seen by itself, and its records go on when those of what is bright are good enough.
 
 use super::eye::CachedRadiance;
 use super::kind::{Kind, SECOND};
@@ -11,10 +12,17 @@ use crate::sent::packed;
 use crate::spectrum::Spectrum;
 
 /// Eye rays that are read. Fewer: single dark pixels decide; more: time.
-pub(super) const RAYS: u32 = 1024;
+pub(super) const RAYS: u32 = 4096;
+
+/// Regions along each side of a picture for which noise is told apart. Fewer: what is dark and noisy is lost in what is around it; more: few rays tell
+/// of each.
+const SIDE: usize = 8;
+
+/// All regions.
+pub(super) const REGIONS: usize = SIDE * SIDE;
 
 /// Light (of the mean of a picture) that is added to that of each ray, in squares: relative errors of what is black mean nothing.
-const DARK: f64 = 0.1;
+const DARK: f64 = 0.05;
 
 /// The kinds that a picture is read from.
 const KINDS: usize = Kind::FINAL.len();
@@ -83,35 +91,62 @@ impl Left {
 
 /// Squares of what differs from reading to reading, over those of the light of each ray.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub(super) struct Noise {
+struct Sums {
     squares: [f64; KINDS],
     rays: f64,
 }
 
+/// The number of the region of a picture in which a point of the film lies.
+fn region_of(at: [f32; 2]) -> usize {
+    // Casts saturate, and take NaN to 0.
+    let [x, y] = at.map(|x| ((x * SIDE as f32) as usize).min(SIDE - 1));
+    y * SIDE + x
+}
+
+/// The numbers of the regions of a picture into which a rectangle of the film reaches, from two coordinates to two.
+pub(super) fn regions_in([x0, y0, x1, y1]: [f32; 4]) -> impl Iterator<Item = usize> {
+    let [first, last] = [[x0, y0], [x1, y1]].map(region_of);
+    let columns = first % SIDE..=last % SIDE;
+    (first / SIDE..=last / SIDE).flat_map(move |y| columns.clone().map(move |x| y * SIDE + x))
+}
+
+/// What rays have told, by region of the picture.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Noise {
+    regions: [Sums; REGIONS],
+}
+
+impl Default for Noise {
+    fn default() -> Self {
+        Self { regions: [Sums::default(); REGIONS] }
+    }
+}
+
 impl Noise {
-    /// Adds rays read `before` and after, in the same order, of a picture as dark as [`dark`] says.
-    pub(super) fn add(&mut self, before: &[Glance], after: &[Glance], dark: f64) {
-        for (before, after) in before.iter().zip(after) {
-            let all = f64::from(after.all);
-            let light = all * all + dark * dark;
-            self.rays += 1.0;
-            for ((sum, a), b) in self.squares.iter_mut().zip(before.kinds).zip(after.kinds) {
-                let difference = f64::from(a - b);
-                // Written so that what is no number counts as nothing.
-                if light > 0.0 && difference.is_finite() {
-                    *sum += difference * difference / light;
-                }
+    /// Adds a ray at a point of the film, read `before` and after, of a picture as dark as [`dark`] says.
+    pub(super) fn add(&mut self, at: [f32; 2], before: &Glance, after: &Glance, dark: f64) {
+        let sums = &mut self.regions[region_of(at)];
+        let all = f64::from(after.all);
+        let light = all * all + dark * dark;
+        sums.rays += 1.0;
+        for ((sum, a), b) in sums.squares.iter_mut().zip(before.kinds).zip(after.kinds) {
+            let difference = f64::from(a - b);
+            // Written so that what is no number counts as nothing.
+            if light > 0.0 && difference.is_finite() {
+                *sum += difference * difference / light;
             }
         }
     }
 
-    /// What each kind leaves in the picture, in the order of [`Kind::FINAL`], whose second estimates had so many times the usual samples.
-    pub(super) fn left(&self, efforts: [f64; KINDS]) -> [Left; KINDS] {
-        core::array::from_fn(|k| {
-            let between = if self.rays > 0.0 { self.squares[k] / self.rays } else { 0.0 };
-            let left = Left::between(between, efforts[k].max(1.0));
-            let smoothed = if Kind::FINAL[k].is_on_surfaces() { presets::SMOOTHED } else { 1.0 };
-            Left { variance: smoothed * left.variance, ..left }
+    /// What each kind leaves in the regions of the picture, in the order of [`Kind::FINAL`], whose second estimates had so many times the usual samples.
+    pub(super) fn left(&self, efforts: [f64; KINDS]) -> [[Left; KINDS]; REGIONS] {
+        self.regions.map(|sums| {
+            core::array::from_fn(|k| {
+                let between = if sums.rays > 0.0 { sums.squares[k] / sums.rays } else { 0.0 };
+                let left = Left::between(between, efforts[k].max(1.0));
+                let smoothed = if Kind::FINAL[k].is_on_surfaces() { presets::SMOOTHED } else { 1.0 };
+                Left { variance: smoothed * left.variance, ..left }
+            })
         })
     }
 }
@@ -165,9 +200,11 @@ mod tests {
     fn noise_is_relative_to_the_light_of_each_ray() {
         let mut noise = Noise::default();
         let before = [glance(1.0, 0.0), glance(8.0, 2.0)];
-        assert!((dark(&before) - 0.55).abs() < 1e-6);
-        noise.add(&before, &[glance(1.1, 0.0), glance(8.0, 3.0)], 0.0);
-        let [single, surface, multiple, irradiance] = noise.left([1.0; KINDS]).map(|left| left.variance);
+        assert!((dark(&before) - 0.275).abs() < 1e-6);
+        let after = [glance(1.1, 0.0), glance(8.0, 3.0)];
+        before.iter().zip(&after).for_each(|(before, after)| noise.add([0.0; 2], before, after, 0.0));
+        let left = noise.left([1.0; KINDS]);
+        let [single, surface, multiple, irradiance] = left[0].map(|left| left.variance);
         assert_eq!((single, surface), (0.0, 0.0));
         let expected = |difference: f64, light: f64| Left::between((difference / light).powi(2) / 2.0, 1.0).variance;
         assert!((multiple / expected(0.1, 1.1) - 1.0).abs() < 1e-5, "{multiple}");
@@ -175,9 +212,19 @@ mod tests {
         assert!((irradiance / expected(1.0, 11.0) - 1.0).abs() < 1e-5, "{irradiance}");
         // Rays in the dark, and light that is no number, say nothing.
         let before = noise;
-        noise.add(&[glance(0.0, 0.0)], &[glance(f32::NAN, 0.0)], 0.0);
-        assert_eq!(noise.squares, before.squares);
-        assert_eq!(Noise::default().left([1.0; KINDS]).map(|left| left.variance), [0.0; KINDS]);
+        noise.add([0.0; 2], &glance(0.0, 0.0), &glance(f32::NAN, 0.0), 0.0);
+        assert_eq!(noise.regions[0].squares, before.regions[0].squares);
+        // Nor do other regions.
+        assert!(left[1..].iter().flatten().all(|left| left.variance == 0.0));
+    }
+
+    #[test]
+    fn records_are_seen_in_the_regions_that_they_reach_into() {
+        assert!(regions_in([0.0, 0.0, 1.0, 1.0]).eq(0..REGIONS));
+        assert!(regions_in([0.3, 0.3, 0.3, 0.3]).eq([2 * SIDE + 2]));
+        assert!(regions_in([0.2, -3.0, 0.3, 0.1]).eq([1, 2]));
+        assert!(regions_in([0.95, 0.8, 9.0, 9.0]).eq([6 * SIDE + 7, 7 * SIDE + 7]));
+        assert!(regions_in([f32::NAN; 4]).eq([0]));
     }
 
     #[test]

@@ -214,30 +214,39 @@ impl Report<'_> {
             for (found, map) in repaired {
                 let places = in_places(map).map_or_else(String::new, |places| format!("; {places}"));
                 let error = rooted(&found.squared);
+                let misled =
+                    misled(found).map_or_else(String::new, |kinds| format!("; gradients of {kinds} led the wrong way"));
                 say!(
-                    "repaired: bias was {} of what is cached{}, error {error}{places}",
+                    "repaired: bias was {} of what is cached{}, error {error}{misled}{places}",
                     percent(&found.cached),
                     blamed(found)
                 );
             }
-            say!(
-                "bias {} of what is cached{}, error {}; {} of all light, by path tracing along {} eye rays",
-                percent(&findings.cached),
-                blamed(findings),
-                rooted(&findings.squared),
-                percent(&findings.all),
-                findings.rays,
-            );
+            let is_unknown = findings.cached.is_unknown() && !findings.cached.exceeds(f64::from(most));
+            if is_unknown {
+                say!(
+                    "warning: how far the picture is off is not known: what paths bring along {} eye rays varies too much to be compared with; take more --audit rays",
+                    findings.rays
+                );
+            } else {
+                let all = if findings.all.is_unknown() { "not known".to_owned() } else { percent(&findings.all) };
+                say!(
+                    "bias {} of what is cached{}, error {}; {all} of all light, by path tracing along {} eye rays",
+                    percent(&findings.cached),
+                    blamed(findings),
+                    rooted(&findings.squared),
+                    findings.rays,
+                );
+            }
             if findings.all.exceeds(f64::from(most)) || findings.cached.exceeds(f64::from(most)) {
                 say!("warning: the picture is off by more than the {due}");
             } else if findings.squared.exceeds(f64::from(most)) {
                 say!(
                     "warning: what is cached has an error of more than the {due}, in blotches that are too bright and too dark"
                 );
-            } else if findings.cached.is_unknown() {
-                say!(
-                    "warning: how far the picture is off is not known: what is cached, or paths, vary too much; take more --audit rays"
-                );
+            }
+            if let Some(kinds) = misled(findings) {
+                say!("warning: gradients of {kinds} lead the wrong way, so that light between records is wrong");
             }
             if let Some(places) = in_places(map) {
                 say!("warning: off by more than the {due} {places}");
@@ -303,7 +312,9 @@ impl Report<'_> {
             let entries = |findings: &Findings| {
                 let parts = Kind::FINAL.into_iter().filter_map(|kind| Some(entry(kind.name(), &findings.of(kind)?)));
                 let all = [entry("all", &findings.all), entry("cached", &findings.cached), square(&findings.squared)];
-                all.into_iter().chain(parts).collect::<Vec<_>>().join(", ")
+                let gradients = Kind::FINAL.into_iter().filter_map(|kind| Some(entry(kind.name(), &findings.gradients(kind)?)));
+                let gradients = format!("\"gradients\": {{{}}}", gradients.collect::<Vec<_>>().join(", "));
+                all.into_iter().chain(parts).chain([gradients]).collect::<Vec<_>>().join(", ")
             };
             let repaired: Vec<String> = repaired.iter().map(|(found, _)| format!("{{{}}}", entries(found))).collect();
             let regions = map.regions().iter().map(|region| {
@@ -365,13 +376,23 @@ fn percent(found: &Deviation) -> String {
     format!("{:+.1} ± {:.1} %", 100.0 * found.bias, 100.0 * found.error).replace('-', "−")
 }
 
-/// An error by its square, with what it may be within a standard error.
+/// An error by its square, with what it may be within a standard error: at most, where that says no more.
 fn rooted(found: &Squared) -> String {
     if !found.error.is_finite() {
         return "unknown".to_owned();
     }
     let [least, most] = found.range();
-    format!("{:.1} % ({:.1} to {:.1} %)", 100.0 * found.root(), 100.0 * least, 100.0 * most)
+    if least > 0.0 {
+        format!("{:.1} % ({:.1} to {:.1} %)", 100.0 * found.root(), 100.0 * least, 100.0 * most)
+    } else {
+        format!("{:.1} % at most", 100.0 * (found.mean.max(0.0) + found.error).sqrt())
+    }
+}
+
+/// Names of the kinds whose gradients lead the wrong way.
+fn misled(findings: &Findings) -> Option<String> {
+    let names: Vec<&str> = Kind::FINAL.into_iter().filter(|kind| findings.is_misled(*kind)).map(Kind::name).collect();
+    (!names.is_empty()).then(|| names.join(", "))
 }
 
 /// Columns and rows of a region, as `0-31`, from the upper left pixel on.

@@ -5,6 +5,7 @@ use crate::cache::asked::{Asked, Wanted};
 use crate::cache::guide::{Guide, Guided, Looks};
 use crate::cache::kind::{Kind, Pass, Step};
 use crate::cache::memory::{Estimate, FilledRecords, FillingMemory};
+use crate::cache::noise::regions_in;
 use crate::cache::slot::learnt_near;
 use crate::cache::{Effort, Record};
 use crate::host::{Medium, Scene};
@@ -128,22 +129,35 @@ impl<F> Filling<'_, F> {
         Some((around, more, count as u32))
     }
 
-    /// Begins a round in which all records from a number on are estimated anew, those with many samples by several jobs.
+    /// How often a record is to be estimated once more: as often as the region asks for it that asks for most.
+    fn rounds_of(&self, kind: Kind, offset: usize) -> u32 {
+        let (rounds, guides) = (&self.more[kind], self.memory.guides[kind].as_slice());
+        let film = guides.get(offset).map_or(Guide::default().film, |guide| guide.film);
+        regions_in(film).map(|region| rounds[region]).max().unwrap_or(0)
+    }
+
+    /// Begins a round in which records from a number on are estimated anew, those with many samples by several jobs.
     pub(super) fn begin_again(&mut self, (step, effort): (Step, Effort), from: usize) {
         let records = self.caches.slots[step.kind].records();
         // Half as far again as usual reach those that most pixels see: they alone get all samples.
         self.usual = 1.5 * usual_radius(records);
         self.bright = usual_value(records);
-        let count = records.len() - from;
+        let (count, is_more) = (records.len() - from, matches!(step.pass, Pass::More { .. }));
         self.memory.estimates.clear();
         self.memory.higher.clear();
         self.memory.open.clear();
+        let mut taken = 0;
         for offset in 0..count {
+            if is_more && self.rounds_of(step.kind, offset) < self.again {
+                continue;
+            }
+            taken += 1;
             let samples = self.anew((step, effort), from + offset, offset).map_or(0, |(.., samples)| samples);
             for _ in 0..samples.div_ceil(effort.samples.max(1)).max(1) {
                 self.is_cut |= self.memory.open.push(offset as u32).is_err();
             }
         }
+        self.part = taken as f32 / count as f32;
         let jobs = self.memory.open.len() as u32;
         self.enter(Round::Again { from: from as u32 }, jobs);
     }

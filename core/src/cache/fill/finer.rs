@@ -4,7 +4,7 @@ use super::{Filling, RAYS_PER_JOB, Round};
 use crate::cache::asked::Asked;
 use crate::cache::guide::Guide;
 use crate::cache::kind::{Kind, Pass, Step};
-use crate::cache::noise::Noise;
+use crate::cache::noise::{Noise, REGIONS};
 use crate::cache::radius::Limits;
 use crate::cache::settings::{Effort, Settings};
 use crate::cache::slot::ByKind;
@@ -144,7 +144,7 @@ impl<'s, F: Fn([f32; 2]) -> Ray> Filling<'s, F> {
         self.level += 1;
         self.view = self.asked.mark(&self.caches.settings);
         (self.noise, self.dark, self.left, self.again) = (Noise::default(), 0.0, None, 0);
-        (self.more, self.estimated) = (ByKind([0; Kind::COUNT]), ByKind([0; Kind::COUNT]));
+        (self.more, self.estimated) = (ByKind([[0; REGIONS]; Kind::COUNT]), ByKind([0.0; Kind::COUNT]));
         self.efforts = ByKind([[0.0; 2]; Kind::COUNT]);
         self.all_computed = ByKind([0; Kind::COUNT]);
         self.enter(Round::Search, self.settings().rays.div_ceil(RAYS_PER_JOB));
@@ -177,10 +177,10 @@ impl<F> Filling<'_, F> {
         self.is_cut |= !is_room;
     }
 
-    /// Counts a round of estimates of the kind at hand.
+    /// Counts a round of estimates of the kind at hand, by the part of its records that were estimated.
     pub(super) fn count_estimates(&mut self) {
         if let Some((Step { kind, pass: Pass::Again { .. } | Pass::More { .. } }, _)) = self.at_hand() {
-            self.estimated[kind] += 1;
+            self.estimated[kind] += self.part;
         }
     }
 
@@ -191,7 +191,7 @@ impl<F> Filling<'_, F> {
             let Some(effort) = self.settings().effort(kind).filter(|_| count > 0) else { continue };
             let held = self.held[kind];
             let kept = COARSER * held.samples * held.count.min(count) as f32 / count as f32;
-            let samples = kept + self.estimated[kind] as f32 * effort.samples as f32;
+            let samples = kept + self.estimated[kind] * effort.samples as f32;
             self.held[kind] = Held { count, samples, ..held };
         }
     }

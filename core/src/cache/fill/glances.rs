@@ -55,14 +55,19 @@ impl<F> Filling<'_, F> {
     /// Takes the readings of a job.
     pub(super) fn take_glances(&mut self, glances: &[Glance], is_second: bool) {
         if is_second {
-            let before = self.memory.glances.as_slice().get((self.taken * RAYS_PER_JOB) as usize..);
-            self.noise.add(before.unwrap_or(&[]), glances, self.dark);
+            let first = self.taken * RAYS_PER_JOB;
+            let before = self.memory.glances.as_slice().get(first as usize..).unwrap_or(&[]);
+            for (number, (before, after)) in (first..).zip(before.iter().zip(glances)) {
+                let at = Asked::at(self.caches.settings.rays.wrapping_add(number));
+                self.noise.add(at, before, after, self.dark);
+            }
         } else {
             self.is_cut |= self.memory.glances.extend_from_slice(glances).is_err();
         }
     }
 
-    /// How often each kind is to be estimated once more, for what the glances have told.
+    /// How often each kind is to be estimated once more in each region of the picture, for what the glances have told there. Work and its price are taken for
+    /// those of a picture that is all as the region is.
     pub(super) fn plan_more(&mut self) {
         let most = presets::record_noise(self.settings().error);
         let efforts = Kind::FINAL.map(|kind| self.efforts[kind][0] / self.efforts[kind][1]);
@@ -74,8 +79,12 @@ impl<F> Filling<'_, F> {
         // Blind estimates, and second ones with all their samples; about, for nothing hangs on it but where it stops to pay.
         let spent = self.walks() as f64 + costs.iter().sum::<f64>();
         let coarser = Kind::FINAL.map(|kind| self.settings().coarser[kind as usize]);
-        let rounds = rounds_for(&left, (costs, coarser), most * most, spent);
-        Kind::FINAL.into_iter().zip(rounds).for_each(|(kind, rounds)| self.more[kind] = rounds);
-        self.left = Some(libm::sqrt(noise::variance_after(&left, rounds)) as f32);
+        let mut variance = 0.0;
+        for (region, left) in left.iter().enumerate() {
+            let rounds = rounds_for(left, (costs, coarser), most * most, spent);
+            Kind::FINAL.into_iter().zip(rounds).for_each(|(kind, rounds)| self.more[kind][region] = rounds);
+            variance += noise::variance_after(left, rounds) / noise::REGIONS as f64;
+        }
+        self.left = Some(libm::sqrt(variance) as f32);
     }
 }

@@ -43,7 +43,7 @@ impl<F> Filling<'_, F> {
                         return;
                     }
                 }
-                Pass::More { .. } if self.more[step.kind] == 0 => {}
+                Pass::More { .. } if self.more[step.kind].iter().all(|rounds| *rounds == 0) => {}
                 Pass::Again { .. } | Pass::More { .. } => {
                     let from = self.before[step.kind].min(slot.len());
                     if slot.len() > from {
@@ -149,10 +149,13 @@ impl<F> Filling<'_, F> {
     pub(super) fn insert(&mut self) -> u32 {
         let Some((step, effort)) = self.at_hand() else { return 0 };
         let Some(reading) = self.strict(step.kind) else { return 0 };
+        let film = self.film;
+        let FillingMemory { wanted, chosen, estimates, higher, guides, .. } = &mut self.memory;
+        let (wanted, chosen) = (wanted.as_slice(), chosen.as_slice());
         let slot = &mut self.caches.slots[step.kind];
         let stride = slot.stride();
         let mut added = 0;
-        for (i, estimate) in self.memory.estimates.as_slice().iter().enumerate() {
+        for (i, estimate) in estimates.as_slice().iter().enumerate() {
             self.computed += 1;
             self.all_computed[step.kind] += 1;
             let Estimate { place, sums, limits, .. } = estimate;
@@ -160,10 +163,14 @@ impl<F> Filling<'_, F> {
             if slot.covers(place, &reading) {
                 continue;
             }
-            let attached = attached(step.kind, estimate, self.memory.higher.as_slice(), i, stride);
+            let attached = attached(step.kind, estimate, higher.as_slice(), i, stride);
             match slot.insert(record, attached) {
                 Inserted::Added => {
-                    self.is_cut |= self.memory.guides[step.kind].push(estimate.learnt).is_err();
+                    let asked = chosen.get(estimate.number as usize).and_then(|(from, _)| wanted.get(*from as usize));
+                    let film = asked.map_or(estimate.learnt.film, |from| from.on_film(record.radius, film));
+                    let mut guide = estimate.learnt;
+                    guide.film = film;
+                    self.is_cut |= guides[step.kind].push(guide).is_err();
                     added += 1;
                 }
                 Inserted::LeftOut => {}
@@ -176,11 +183,11 @@ impl<F> Filling<'_, F> {
     /// Counts a round of more estimates; whether others follow.
     pub(super) fn take_round(&mut self) -> bool {
         let Some((Step { kind, pass: Pass::More { .. } }, _)) = self.at_hand() else { return false };
-        self.more[kind] = self.more[kind].saturating_sub(1);
-        if self.more[kind] == 0 {
+        let are_more = self.more[kind].iter().any(|rounds| *rounds > self.again);
+        if !are_more {
             self.again = 0;
         }
-        self.more[kind] > 0
+        are_more
     }
 
     /// Mixes the estimates of a round into the records from a number on, and adds to what was learnt.
