@@ -2,8 +2,12 @@
 // alpha (NAME-sh0.ktx2 and so on), one of the medium (NAME-medium.ktx2: albedo, extinction in alpha), and two of the surfaces around probes
 // (NAME-wall0.ktx2, NAME-wall1.ktx2: a point at an offset o, in cells, is behind one where dot(o, wall) > 1).
 //
+// Of a bake with --refine, all of these are atlases: first the probes of all cells, and above them in z bricks of 4 x 4 x 4 probes of half the spacing, and
+// so on. NAME-index.ktx2 says for each brick of each finer level at which texel it begins, with 1 in alpha where it is there; alpha of wall0 is 1
+// where a probe has neighbours of its level on all sides. Without finer levels, bind a texture of one texel as `index`.
+//
 // Copy it into your shader. The textures are read texel by texel, because probes in walls, and those behind a wall, must have no part in what is mixed: no sampler
-// is needed. Where no wall is thinner than a cell, bind textures of one texel, all 0, as `wall0` and `wall1`.
+// is needed. Where no wall is thinner than a cell, and without finer levels, bind textures of one texel, all 0, as `wall0` and `wall1`.
 
 struct Probes {
     // The box: its corner, and its size (m).
@@ -13,6 +17,9 @@ struct Probes {
     size: vec3<f32>,
     // Numbers of a probe: 1, 4 or 9. What is bound beyond them is not read.
     numbers: u32,
+    // Probes along x, y and z in the box, and how many finer levels there are (fogbow.counts, fogbow.levels). With none, counts are not read.
+    counts: vec3<u32>,
+    levels: u32,
 }
 
 @group(0) @binding(0) var<uniform> probes: Probes;
@@ -28,24 +35,51 @@ struct Probes {
 @group(0) @binding(10) var medium: texture_3d<f32>;
 @group(0) @binding(11) var wall0: texture_3d<f32>;
 @group(0) @binding(12) var wall1: texture_3d<f32>;
+@group(0) @binding(13) var index: texture_3d<f32>;
 
-// The eight probes around a point: the texel of the lowest, of the highest, and how far between them the point lies.
+// The eight cells of a level around a point: the lowest, the highest, how far between them the point lies, where their probes are, and what part
+// they have in the light.
 struct Around {
     low: vec3<i32>,
     high: vec3<i32>,
     share: vec3<f32>,
+    texels: array<vec3<i32>, 8>,
+    part: f32,
 }
 
-fn around(point: vec3<f32>) -> Around {
-    let counts = vec3<f32>(textureDimensions(sh0));
+fn around(point: vec3<f32>, level: u32) -> Around {
+    let all = select(probes.counts, textureDimensions(sh0), vec3<bool>(probes.levels == 0u));
+    let counts = vec3<f32>(all << vec3<u32>(level));
     // Probes stand in the centres of cells. Beyond the outermost the nearest of them counts.
     let at = clamp((point - probes.corner) / probes.size * counts - 0.5, vec3<f32>(0.0), counts - 1.0);
     let low = min(floor(at), max(counts - 2.0, vec3<f32>(0.0)));
     let high = min(low + 1.0, counts - 1.0);
-    return Around(vec3<i32>(low), vec3<i32>(high), at - low);
+    var place = Around(vec3<i32>(low), vec3<i32>(high), at - low, array<vec3<i32>, 8>(), 1.0);
+    // Levels before this one in the index.
+    var layer = 0;
+    for (var other = 1u; other < level; other++) {
+        layer += i32(((all.z << other) + 3u) / 4u);
+    }
+    // A finer level has a part within those probes that have neighbours on all sides: all eight are there, then.
+    var part = 0.0;
+    var inner = 0u;
+    for (var corner = 0u; corner < 8u; corner++) {
+        var texel = corner_cell(place, corner);
+        if level > 0u {
+            let brick = textureLoad(index, texel / 4 + vec3<i32>(0, 0, layer), 0);
+            texel = vec3<i32>(brick.xyz) + texel % 4;
+            if brick.a * textureLoad(wall0, texel, 0).a > 0.0 {
+                part += corner_weight(place, corner);
+                inner++;
+            }
+        }
+        place.texels[corner] = texel;
+    }
+    place.part = select(min(part, 1.0), 1.0, level == 0u || inner == 8u);
+    return place;
 }
 
-fn corner_texel(place: Around, corner: u32) -> vec3<i32> {
+fn corner_cell(place: Around, corner: u32) -> vec3<i32> {
     let is_high = vec3<bool>((corner & 1u) != 0u, (corner & 2u) != 0u, (corner & 4u) != 0u);
     return select(place.low, place.high, is_high);
 }
@@ -57,8 +91,7 @@ fn corner_weight(place: Around, corner: u32) -> f32 {
 }
 
 // How much of a part a probe of the eight has in the light: 1 before a surface, next to none behind it.
-fn sees(place: Around, corner: u32) -> f32 {
-    let texel = corner_texel(place, corner);
+fn sees(place: Around, corner: u32, texel: vec3<i32>) -> f32 {
     let is_high = vec3<bool>((corner & 1u) != 0u, (corner & 2u) != 0u, (corner & 4u) != 0u);
     let near = textureLoad(wall0, min(texel, vec3<i32>(textureDimensions(wall0)) - 1), 0).rgb;
     let other = textureLoad(wall1, min(texel, vec3<i32>(textureDimensions(wall1)) - 1), 0).rgb;
@@ -70,21 +103,26 @@ fn sees(place: Around, corner: u32) -> f32 {
 }
 
 // In-scattered radiance (W/(m^2 sr)) at a point towards the eye (unit): the phase function is in it, the scattering coefficient is not.
-// sum(w v s c) / sum(w v s) over the eight probes around, v: 1 where a probe is valid, s: whether it sees the point; sum(w c) where none is valid.
+// sum(w v s c) / sum(w v s) over the eight probes around, v: 1 where a probe is valid, s: whether it sees the point; sum(w c) where none is valid. Where a finer level
+// ends, over its probes and those of the coarser one: weights go over from one into the other.
 fn in_scattered(point: vec3<f32>, to_eye: vec3<f32>) -> vec3<f32> {
-    let place = around(point);
     var light = vec3<f32>(0.0);
     var hidden = vec3<f32>(0.0);
     var valid = 0.0;
-    for (var corner = 0u; corner < 8u; corner++) {
-        let texel = corner_texel(place, corner);
-        let weight = corner_weight(place, corner);
-        let first = textureLoad(sh0, texel, 0);
-        let seen = expansion(first.rgb, texel, to_eye);
-        let part = weight * first.a * sees(place, corner);
-        light += part * seen;
-        hidden += weight * seen;
-        valid += part;
+    var rest = 1.0;
+    for (var level = probes.levels + 1u; level > 0u && rest > 0.0; level--) {
+        var place = around(point, level - 1u);
+        for (var corner = 0u; corner < 8u && place.part > 0.0; corner++) {
+            let texel = place.texels[corner];
+            let weight = rest * place.part * corner_weight(place, corner);
+            let first = textureLoad(sh0, texel, 0);
+            let seen = expansion(first.rgb, texel, to_eye);
+            let part = weight * first.a * sees(place, corner, texel);
+            light += part * seen;
+            hidden += weight * seen;
+            valid += part;
+        }
+        rest *= 1.0 - place.part;
     }
     return max(select(hidden, light / valid, valid > 0.0), vec3<f32>(0.0)) / probes.scale;
 }
@@ -105,10 +143,14 @@ fn expansion(first: vec3<f32>, texel: vec3<i32>, d: vec3<f32>) -> vec3<f32> {
 
 // Albedo, and extinction (1/m) in alpha.
 fn matter(point: vec3<f32>) -> vec4<f32> {
-    let place = around(point);
     var sum = vec4<f32>(0.0);
-    for (var corner = 0u; corner < 8u; corner++) {
-        sum += corner_weight(place, corner) * textureLoad(medium, corner_texel(place, corner), 0);
+    var rest = 1.0;
+    for (var level = probes.levels + 1u; level > 0u && rest > 0.0; level--) {
+        var place = around(point, level - 1u);
+        for (var corner = 0u; corner < 8u && place.part > 0.0; corner++) {
+            sum += rest * place.part * corner_weight(place, corner) * textureLoad(medium, place.texels[corner], 0);
+        }
+        rest *= 1.0 - place.part;
     }
     return sum;
 }

@@ -9,8 +9,8 @@ use glam::Vec3;
 
 use super::arriving::{Sampler, phase_at};
 use super::basis::MOST_COEFFICIENTS;
-use super::flights::{FlightMemory, PROBES, PhotonFlight, Photons, open_share};
-use super::grid::{BakeMemory, Brick, Probe, ProbeGrid, WALLS_AT};
+use super::flights::{FlightMemory, PhotonFlight, Photons, open_share};
+use super::grid::{BakeMemory, Brick, INNER, PROBES, Probe, ProbeGrid, WALLS_AT};
 use super::places;
 use super::settings::{BakeError, BakeSettings};
 use crate::cache::RadianceCaches;
@@ -153,6 +153,7 @@ impl<'s, 'c> Bake<'s, 'c> {
     ///     deviations: (&mut deviations[..]).into(),
     ///     probes: (&mut probes[..]).into(),
     ///     bricks: (&mut bricks[..]).into(),
+    ///     places: (&mut [][..]).into(), // of a grid that has all probes, none
     /// };
     /// let mut bake = Bake::new_in(memory, settings)?;
     /// let (mut of_job, mut beside) = ([Spectrum::ZERO; 64], [Probe::default(); 64]);
@@ -198,7 +199,7 @@ impl<'s, 'c> Bake<'s, 'c> {
     /// ```
     pub fn resume(grid: ProbeGrid<'s>, settings: BakeSettings) -> Result<Self, BakeError> {
         let held = (settings.basis, settings.quantity, settings.orders);
-        if settings.lattice()? != grid.lattice || held != (grid.basis, grid.quantity, grid.orders) {
+        if settings.cells(!grid.is_sparse())? != grid.lattice || held != (grid.basis, grid.quantity, grid.orders) {
             return Err(BakeError::Grid);
         }
         let mut bake = Self::over(grid, settings);
@@ -377,7 +378,7 @@ impl<'s, 'c> Bake<'s, 'c> {
                 let centre = lattice.centre(index);
                 (centre + half).cmpge(bounds.min).all() && (centre - half).cmple(bounds.max).all()
             };
-            if self.grid.in_brick(brick).any(touches) {
+            if self.grid.in_brick(brick).any(|(_, cell)| touches(cell)) {
                 self.grid.memory.bricks.as_mut_slice()[brick] = Brick { passes: 0, due: 1 };
             }
         }
@@ -417,7 +418,7 @@ impl<'s, 'c> Bake<'s, 'c> {
     fn plan(&mut self) {
         let of_mean = |mean: f32| f64::from(mean) * self.grid.basis.number_of_mean(self.grid.quantity);
         let level = self.settings.level.map_or_else(|| self.grid.level_of_numbers(), of_mean);
-        let times = self.photons.is_some().then(|| self.grid.relative_error() / self.settings.error);
+        let times = self.photons.is_some().then(|| self.grid.error_over(level) / self.settings.error);
         let bricks = self.grid.memory.bricks.as_slice();
         let most = bricks.iter().map(|brick| brick.passes).max().unwrap_or(0);
         let (mut due, mut done) = (0_u32, 0.0_f32);
@@ -441,11 +442,12 @@ impl<'s, 'c> Bake<'s, 'c> {
     /// The share of a brick's passes that it has; `None` where it has all.
     fn share_of_brick(&self, brick: usize, level: f64) -> Option<f32> {
         let Self { settings, grid, .. } = self;
-        let (sum, numbers) = grid.squared_errors(grid.in_brick(brick));
+        let numbers_of = || grid.in_brick(brick).map(|(number, _)| number);
+        let (sum, numbers) = grid.squared_errors(numbers_of());
         let relative = libm::sqrt(sum / f64::from(numbers.max(1))) / level;
         let Brick { passes, .. } = grid.memory.bricks.as_slice()[brick];
         // Where nothing is random nothing is gained; but what is black so far may have rare light.
-        let is_lit = || grid.in_brick(brick).any(|index| grid.held(index).iter().any(|number| !number.is_black()));
+        let is_lit = || numbers_of().any(|index| grid.held(index).iter().any(|number| !number.is_black()));
         let is_known = sum == 0.0 && passes >= 2 && is_lit();
         // In the dark the quotient is no number, and all is good.
         let is_good = is_known || passes >= LEAST_PASSES && !(relative > f64::from(settings.error));
@@ -460,7 +462,7 @@ impl<'s, 'c> Bake<'s, 'c> {
     fn share_by_photons(&self, brick: usize, most: u32, times: f32) -> Option<f32> {
         let Self { settings, grid, .. } = self;
         let Brick { passes, .. } = grid.memory.bricks.as_slice()[brick];
-        let is_empty = || !grid.in_brick(brick).any(|index| grid.probes()[index].is_valid());
+        let is_empty = || !grid.in_brick(brick).any(|(number, _)| grid.probes()[number].is_valid());
         let is_enough = passes >= LEAST_PASSES && times <= 1.0 || passes >= settings.most_passes;
         if passes == 0 || passes == most && is_enough || is_empty() {
             return None;
@@ -505,23 +507,29 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Rounds<World<'_, M, S>> for Bake<'_,
             return;
         }
         let (cell, each) = (grid.lattice.cell(), grid.basis.count());
-        let known = |index: usize| {
-            let point = grid.lattice.centre(index);
-            if passes == 0 { looked_at(point, cell, world, settings) } else { grid.probes()[index] }
+        let known = |(number, at): (usize, usize)| {
+            let point = grid.lattice.centre(at);
+            let held = grid.probes()[number];
+            if passes > 0 {
+                return held;
+            }
+            let probe = looked_at(point, cell, world, settings);
+            Probe { state: probe.state | held.state & INNER, ..probe }
         };
         let seen: heapless::Vec<Probe, PROBES> = grid.in_brick(job as usize).map(known).collect();
         let mut all = [[Spectrum::ZERO; MOST_COEFFICIENTS]; PROBES];
         if let Some(photons) = &self.photons {
-            let phase = |index| phase_at(grid.lattice.centre(index), world, settings);
+            let phase = |(_, at)| phase_at(grid.lattice.centre(at), world, settings);
             let phases: heapless::Vec<Phase, PROBES> = grid.in_brick(job as usize).map(phase).collect();
             photons.add(grid, job as usize, &seen, &phases, &mut all);
         }
         let sampler = Sampler { settings, caches: self.caches, has_photons: self.photons.is_some() };
-        for ((index, probe), held) in grid.in_brick(job as usize).zip(&seen).zip(&mut all) {
+        for (((_, at), probe), held) in grid.in_brick(job as usize).zip(&seen).zip(&mut all) {
             let held = &mut held[..each];
             if probe.is_valid() {
-                let mut rng = independent(settings.seed, BAKE_KEY | index as u64, passes);
-                sampler.sample(grid.lattice.centre(index), world, &mut rng, held);
+                // By the cell, whichever others are baked: bricks of a grid that has some alone are those of one that has all.
+                let mut rng = independent(settings.seed, BAKE_KEY | at as u64, passes);
+                sampler.sample(grid.lattice.centre(at), world, &mut rng, held);
                 // No light is better than no number, which would be in all that is mixed with it.
                 held.iter_mut().filter(|number| !number.is_finite()).for_each(|number| *number = Spectrum::ZERO);
             }
@@ -546,7 +554,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Rounds<World<'_, M, S>> for Bake<'_,
         let Brick { passes, due } = grid.memory.bricks.as_slice()[brick];
         if passes < due && !output.is_cut {
             let found = output.values.as_slice().chunks_exact(each).zip(output.probes.as_slice());
-            for (index, (held, probe)) in grid.in_brick(brick).zip(found) {
+            for ((index, _), (held, probe)) in grid.in_brick(brick).zip(found) {
                 let BakeMemory { values, deviations, probes, .. } = &mut grid.memory;
                 probes.as_mut_slice()[index] = *probe;
                 let values = &mut values.as_mut_slice()[index * each..][..each];

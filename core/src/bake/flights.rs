@@ -11,7 +11,7 @@ use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
 use super::basis::{Parts, ProbeBasis, Projection, Quantity};
-use super::grid::{BRICK, Probe, ProbeGrid};
+use super::grid::{BRICK, PROBES, Probe, ProbeGrid};
 use super::places::PLANES;
 use super::settings::BakeSettings;
 use crate::covariance::Lattice;
@@ -47,9 +47,6 @@ const LEAST_ROOM: f32 = 0.25;
 
 /// Points that tell how large a part of a cell is: to a few parts in a thousand.
 const VOLUME_POINTS: u32 = 1024;
-
-/// Most probes of a brick.
-pub(super) const PROBES: usize = (BRICK * BRICK * BRICK) as usize;
 
 /// A photon's flight within the box.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Pod, Zeroable)]
@@ -176,7 +173,8 @@ impl<'s> Photons<'s> {
         let starts = starts.as_mut_slice();
         let for_each = |visit: &mut dyn FnMut(u32, usize)| {
             for (number, flight) in (0..).zip(flights.as_slice()) {
-                bricks.cells(&flight.ray()).for_each(|crossing| visit(number, crossing.cell));
+                let crossed = bricks.cells(&flight.ray()).filter(|crossing| grid.brick_at(crossing.cell).is_some());
+                crossed.for_each(|crossing| visit(number, crossing.cell));
             }
         };
         for_each(&mut |_, brick| starts[brick] += 1);
@@ -223,7 +221,7 @@ impl<'s> Photons<'s> {
         let projections: heapless::Vec<Projection<'_>, PROBES> =
             phases.iter().map(|phase| Projection::new(basis, quantity, phase)).collect();
         let mut y = [0.0; super::MOST_COEFFICIENTS];
-        for flight in self.across(brick) {
+        for flight in self.across(grid.place(brick)) {
             let ray = flight.ray();
             // The same for all cells; what the phase function does to it comes last.
             let mut light = [Spectrum::ZERO; super::MOST_COEFFICIENTS];

@@ -4,6 +4,7 @@ use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
 use super::basis::{MOST_COEFFICIENTS, Orders, ProbeBasis, Quantity};
+use super::levels;
 use super::settings::{BakeError, BakeSettings};
 use crate::covariance::Lattice;
 use crate::math::Bounds;
@@ -13,6 +14,9 @@ use crate::storage::{Full, List};
 
 /// Probes along each side of a brick, which a job bakes.
 pub(super) const BRICK: u32 = 4;
+
+/// Most probes of a brick.
+pub(super) const PROBES: usize = (BRICK * BRICK * BRICK) as usize;
 
 /// One over the share of the way to a surface within which a probe's part falls to nothing. Larger: light jumps where a surface ends in the open. Smaller: probes
 /// near a surface have a part in less.
@@ -52,13 +56,16 @@ pub struct Probe {
     pub(super) fourth: Vec3,
     /// What share of its cell photons count in.
     pub(super) open: f32,
-    /// A [`ProbeState`] by its number, in [`STATE`]; in [`WALLS`], bits for x, y and z where a surface stands before the next probe. Above that, marks of a dilation
+    /// A [`ProbeState`] by its number, in [`STATE`]; [`INNER`]; in [`WALLS`], bits for x, y and z where a surface stands before the next probe. Above that, marks of a dilation
     /// under way.
     pub(super) state: u32,
 }
 
 /// Bits of a state.
 pub(super) const STATE: u32 = 7;
+
+/// The bit of a probe of some bricks alone that has probes all around.
+pub(super) const INNER: u32 = 8;
 
 /// Bits of surfaces towards the next probes.
 pub(super) const WALLS: u32 = 7 << WALLS_AT;
@@ -127,6 +134,17 @@ impl Probe {
         ((1.0 - s) * SOFT).clamp(0.0, 1.0) + HIDDEN / (fourth * fourth)
     }
 
+    /// Whether a probe of a level that has some bricks alone has neighbours of that level on all sides: within a cell of probes that have not, look-ups go over into the coarser level.
+    ///
+    /// ```
+    /// # use fogbow::bake::Probe;
+    /// assert!(!Probe::default().is_inner());
+    /// ```
+    #[must_use]
+    pub fn is_inner(&self) -> bool {
+        self.state & INNER != 0
+    }
+
     pub(super) fn is_valid(&self) -> bool {
         self.state & STATE == ProbeState::Valid as u32
     }
@@ -154,6 +172,20 @@ pub struct BakeMemory<'s> {
     pub probes: List<'s, Probe>,
     /// One for 4 × 4 × 4 probes.
     pub bricks: List<'s, Brick>,
+    /// Of a grid that has some bricks alone ([`ProbeGrid::finer`]), where each of them is; of others none.
+    pub places: List<'s, u32>,
+}
+
+impl BakeMemory<'_> {
+    pub(super) fn nothing() -> Self {
+        Self {
+            values: (&mut [][..]).into(),
+            deviations: (&mut [][..]).into(),
+            probes: (&mut [][..]).into(),
+            bricks: (&mut [][..]).into(),
+            places: (&mut [][..]).into(),
+        }
+    }
 }
 
 /// How far one grid is from another: see [`ProbeGrid::deviation`].
@@ -231,8 +263,9 @@ impl<'s> ProbeGrid<'s> {
         let mut grid = Self { lattice, basis, quantity, orders, memory };
         let (probes, numbers) = (lattice.cell_count(), lattice.cell_count() * settings.basis.count());
         let bricks = grid.brick_counts().iter().map(|&n| n as usize).product();
-        let BakeMemory { values, deviations, probes: states, bricks: progress } = &mut grid.memory;
+        let BakeMemory { values, deviations, probes: states, bricks: progress, places } = &mut grid.memory;
         let mut reset = || {
+            places.clear();
             values.reset(numbers, Spectrum::ZERO)?;
             deviations.reset(numbers, 0.0)?;
             states.reset(probes, Probe::default())?;
@@ -244,7 +277,7 @@ impl<'s> ProbeGrid<'s> {
 }
 
 impl ProbeGrid<'_> {
-    /// The cells, with a probe in the centre of each.
+    /// The cells, with a probe in the centre of each; of a grid that has some bricks alone ([`ProbeGrid::finer`]), of some.
     #[must_use]
     pub fn lattice(&self) -> &Lattice {
         &self.lattice
@@ -277,7 +310,8 @@ impl ProbeGrid<'_> {
         &self.memory.values.as_slice()[self.numbers(index)]
     }
 
-    /// What lies beside the light of the probes, in the order of the cells.
+    /// What lies beside the light of the probes, in the order of the cells; of a grid that has some bricks alone, 64 for each brick in the order of
+    /// [`ProbeGrid::places`], x first in each, with unknown ones beyond the border of the box.
     #[must_use]
     pub fn probes(&self) -> &[Probe] {
         self.memory.probes.as_slice()
@@ -305,8 +339,13 @@ impl ProbeGrid<'_> {
     /// [`ProbeGrid::error`]. 0 in the dark.
     #[must_use]
     pub fn relative_error(&self) -> f32 {
-        let (sum, numbers) = self.squared_errors(0..self.lattice.cell_count());
-        let error = libm::sqrt(sum / f64::from(numbers.max(1))) / self.level_of_numbers();
+        self.error_over(self.level_of_numbers())
+    }
+
+    /// The same in proportion to a mean of numbers.
+    pub(super) fn error_over(&self, level: f64) -> f32 {
+        let (sum, numbers) = self.squared_errors(0..self.probes().len());
+        let error = libm::sqrt(sum / f64::from(numbers.max(1))) / level;
         // In the dark there is nothing to be in proportion to.
         if error.is_nan() { 0.0 } else { error as f32 }
     }
@@ -362,19 +401,21 @@ impl ProbeGrid<'_> {
     /// probes around a point, whatever they are. Look-ups here leave out those behind a surface.
     #[must_use]
     pub fn leaks(&self) -> usize {
-        let [nx, ny, _] = self.lattice.size().map(|n| n as usize);
-        let next = [1, nx, nx * ny];
-        let valid = |index: usize| self.probes().get(index).is_some_and(Probe::is_valid);
-        let of = |(index, probe): (usize, &Probe)| {
+        let of = |(number, probe): (usize, &Probe)| {
             let walls = probe.walls();
-            (0..3).filter(|axis| walls[*axis] && probe.is_valid() && valid(index + next[*axis])).count()
+            let leaks = |axis: &usize| {
+                walls[*axis]
+                    && probe.is_valid()
+                    && self.beside(number, *axis, 1).is_some_and(|next| self.probes()[next].is_valid())
+            };
+            (0..3).filter(leaks).count()
         };
         self.probes().iter().enumerate().map(of).sum()
     }
 
     /// How far look-ups half way from a probe to its neighbours are off because the grid is too coarse for how light varies (in the unit of light),
-    /// a root mean square over numbers: an eighth of the second differences along the axes, added up, without what their standard errors explain. 0 where probes or neighbours
-    /// are not valid, and at the borders of the box.
+    /// a root mean square over numbers: an eighth of the second differences along the axes, added up, without what their standard errors explain. Nothing along axes where probes
+    /// or neighbours are not valid or not there.
     ///
     /// Exact where light changes quadratically; at the edge of a shadow about right; of what varies between two probes and not at them, nothing is known.
     ///
@@ -382,12 +423,12 @@ impl ProbeGrid<'_> {
     /// If there is no such probe.
     #[must_use]
     pub fn coarseness(&self, index: usize) -> f32 {
-        let size = self.lattice.size().map(|n| n as usize);
-        let at = [index % size[0], index / size[0] % size[1], index / (size[0] * size[1])];
-        let strides = [1, size[0], size[0] * size[1]];
         let mut sum = 0.0;
-        for axis in (0..3).filter(|axis| at[*axis] > 0 && at[*axis] + 1 < size[*axis]) {
-            let three = [index - strides[axis], index, index + strides[axis]];
+        for axis in 0..3 {
+            let (Some(before), Some(after)) = (self.beside(index, axis, -1), self.beside(index, axis, 1)) else {
+                continue;
+            };
+            let three = [before, index, after];
             if !three.iter().all(|probe| self.probes()[*probe].is_valid()) {
                 continue;
             }
@@ -434,31 +475,22 @@ impl ProbeGrid<'_> {
     ///
     /// Where no probe is valid, `Σ w c`: what [`ProbeGrid::dilate`] has left there.
     pub fn look_up(&self, point: Vec3, held: &mut [Spectrum]) -> f32 {
+        levels::mix(core::slice::from_ref(self), point, held)
+    }
+
+    /// The cells around a point, or of the nearest of the outermost probes: the number of each one's probe, if it is there, its trilinear weight, and where the point lies as seen from it, in cells.
+    #[inline]
+    pub(super) fn around(&self, point: Vec3) -> [(Option<usize>, f32, Vec3); 8] {
         let bounds = self.lattice.bounds();
         let point = point.clamp(bounds.min, bounds.max);
         let around = self.lattice.around(point).unwrap_or_default();
         // Beyond the outermost probes, as at them.
         let cell = self.lattice.cell();
         let inside = point.max(bounds.min + 0.5 * cell).min(bounds.max - 0.5 * cell);
-        let (mut share, mut total) = (0.0, 0.0);
-        let parts = around.map(|(index, weight)| {
-            let probe = &self.probes()[index];
-            if !(weight > 0.0 && probe.is_valid()) {
-                return 0.0;
-            }
-            let part = weight * probe.sees((inside - self.lattice.centre(index)) / cell);
-            share += weight;
-            total += part;
-            part
-        });
-        held.fill(Spectrum::ZERO);
-        for ((index, weight), part) in around.into_iter().zip(parts) {
-            let weight = if total > 0.0 { part / total } else { weight };
-            if weight > 0.0 {
-                held.iter_mut().zip(self.held(index)).for_each(|(sum, value)| *sum += *value * weight);
-            }
-        }
-        share
+        around.map(|(index, weight)| {
+            let offset = (inside - self.lattice.centre(index)) / cell;
+            (self.number_of(index), weight, offset)
+        })
     }
 
     /// The light at `point` in a direction (unit): in-scattered radiance (W·m⁻²·sr⁻¹, without `σₛ`) towards it, or irradiance (W·m⁻²) of
@@ -485,7 +517,7 @@ impl ProbeGrid<'_> {
             let [a, b] = [self, unbiased].map(|grid| f64::from(grid.error(index, number)));
             a * a + b * b
         };
-        for index in (0..self.lattice.cell_count()).filter(|index| known(*index)) {
+        for index in (0..self.probes().len()).filter(|index| known(*index)) {
             let (held, due) = (self.held(index), unbiased.held(index));
             level += f64::from(self.basis.level(due));
             bias += f64::from(self.basis.level(held) - self.basis.level(due));
@@ -511,7 +543,7 @@ impl ProbeGrid<'_> {
     /// Lets the light of valid probes spread into those that are not, the nearer a probe the more of it, round by round: for engines that mix
     /// all eight probes whatever they are. Look-ups here need it only where no probe around is valid. How many probes it reached.
     pub fn dilate(&mut self) -> usize {
-        let count = self.lattice.cell_count();
+        let count = self.probes().len();
         let each = self.basis.count();
         let mut reached = 0;
         // Of the round in which a probe got its light; a probe gives it on in later ones.
@@ -523,7 +555,9 @@ impl ProbeGrid<'_> {
                     continue;
                 }
                 let (mut sum, mut total) = ([Spectrum::ZERO; MOST_COEFFICIENTS], 0.0);
-                for_each_neighbour(&self.lattice, index, |neighbour, distance_squared| {
+                let Some(cell) = self.cell_of(index) else { continue };
+                for_each_neighbour(&self.lattice, cell, |neighbour, distance_squared| {
+                    let Some(neighbour) = self.number_of(neighbour) else { return };
                     if known(&self.memory.probes.as_slice()[neighbour], round) {
                         let weight = 1.0 / distance_squared;
                         let light = &self.memory.values.as_slice()[neighbour * each..][..each];
@@ -550,11 +584,12 @@ impl ProbeGrid<'_> {
     /// Bytes of memory.
     #[must_use]
     pub fn bytes(&self) -> usize {
-        let BakeMemory { values, deviations, probes, bricks } = &self.memory;
+        let BakeMemory { values, deviations, probes, bricks, places } = &self.memory;
         size_of_val(values.as_slice())
             + size_of_val(deviations.as_slice())
             + size_of_val(probes.as_slice())
             + size_of_val(bricks.as_slice())
+            + size_of_val(places.as_slice())
     }
 
     fn numbers(&self, index: usize) -> core::ops::Range<usize> {
@@ -566,17 +601,104 @@ impl ProbeGrid<'_> {
         self.lattice.size().map(|n| n.div_ceil(BRICK))
     }
 
-    fn brick_of(&self, index: usize) -> usize {
-        let [nx, ny, _] = self.lattice.size().map(|n| n as usize);
+    /// Where the bricks of a grid are that has some alone ([`ProbeGrid::finer`]), in rising order: numbers among all bricks of 4 × 4 × 4 cells of the lattice, x first. Of others, none.
+    #[must_use]
+    pub fn places(&self) -> &[u32] {
+        self.memory.places.as_slice()
+    }
+
+    /// The brick that holds a probe.
+    fn brick_of(&self, number: usize) -> usize {
+        if self.is_sparse() { number / PROBES } else { self.place_of(number) }
+    }
+
+    /// The brick at a place, if there is one.
+    pub(super) fn brick_at(&self, place: usize) -> Option<usize> {
+        if self.is_sparse() { self.places().binary_search(&(place as u32)).ok() } else { Some(place) }
+    }
+
+    pub(super) fn is_sparse(&self) -> bool {
+        !self.places().is_empty()
+    }
+
+    /// The brick of all those of the lattice that holds a cell.
+    fn place_of(&self, cell: usize) -> usize {
         let [bx, by, _] = self.brick_counts().map(|n| n as usize);
-        let [x, y, z] = [index % nx, index / nx % ny, index / (nx * ny)].map(|i| i / BRICK as usize);
+        let [x, y, z] = self.at(cell).map(|i| (i / BRICK) as usize);
         x + bx * (y + by * z)
+    }
+
+    /// Where a brick is among all those of the lattice.
+    pub(super) fn place(&self, brick: usize) -> usize {
+        self.places().get(brick).map_or(brick, |place| *place as usize)
+    }
+
+    /// Where a cell is, counted along x, y and z.
+    pub(super) fn at(&self, cell: usize) -> [u32; 3] {
+        let [nx, ny, _] = self.lattice.size().map(|n| n as usize);
+        [cell % nx, cell / nx % ny, cell / (nx * ny)].map(|i| i as u32)
+    }
+
+    pub(super) fn flat(&self, [x, y, z]: [u32; 3]) -> usize {
+        let [nx, ny, _] = self.lattice.size().map(|n| n as usize);
+        x as usize + nx * (y as usize + ny * z as usize)
+    }
+
+    /// The number of a cell's probe, if there is one.
+    ///
+    /// ```
+    /// # use fogbow::{host::Empty, math::{Bounds, Vec3}, world::{Outline, World}};
+    /// # use fogbow::bake::{Bake, BakeSettings};
+    /// # #[cfg(feature = "alloc")] {
+    /// # let bounds = Bounds { min: Vec3::ZERO, max: Vec3::ONE };
+    /// # let outline = Outline::of(&World { medium: &Empty, scene: &Empty, lights: (&[]).into() }, bounds);
+    /// let grid = Bake::new(BakeSettings::for_outline(&outline, [5, 4, 4]))?.finish();
+    /// // All cells have probes, in the same order.
+    /// assert_eq!((grid.number_of(7), grid.cell_of(7), grid.places().len()), (Some(7), Some(7), 0));
+    /// # }
+    /// # Ok::<(), fogbow::bake::BakeError>(())
+    /// ```
+    #[inline]
+    #[must_use]
+    pub fn number_of(&self, cell: usize) -> Option<usize> {
+        if !self.is_sparse() {
+            return Some(cell);
+        }
+        let brick = self.brick_at(self.place_of(cell))?;
+        let [x, y, z] = self.at(cell).map(|i| (i % BRICK) as usize);
+        const SIDE: usize = BRICK as usize;
+        Some(brick * PROBES + x + SIDE * (y + SIDE * z))
+    }
+
+    /// The cell of a probe; `None` for those beyond the border of the box, of which nothing is ever known.
+    #[must_use]
+    pub fn cell_of(&self, number: usize) -> Option<usize> {
+        if !self.is_sparse() {
+            return Some(number);
+        }
+        let first = self.first_of(self.place(number / PROBES));
+        let local = (number % PROBES) as u32;
+        let at = [local % BRICK, local / BRICK % BRICK, local / (BRICK * BRICK)];
+        let at: [u32; 3] = core::array::from_fn(|i| first[i] + at[i]);
+        (0..3).all(|i| at[i] < self.lattice.size()[i]).then(|| self.flat(at))
+    }
+
+    /// The probe so many cells farther along an axis, if there is one.
+    fn beside(&self, number: usize, axis: usize, step: i32) -> Option<usize> {
+        let mut at = self.at(self.cell_of(number)?);
+        at[axis] = at[axis].checked_add_signed(step).filter(|i| *i < self.lattice.size()[axis])?;
+        self.number_of(self.flat(at))
+    }
+
+    /// The first cell of a brick of the lattice.
+    pub(super) fn first_of(&self, place: usize) -> [u32; 3] {
+        let [bx, by, _] = self.brick_counts().map(|n| n as usize);
+        [place % bx, place / bx % by, place / (bx * by)].map(|i| i as u32 * BRICK)
     }
 
     /// The cells of a brick, in the same order.
     pub(super) fn brick_lattice(&self, brick: usize) -> Option<Lattice> {
-        let (size, [bx, by, _]) = (self.lattice.size(), self.brick_counts().map(|n| n as usize));
-        let first = [brick % bx, brick / bx % by, brick / (bx * by)].map(|i| i as u32 * BRICK);
+        let (size, first) = (self.lattice.size(), self.first_of(self.place(brick)));
         let end: [u32; 3] = core::array::from_fn(|i| (first[i] + BRICK).min(size[i]));
         let at =
             |at: [u32; 3]| self.lattice.bounds().min + self.lattice.cell() * Vec3::from_array(at.map(|n| n as f32));
@@ -584,16 +706,17 @@ impl ProbeGrid<'_> {
         Lattice::new(Bounds { min: at(first), max: at(end) }, counts).ok()
     }
 
-    /// The probes of a brick, in the order in which jobs leave them.
-    pub(super) fn in_brick(&self, brick: usize) -> impl Iterator<Item = usize> + use<> {
-        let size = self.lattice.size();
-        let [bx, by, _] = self.brick_counts().map(|n| n as usize);
-        let first = [brick % bx, brick / bx % by, brick / (bx * by)].map(|i| i as u32 * BRICK);
+    /// The probes of a brick, in the order in which jobs leave them: the number of each, and its cell.
+    pub(super) fn in_brick(&self, brick: usize) -> impl Iterator<Item = (usize, usize)> + use<> {
+        let (size, first, is_sparse) = (self.lattice.size(), self.first_of(self.place(brick)), self.is_sparse());
         let end: [u32; 3] = core::array::from_fn(|i| (first[i] + BRICK).min(size[i]));
-        let flat =
-            move |x: u32, y: u32, z: u32| x as usize + size[0] as usize * (y as usize + size[1] as usize * z as usize);
+        let both = move |x: u32, y: u32, z: u32| {
+            let cell = x as usize + size[0] as usize * (y as usize + size[1] as usize * z as usize);
+            let local = x - first[0] + BRICK * (y - first[1] + BRICK * (z - first[2]));
+            (if is_sparse { brick * PROBES + local as usize } else { cell }, cell)
+        };
         (first[2]..end[2])
-            .flat_map(move |z| (first[1]..end[1]).flat_map(move |y| (first[0]..end[0]).map(move |x| flat(x, y, z))))
+            .flat_map(move |z| (first[1]..end[1]).flat_map(move |y| (first[0]..end[0]).map(move |x| both(x, y, z))))
     }
 }
 

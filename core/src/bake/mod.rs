@@ -24,6 +24,7 @@
 //! | `fill` | [`Bake`]: passes over bricks |
 //! | `flights` | [`PhotonFlight`]s that all probes share: what they leave in cells |
 //! | `grid` | [`ProbeGrid`]: what was baked; look-ups, dilation |
+//! | `levels` | [`ProbeLevels`]: bricks of half the spacing where light varies |
 //! | `parts` | parts of a grid, for several machines, and their merging |
 //! | `froxels` | [`Froxels`]: fog before a camera in cells of its frustum, as engines show it |
 //! | `one_light` | [`OneLight`]: a layer of light for each lamp |
@@ -37,6 +38,7 @@ mod fill;
 mod flights;
 mod froxels;
 mod grid;
+mod levels;
 mod one_light;
 mod output_bytes;
 mod parts;
@@ -50,5 +52,6 @@ pub use fill::{Bake, BakedProbes};
 pub use flights::{FlightMemory, PhotonFlight};
 pub use froxels::{Froxel, Froxels};
 pub use grid::{BakeMemory, Brick, Probe, ProbeDeviation, ProbeGrid, ProbeState};
+pub use levels::{MOST_LEVELS, ProbeLevels};
 pub use one_light::OneLight;
 pub use settings::{BakeError, BakeSettings, MOST_PROBES};

@@ -1,7 +1,7 @@
 //! Parts of a grid, for several machines: bricks shared out, and grids put together.
 
 use super::fill::Bake;
-use super::grid::{BakeMemory, ProbeGrid};
+use super::grid::{BakeMemory, INNER, Probe, ProbeGrid};
 use super::settings::BakeError;
 
 impl Bake<'_, '_> {
@@ -79,21 +79,23 @@ impl ProbeGrid<'_> {
         let each = self.basis.count();
         for brick in 0..self.memory.bricks.len() {
             let here = self.memory.bricks.as_slice()[brick];
-            let there = other.memory.bricks.as_slice()[brick];
-            if here.passes > 0 || there.passes == 0 {
+            let there = other.brick_at(self.place(brick));
+            let known = there.map(|there| (there, other.memory.bricks.as_slice()[there]));
+            let Some((there, progress)) = known.filter(|(_, there)| here.passes == 0 && there.passes > 0) else {
                 self.memory.bricks.as_mut_slice()[brick].due = here.due.max(1);
                 continue;
+            };
+            for ((to, _), (from, _)) in self.in_brick(brick).zip(other.in_brick(there)) {
+                let [to_numbers, from_numbers] = [to, from].map(|index| index * each..(index + 1) * each);
+                let BakeMemory { values, deviations, probes, bricks: _, places: _ } = &mut self.memory;
+                values.as_mut_slice()[to_numbers.clone()]
+                    .copy_from_slice(&other.memory.values.as_slice()[from_numbers.clone()]);
+                deviations.as_mut_slice()[to_numbers]
+                    .copy_from_slice(&other.memory.deviations.as_slice()[from_numbers]);
+                let (probe, from) = (&mut probes.as_mut_slice()[to], other.memory.probes.as_slice()[from]);
+                *probe = Probe { state: from.state & !INNER | probe.state & INNER, ..from };
             }
-            for index in other.in_brick(brick) {
-                let numbers = index * each..(index + 1) * each;
-                let BakeMemory { values, deviations, probes, bricks: _ } = &mut self.memory;
-                values.as_mut_slice()[numbers.clone()]
-                    .copy_from_slice(&other.memory.values.as_slice()[numbers.clone()]);
-                deviations.as_mut_slice()[numbers.clone()]
-                    .copy_from_slice(&other.memory.deviations.as_slice()[numbers]);
-                probes.as_mut_slice()[index] = other.memory.probes.as_slice()[index];
-            }
-            self.memory.bricks.as_mut_slice()[brick] = there;
+            self.memory.bricks.as_mut_slice()[brick] = progress;
         }
         Ok(())
     }

@@ -37,7 +37,7 @@ pub struct BakeSettings {
     pub error: f32,
     /// The mean that errors are in proportion to (W·m⁻²·sr⁻¹, of irradiance W·m⁻²), if it is known beforehand, as [`ProbeGrid::level`](super::ProbeGrid::level) of a coarse grid: then no brick
     /// depends on any other, and several machines may bake some of them each ([`Bake::of_part`](super::Bake::of_part)). `None`: that of all probes, as far as
-    /// they are baked. Photons take no notice of it.
+    /// they are baked.
     pub level: Option<f32>,
     /// Directions of a pass in which light is looked for.
     pub directions: u32,
@@ -140,8 +140,16 @@ impl BakeSettings {
     /// # Errors
     /// What no grid can be.
     pub(super) fn lattice(&self) -> Result<Lattice, BakeError> {
+        self.cells(true)
+    }
+
+    /// The cells, with a probe in each or in some alone, of which there may be more.
+    ///
+    /// # Errors
+    /// What no grid can be.
+    pub(super) fn cells(&self, has_all: bool) -> Result<Lattice, BakeError> {
         let count = self.counts.iter().try_fold(1_u64, |product, n| product.checked_mul(u64::from(*n)));
-        if count.is_none_or(|count| count > MOST_PROBES as u64) {
+        if has_all && count.is_none_or(|count| count > MOST_PROBES as u64) {
             return Err(BakeError::Probes(count.unwrap_or(u64::MAX)));
         }
         if let ProbeBasis::SphericalHarmonics { degree: degree @ 4.. } = self.basis {

@@ -13,13 +13,13 @@ pub mod raw;
 pub mod sheets;
 pub mod texture;
 
-use fogbow::bake::{Orders, ProbeBasis, ProbeDeviation, ProbeGrid, ProbeState, Quantity};
+use fogbow::bake::{Orders, ProbeBasis, ProbeDeviation, ProbeGrid, ProbeLevels, ProbeState, Quantity};
 
-/// A grid, dilated into probes that are not valid, and what it does not say of itself.
+/// A grid and its finer levels, dilated into probes that are not valid, and what they do not say of themselves.
 #[derive(Debug)]
 pub struct Baked {
-    /// The grid.
-    pub grid: ProbeGrid<'static>,
+    /// The grid, and levels of half its spacing and so on.
+    pub levels: ProbeLevels<'static>,
     /// How light was found; `None` where that is not known any more.
     pub method: Option<&'static str>,
     /// Mean cosine of the sharpest phase function, which is in the numbers of in-scattered radiance; `None` where that is not known any more.
@@ -60,10 +60,33 @@ impl Baked {
         }
     }
 
+    /// The grid that has all probes.
+    #[must_use]
+    pub fn grid(&self) -> &ProbeGrid<'static> {
+        &self.levels.levels()[0]
+    }
+
+    /// Finer levels, which have some bricks alone.
+    #[must_use]
+    pub fn finer(&self) -> &[ProbeGrid<'static>] {
+        &self.levels.levels()[1..]
+    }
+
+    /// # Errors
+    /// Finer levels, which a format has no place for.
+    pub fn is_even(&self, format: &str) -> Result<(), String> {
+        if self.finer().is_empty() {
+            return Ok(());
+        }
+        Err(format!(
+            "{format} has no place for bricks of half the spacing: bake without --refine, or write .bake, .json or .ktx2 of the plain layout"
+        ))
+    }
+
     /// The basis in a word.
     #[must_use]
     pub fn basis(&self) -> String {
-        match self.grid.basis() {
+        match self.grid().basis() {
             ProbeBasis::SphericalHarmonics { degree } => format!("sh{degree}"),
             ProbeBasis::AmbientCube => "ambient-cube".to_owned(),
             ProbeBasis::Fluence => "fluence".to_owned(),
@@ -73,7 +96,7 @@ impl Baked {
     /// What the numbers are of, and their unit.
     #[must_use]
     pub fn quantity(&self) -> (&'static str, &'static str) {
-        match (self.grid.basis(), self.grid.quantity()) {
+        match (self.grid().basis(), self.grid().quantity()) {
             (ProbeBasis::Fluence, _) => ("fluence", "W/m^2"),
             (_, Quantity::InScattered) => ("in-scattered", "W/(m^2 sr)"),
             (_, Quantity::Irradiance) => ("irradiance", "W/m^2"),
@@ -83,7 +106,7 @@ impl Baked {
     /// Which light is in the numbers.
     #[must_use]
     pub fn orders(&self) -> &'static str {
-        match self.grid.orders() {
+        match self.grid().orders() {
             Orders::All => "all",
             Orders::Indirect => "indirect",
             Orders::Multiple => "multiple",
@@ -93,7 +116,7 @@ impl Baked {
     /// How many probes are valid, in walls, and far from any medium.
     #[must_use]
     pub fn counts(&self) -> [usize; 3] {
-        let count = |state| self.grid.probes().iter().filter(|probe| probe.state() == state).count();
+        let count = |state| self.grid().probes().iter().filter(|probe| probe.state() == state).count();
         [ProbeState::Valid, ProbeState::InWall, ProbeState::Empty].map(count)
     }
 }

@@ -2,7 +2,7 @@
 
 use core::fmt::Write as _;
 
-use fogbow::bake::ProbeState;
+use fogbow::bake::{Probe, ProbeGrid, ProbeState};
 use fogbow::math::Vec3;
 
 use super::Baked;
@@ -19,46 +19,59 @@ struct Array {
     bytes: Vec<u8>,
 }
 
-/// The bytes of all arrays: `f32` but for the states of probes, which are `u8`; probes along x first, then y, then z.
+/// The bytes of all arrays: `f32` but for the states of probes, which are `u8`; probes along x first, then y, then z, in the box and in each brick of finer levels.
 #[must_use]
 pub fn data(baked: &Baked) -> Vec<u8> {
     arrays(baked).into_iter().flat_map(|array| array.bytes).collect()
 }
 
 fn arrays(baked: &Baked) -> Vec<Array> {
-    let grid = &baked.grid;
+    let levels = baked.levels.levels().iter().enumerate();
+    levels.flat_map(|(number, grid)| arrays_of(baked.scale, number, grid)).collect()
+}
+
+/// The arrays of a level; those of finer ones have its number before their names, and 64 probes for each brick.
+fn arrays_of(scale: f32, level: usize, grid: &ProbeGrid<'_>) -> Vec<Array> {
+    let named = |name: &str| if level == 0 { name.to_owned() } else { format!("level {level}: {name}") };
     let floats = |name: &str, components: u32, of: &dyn Fn(usize) -> Vec<f32>| {
         let bytes = (0..grid.probes().len()).flat_map(of).flat_map(f32::to_le_bytes).collect();
-        Array { name: name.to_owned(), kind: "f32", components, bytes }
+        Array { name: named(name), kind: "f32", components, bytes }
     };
     let mut all = Vec::new();
     for (number, name) in Baked::names(grid.basis()).iter().enumerate() {
-        all.push(floats(name, 3, &|index| (grid.held(index)[number] * baked.scale).0.to_vec()));
+        all.push(floats(name, 3, &|index| (grid.held(index)[number] * scale).0.to_vec()));
     }
     for (number, name) in Baked::names(grid.basis()).iter().enumerate() {
-        all.push(floats(&format!("error of {name}"), 1, &|index| vec![grid.error(index, number) * baked.scale]));
+        // Beyond the border of the box nothing is known.
+        let error = |index| if grid.cell_of(index).is_some() { grid.error(index, number) * scale } else { 0.0 };
+        all.push(floats(&format!("error of {name}"), 1, &|index| vec![error(index)]));
     }
-    all.push(floats("coarseness", 1, &|index| vec![grid.coarseness(index) * baked.scale]));
+    all.push(floats("coarseness", 1, &|index| vec![grid.coarseness(index) * scale]));
     all.push(floats("extinction", 3, &|index| grid.probes()[index].extinction.0.to_vec()));
     all.push(floats("albedo", 3, &|index| grid.probes()[index].albedo.0.to_vec()));
     for (number, name) in WALLS.into_iter().enumerate() {
         all.push(floats(name, 3, &|index| grid.probes()[index].planes()[number].to_array().to_vec()));
     }
-    let state = |probe: &fogbow::bake::Probe| match probe.state() {
+    let bytes = |name: &str, of: &dyn Fn(&Probe) -> u8| {
+        let bytes = grid.probes().iter().map(of).collect();
+        Array { name: named(name), kind: "u8", components: 1, bytes }
+    };
+    all.push(bytes("state", &|probe| match probe.state() {
         ProbeState::Valid => 1,
         ProbeState::InWall => 2,
         ProbeState::Empty => 3,
         ProbeState::Unknown => 0,
-    };
-    let states = grid.probes().iter().map(state).collect();
-    all.push(Array { name: "state".to_owned(), kind: "u8", components: 1, bytes: states });
+    }));
+    if level > 0 {
+        all.push(bytes("inner", &|probe| u8::from(probe.is_inner())));
+    }
     all
 }
 
 /// What is in a bake, as JSON. `data_file` is where the numbers are: those of [`data`], or `None` for textures.
 #[must_use]
 pub fn description(baked: &Baked, data_file: Option<&str>) -> String {
-    let grid = &baked.grid;
+    let grid = baked.grid();
     let lattice = grid.lattice();
     let (quantity, unit) = baked.quantity();
     let [valid, in_wall, empty] = baked.counts();
@@ -81,7 +94,7 @@ pub fn description(baked: &Baked, data_file: Option<&str>) -> String {
     field("mean_cosine", number(baked.mean_cosine));
     field("method", baked.method.map_or("null".to_owned(), string));
     field("relative_error", number(Some(grid.relative_error())));
-    let [usual, worst] = grid.relative_coarseness();
+    let [usual, worst] = baked.levels.relative_coarseness();
     field("relative_coarseness", format!("{{\"root_mean_square\": {usual}, \"greatest\": {worst}}}"));
     let deviation = baked.deviation.map(|d| {
         let [bias, error, spread] = [d.bias, d.bias_error, d.spread].map(|value| number(Some(value)));
@@ -99,6 +112,20 @@ pub fn description(baked: &Baked, data_file: Option<&str>) -> String {
     field("in_wall", in_wall.to_string());
     field("empty", empty.to_string());
     field("leaks", grid.leaks().to_string());
+    if !baked.finer().is_empty() {
+        let level = |grid: &ProbeGrid<'_>| {
+            let [nx, ny, nz] = grid.lattice().size();
+            let bricks: Vec<_> = grid.places().iter().map(u32::to_string).collect();
+            format!(
+                "    {{\"counts\": [{nx}, {ny}, {nz}], \"spacing\": {}, \"relative_error\": {}, \"bricks\": [{}]}}",
+                vector(grid.lattice().cell()),
+                number(Some(grid.relative_error())),
+                bricks.join(", ")
+            )
+        };
+        let levels: Vec<_> = baked.finer().iter().map(level).collect();
+        field("levels", format!("[\n{}\n  ]", levels.join(",\n")));
+    }
     let mut lines = Vec::new();
     if let Some(file) = data_file {
         field("data", string(file));

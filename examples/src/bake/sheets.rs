@@ -2,7 +2,7 @@
 
 use fogbow::bake::ProbeState;
 use fogbow::spectrum::Spectrum;
-use fogbow_std::film::{Image, SizeError};
+use fogbow_std::film::Image;
 
 use super::Baked;
 
@@ -25,9 +25,10 @@ pub fn tiles(depth: u32) -> [u32; 2] {
 /// goes to the right and y down.
 ///
 /// # Errors
-/// More pixels than a picture has.
-pub fn sheets(baked: &Baked) -> Result<Vec<(String, Image)>, SizeError> {
-    let grid = &baked.grid;
+/// More pixels than a picture has; bricks of half the spacing, which sheets have no place for.
+pub fn sheets(baked: &Baked) -> Result<Vec<(String, Image)>, String> {
+    baked.is_even("a sheet of slices")?;
+    let grid = baked.grid();
     let valid = |index: usize| if grid.probes()[index].state() == ProbeState::Valid { 1.0 } else { 0.0 };
     let mut all = Vec::new();
     for (number, name) in Baked::names(grid.basis()).into_iter().enumerate() {
@@ -39,10 +40,10 @@ pub fn sheets(baked: &Baked) -> Result<Vec<(String, Image)>, SizeError> {
     Ok(all)
 }
 
-fn sheet(baked: &Baked, of: impl Fn(usize) -> Spectrum) -> Result<Image, SizeError> {
-    let [nx, ny, nz] = baked.grid.lattice().size();
+fn sheet(baked: &Baked, of: impl Fn(usize) -> Spectrum) -> Result<Image, String> {
+    let [nx, ny, nz] = baked.grid().lattice().size();
     let [across, down] = tiles(nz);
-    let mut image = Image::new(across * nx, down * ny, Spectrum::ZERO)?;
+    let mut image = Image::new(across * nx, down * ny, Spectrum::ZERO).map_err(|error| error.to_string())?;
     for index in 0..nx * ny * nz {
         let [x, y, z] = [index % nx, index / nx % ny, index / (nx * ny)];
         let [column, row] = [x + nx * (z % across), y + ny * (z / across)];

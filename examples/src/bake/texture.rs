@@ -1,6 +1,6 @@
 //! 3D textures: texels, and the layouts of engines.
 
-use fogbow::bake::{ProbeBasis, ProbeState, Quantity};
+use fogbow::bake::{Probe, ProbeBasis, ProbeGrid, ProbeState, Quantity};
 use fogbow::math::float::PI;
 use fogbow::spectrum::Spectrum;
 
@@ -34,31 +34,142 @@ pub struct Texture {
 /// A layout that has no place for what was baked; what would have.
 pub fn textures(baked: &Baked, layout: Layout) -> Result<Vec<Texture>, String> {
     match layout {
-        Layout::Plain => Ok(plain(baked)),
+        Layout::Plain => plain(baked),
         Layout::Bevy => bevy(baked).map(|texture| vec![texture]),
         Layout::Three => three(baked).map(|texture| vec![texture]),
     }
 }
 
 /// A texture for each number with validity in alpha; one for the medium: extinction (per metre, a mean over channels) in alpha, albedo in colour; and two for the
-/// surfaces around probes, [`Probe::planes`](fogbow::bake::Probe::planes).
-fn plain(baked: &Baked) -> Vec<Texture> {
-    let grid = &baked.grid;
-    let size = grid.lattice().size();
-    let valid = |index: usize| if grid.probes()[index].state() == ProbeState::Valid { 1.0 } else { 0.0 };
-    let of = |(number, name): (usize, String)| {
-        let texel = |index: usize| rgba(grid.held(index)[number] * baked.scale, valid(index));
-        Texture { name, size, texels: (0..grid.probes().len()).map(texel).collect() }
+/// surfaces around probes, [`Probe::planes`](fogbow::bake::Probe::planes). With finer levels, all of these are atlases, and one more says where bricks are: see [`Atlas`].
+fn plain(baked: &Baked) -> Result<Vec<Texture>, String> {
+    let atlas = Atlas::of(baked)?;
+    let texture = |name: &str, of: &dyn Fn(&ProbeGrid<'_>, usize) -> [f32; 4]| Texture {
+        name: name.to_owned(),
+        size: atlas.size,
+        texels: atlas.texels(baked, of),
     };
-    let mut all: Vec<Texture> = Baked::names(grid.basis()).into_iter().enumerate().map(of).collect();
-    let medium = grid.probes().iter().map(|probe| rgba(probe.albedo, probe.extinction.mean())).collect();
-    all.push(Texture { name: "medium".to_owned(), size, texels: medium });
-    for (number, name) in WALLS.into_iter().enumerate() {
-        let planes = grid.probes().iter().map(|probe| probe.planes()[number].extend(0.0).to_array()).collect();
-        all.push(Texture { name: name.to_owned(), size, texels: planes });
+    let valid = |probe: &Probe| if probe.state() == ProbeState::Valid { 1.0 } else { 0.0 };
+    let mut all: Vec<Texture> = Vec::new();
+    for (number, name) in Baked::names(baked.grid().basis()).iter().enumerate() {
+        all.push(texture(name, &|grid, index| {
+            rgba(grid.held(index)[number] * baked.scale, valid(&grid.probes()[index]))
+        }));
     }
-    all
+    all.push(texture("medium", &|grid, index| {
+        let probe = &grid.probes()[index];
+        rgba(probe.albedo, probe.extinction.mean())
+    }));
+    for (number, name) in WALLS.into_iter().enumerate() {
+        all.push(texture(name, &|grid, index| {
+            let probe = &grid.probes()[index];
+            let inner = if number == 0 && probe.is_inner() { 1.0 } else { 0.0 };
+            probe.planes()[number].extend(inner).to_array()
+        }));
+    }
+    if !baked.finer().is_empty() {
+        all.push(atlas.index(baked));
+    }
+    Ok(all)
 }
+
+/// Where levels lie in textures: the probes of all cells at the origin, x, y and z as in the box; above them in z layers of bricks, 4 × 4 × 4 texels each, level after
+/// level, x first.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Atlas {
+    /// Texels along x, y and z.
+    pub size: [u32; 3],
+    /// Where bricks begin in z.
+    first: u32,
+}
+
+/// Texels along a side of a brick.
+const BRICK: u32 = 4;
+
+/// Most texels along a side: what graphics processors hold of three-dimensional textures, and half floats exactly.
+const MOST_TEXELS: u32 = 2048;
+
+impl Atlas {
+    /// # Errors
+    /// More bricks than a texture holds.
+    pub fn of(baked: &Baked) -> Result<Self, String> {
+        let [nx, ny, nz] = baked.grid().lattice().size();
+        let bricks: usize = baked.finer().iter().map(|grid| grid.places().len()).sum();
+        if bricks == 0 {
+            return Ok(Self { size: [nx, ny, nz], first: nz });
+        }
+        // About a cube of them.
+        let mut side = 1;
+        while (side * side * side) < bricks {
+            side += 1;
+        }
+        let side = side as u32 * BRICK;
+        let (x, y) = (nx.next_multiple_of(BRICK).max(side), ny.next_multiple_of(BRICK).max(side));
+        let in_layer = (x / BRICK * (y / BRICK)) as usize;
+        let z = nz + bricks.div_ceil(in_layer) as u32 * BRICK;
+        if x.max(y).max(z) > MOST_TEXELS {
+            return Err(format!(
+                "{bricks} bricks make a texture of {x} x {y} x {z} texels, and there may be {MOST_TEXELS} along a side: refine less"
+            ));
+        }
+        Ok(Self { size: [x, y, z], first: nz })
+    }
+
+    /// Where brick number `brick` of all finer levels begins.
+    fn corner(&self, brick: usize) -> [u32; 3] {
+        let [across, up] = [self.size[0], self.size[1]].map(|n| (n / BRICK) as usize);
+        let [x, y, z] = [brick % across, brick / across % up, brick / (across * up)].map(|n| n as u32 * BRICK);
+        [x, y, z + self.first]
+    }
+
+    fn texels(&self, baked: &Baked, of: &dyn Fn(&ProbeGrid<'_>, usize) -> [f32; 4]) -> Vec<[f32; 4]> {
+        let [x, y, z] = self.size.map(|n| n as usize);
+        let mut texels = vec![[0.0; 4]; x * y * z];
+        let mut put = |at: [u32; 3], texel| {
+            let [i, j, k] = at.map(|n| n as usize);
+            texels[i + x * (j + y * k)] = texel;
+        };
+        let [nx, ny, _] = baked.grid().lattice().size();
+        for index in 0..baked.grid().probes().len() {
+            let i = index as u32;
+            put([i % nx, i / nx % ny, i / (nx * ny)], of(baked.grid(), index));
+        }
+        let mut first = 0;
+        for grid in baked.finer() {
+            for index in 0..grid.probes().len() {
+                let corner = self.corner(first + index / 64);
+                let local = (index % 64) as u32;
+                let within = [local % BRICK, local / BRICK % BRICK, local / (BRICK * BRICK)];
+                put(core::array::from_fn(|axis| corner[axis] + within[axis]), of(grid, index));
+            }
+            first += grid.places().len();
+        }
+        texels
+    }
+
+    /// For each brick of 4 × 4 × 4 probes of each finer level the texel at which it begins, with 1 in alpha where it is there; level after level along z.
+    fn index(&self, baked: &Baked) -> Texture {
+        let places = |grid: &ProbeGrid<'_>| grid.lattice().size().map(|n| n.div_ceil(BRICK));
+        let [x, y] = [0, 1].map(|axis| baked.finer().iter().map(|grid| places(grid)[axis]).max().unwrap_or(1));
+        let z = baked.finer().iter().map(|grid| places(grid)[2]).sum();
+        let mut texels = vec![[0.0; 4]; (x * y * z) as usize];
+        let (mut first, mut layer) = (0, 0);
+        for grid in baked.finer() {
+            let [px, py, pz] = places(grid);
+            for (brick, place) in grid.places().iter().enumerate() {
+                let [i, j, k] = [place % px, place / px % py, place / (px * py)];
+                let [a, b, c] = self.corner(first + brick).map(|n| n as f32);
+                texels[(i + x * (j + y * (k + layer))) as usize] = [a, b, c, 1.0];
+            }
+            first += grid.places().len();
+            layer += pz;
+        }
+        Texture { name: INDEX.to_owned(), size: [x, y, z], texels }
+    }
+}
+
+/// Where bricks of finer levels are: name of the texture.
+pub const INDEX: &str = "index";
 
 /// Surfaces around probes: names of the textures, and of the arrays of plain numbers.
 pub const WALLS: [&str; 2] = ["wall0", "wall1"];
@@ -70,7 +181,8 @@ fn rgba(colour: Spectrum, alpha: f32) -> [f32; 4] {
 /// Bevy's irradiance volume, by its shader (`irradiance_volume.wesl`): `(Rx, 2Ry, 3Rz)` texels. Thirds in z are the axes x, y, z; the upper
 /// half in y is where the normal's component is negative. Irradiance over π.
 fn bevy(baked: &Baked) -> Result<Texture, String> {
-    let grid = &baked.grid;
+    baked.is_even("an irradiance volume of Bevy")?;
+    let grid = baked.grid();
     if (grid.basis(), grid.quantity()) != (ProbeBasis::AmbientCube, Quantity::Irradiance) {
         return Err("an irradiance volume of Bevy takes an ambient cube of irradiance".to_owned());
     }
@@ -94,7 +206,8 @@ const PADDING: u32 = 1;
 ///
 /// three.js' probes stand at the corners of its box: make it as large as the box around the outermost probes.
 fn three(baked: &Baked) -> Result<Texture, String> {
-    let grid = &baked.grid;
+    baked.is_even("a LightProbeGrid of three.js")?;
+    let grid = baked.grid();
     if (grid.basis(), grid.quantity()) != (ProbeBasis::SphericalHarmonics { degree: 2 }, Quantity::Irradiance) {
         return Err("a LightProbeGrid of three.js takes irradiance in spherical harmonics of degree 2".to_owned());
     }

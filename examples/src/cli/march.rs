@@ -1,6 +1,6 @@
 //! `fogbow render --method march`.
 
-use fogbow::bake::{BakeMemory, Orders, ProbeGrid, Quantity, bytes};
+use fogbow::bake::{Orders, ProbeLevels, Quantity};
 use fogbow::host::Medium;
 use fogbow::light::Light;
 use fogbow::march;
@@ -15,7 +15,7 @@ use fogbow_std::stats::{CountingMedium, CountingScene};
 use fogbow_std::tiles::{self, Outcome};
 
 use super::Failure;
-use super::bake::is_made_for;
+use super::bake::{is_made_for, read};
 use super::covariance::MarchArguments;
 use super::render::{LAYERS, Shot, weigh, write_layers};
 use super::scene::SceneArguments;
@@ -29,7 +29,7 @@ pub(super) struct MarchJob<'a> {
     pub(super) film: &'a mut Film,
     pub(super) arguments: &'a MarchArguments,
     /// Baked light of the medium.
-    pub(super) baked: Option<ProbeGrid<'static>>,
+    pub(super) baked: Option<ProbeLevels<'static>>,
 }
 
 /// The light of a bake, if there is to be any.
@@ -41,12 +41,12 @@ pub(super) fn baked(
     scene: &SceneArguments,
     paths: &path::Settings,
     world: &World<'_>,
-) -> Result<Option<ProbeGrid<'static>>, Failure> {
+) -> Result<Option<ProbeLevels<'static>>, Failure> {
     let Some(file) = &arguments.bake else { return Ok(None) };
     let fail = |reason: &str| format!("{}: {reason}", file.display());
     let all = read_file(file)?;
-    let tag = bytes::tag(&all).map_err(|error| fail(&error.to_string()))?;
-    let mut grid = bytes::read(&all, tag, BakeMemory::default()).map_err(|error| fail(&error.to_string()))?;
+    let (mut levels, tag) = read(&all).map_err(|error| fail(&error.to_string()))?;
+    let grid = &levels.levels()[0];
     if !is_made_for(tag, scene, paths)? {
         return Err(fail("was made for another scene").into());
     }
@@ -63,8 +63,8 @@ pub(super) fn baked(
     if !is_held {
         return Err(fail("its box does not hold all of the medium").into());
     }
-    grid.dilate();
-    Ok(Some(grid))
+    levels.dilate();
+    Ok(Some(levels))
 }
 
 impl WithMedium for MarchJob<'_> {
@@ -79,7 +79,7 @@ impl WithMedium for MarchJob<'_> {
         let stride = self.arguments.stride(shot.world.bounds().size().length(), shot.grid);
         // An even sky is in indirect light.
         let lamps: Vec<Light<'_>> = shot.lights.iter().filter(|light| !light.is_sky()).copied().collect();
-        let is_whole = self.baked.as_ref().is_some_and(|grid| grid.orders() == Orders::All);
+        let is_whole = self.baked.as_ref().is_some_and(|levels| levels.finest().orders() == Orders::All);
         let outcome = tiles::render(self.film, shot.settings, self.control, |sample, rng, layers| {
             let world = LitWorld {
                 medium: &CountingMedium { medium, tally: sample.tally },
@@ -102,16 +102,16 @@ impl WithMedium for MarchJob<'_> {
                         let phase = &properties.phase;
                         let here = match &self.baked {
                             None => path::in_scattered(&world, point, to_eye, phase, &settings, rng),
-                            Some(grid) if is_whole => {
-                                InScattered { multiple: grid.value(point, to_eye), ..InScattered::default() }
+                            Some(levels) if is_whole => {
+                                InScattered { multiple: levels.value(point, to_eye), ..InScattered::default() }
                             }
-                            Some(grid) => {
+                            Some(levels) => {
                                 let (once, lit) = (
                                     path::Settings { max_scatterings: 1, ..settings },
                                     LitWorld { lights: (&lamps).into(), ..world },
                                 );
                                 let single = path::in_scattered(&lit, point, to_eye, phase, &once, rng).single;
-                                InScattered { single, multiple: grid.value(point, to_eye) }
+                                InScattered { single, multiple: levels.value(point, to_eye) }
                             }
                         };
                         let factor: Spectrum = weight * properties.scattering;

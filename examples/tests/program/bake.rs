@@ -224,6 +224,134 @@ fn an_atlas_is_what_three_js_samples() {
     }
 }
 
+/// What fog.wgsl makes of the textures of a bake with finer levels, line by line.
+struct Shader {
+    textures: Vec<(String, Texture)>,
+    min: Vec3,
+    size: Vec3,
+    counts: [u32; 3],
+    levels: u32,
+}
+
+impl Shader {
+    fn load(&self, name: &str, at: [u32; 3]) -> [f32; 4] {
+        let (_, texture) = self.textures.iter().find(|(other, _)| other == name).unwrap();
+        let [nx, ny, nz] = texture.size;
+        assert!(at[0] < nx && at[1] < ny && at[2] < nz, "{name} {at:?} of {:?}", texture.size);
+        texture.texels[(at[0] + nx * (at[1] + ny * at[2])) as usize]
+    }
+
+    fn in_scattered(&self, point: Vec3, d: Vec3) -> Vec3 {
+        let (mut light, mut hidden, mut valid, mut rest) = (Vec3::ZERO, Vec3::ZERO, 0.0, 1.0);
+        for level in (0..=self.levels).rev() {
+            let counts = Vec3::from_array(self.counts.map(|n| (n << level) as f32));
+            let at = ((point - self.min) / self.size * counts - 0.5).clamp(Vec3::ZERO, counts - 1.0);
+            let low = at.floor().min((counts - 2.0).max(Vec3::ZERO));
+            let (high, share) = ((low + 1.0).min(counts - 1.0), at - low);
+            let layer: u32 = (1..level).map(|other| (self.counts[2] << other).div_ceil(4)).sum();
+            let (mut part, mut inner) = (0.0, 0);
+            let corners: Vec<_> = (0..8)
+                .map(|corner| {
+                    let bit = [corner & 1, corner >> 1 & 1, corner >> 2];
+                    let cell = [0, 1, 2].map(|i| if bit[i] == 1 { high[i] } else { low[i] } as u32);
+                    let weight = (0..3).map(|i| if bit[i] == 1 { share[i] } else { 1.0 - share[i] }).product::<f32>();
+                    let offset = Vec3::from_array([0, 1, 2].map(|i| share[i] - bit[i] as f32));
+                    if level == 0 {
+                        return (cell, weight, offset);
+                    }
+                    let brick = self.load("index", [cell[0] / 4, cell[1] / 4, cell[2] / 4 + layer]);
+                    let texel = [0, 1, 2].map(|i| brick[i] as u32 + cell[i] % 4);
+                    if brick[3] * self.load("wall0", texel)[3] > 0.0 {
+                        part += weight;
+                        inner += 1;
+                    }
+                    (texel, weight, offset)
+                })
+                .collect();
+            let part = if level == 0 || inner == 8 { 1.0 } else { f32::min(part, 1.0) };
+            for (texel, weight, offset) in corners.into_iter().filter(|_| part > 0.0) {
+                let weight = rest * part * weight;
+                let of = |name: &str| Vec3::from_slice(&self.load(name, texel)[..3]);
+                let seen =
+                    0.282_094_8 * of("sh0") + 0.488_602_5 * (d.y * of("sh1") + d.z * of("sh2") + d.x * of("sh3"));
+                let s = offset.dot(of("wall0")).max(offset.dot(of("wall1")));
+                let sees = ((1.0 - s) * 10.0).clamp(0.0, 1.0) + 1e-6 / s.max(1.0).powi(8);
+                let one = weight * self.load("sh0", texel)[3] * sees;
+                light += one * seen;
+                hidden += weight * seen;
+                valid += one;
+            }
+            rest *= 1.0 - part;
+            if !(rest > 0.0) {
+                break;
+            }
+        }
+        if valid > 0.0 { light / valid } else { hidden }.max(Vec3::ZERO)
+    }
+}
+
+#[test]
+fn finer_levels_are_found_by_shaders_and_gone_on_with() {
+    let folder = Folder::new("bake-levels");
+    let options = ["--counts", "9x7x6", "--basis", "sh1", "--passes", "4", "--error", "0.05", "--refine", "0.3"];
+    let outputs = ["-o", "a.bake", "-o", "a.json", "-o", "a.ktx2", "--threads", "2"];
+    bake(&folder, &[&options[..], &outputs].concat());
+    let kept = file(&folder, "a.bake");
+    let mut levels = bytes::read_levels(&kept, bytes::tag(&kept).unwrap(), |_| BakeMemory::default()).unwrap();
+    assert_eq!(levels.levels().len(), 3);
+    levels.dilate();
+
+    // Plain numbers of each level.
+    let about = json(&folder, "a.json");
+    let data = file(&folder, "a.bin");
+    let arrays = about["arrays"].as_array().unwrap();
+    for (number, grid) in levels.levels().iter().enumerate().skip(1) {
+        let told = &about["levels"][number - 1];
+        let bricks: Vec<u32> =
+            told["bricks"].as_array().unwrap().iter().map(|brick| brick.as_u64().unwrap() as u32).collect();
+        assert_eq!((&bricks[..], told["counts"][0].as_u64()), (grid.places(), Some(9 << number)));
+        let name = format!("level {number}: sh2");
+        let array = arrays.iter().find(|array| array["name"] == name.as_str()).unwrap();
+        let [offset, length] = ["offset", "bytes"].map(|key| array[key].as_u64().unwrap() as usize);
+        let floats = data[offset..][..length].as_chunks::<4>().0.iter().map(|bytes| f32::from_le_bytes(*bytes));
+        assert!(floats.eq((0..grid.probes().len()).flat_map(|index| grid.held(index)[2].0)));
+    }
+
+    // Textures, as the shader reads them.
+    let names = ["sh0", "sh1", "sh2", "sh3", "wall0", "wall1", "index"];
+    let textures = names.map(|name| (name.to_owned(), texture(&folder, &format!("a-{name}.ktx2")).0)).to_vec();
+    let bounds = levels.finest().lattice().bounds();
+    let shader = Shader { textures, min: bounds.min, size: bounds.size(), counts: [9, 7, 6], levels: 2 };
+    let level = levels.levels()[0].level() as f32;
+    let (mut lit, mut off) = (0, 0);
+    for i in 0..4000 {
+        let unit = Vec3::from(fogbow::sampling::even3(i));
+        let (point, d) = (bounds.min + bounds.size() * unit, (unit - 0.4).normalize());
+        let (found, due) = (shader.in_scattered(point, d), levels.value(point, d));
+        // Half floats; beside walls, rounding decides which probes see a point.
+        off += u32::from((found.x - due[0]).abs() > HALF * (due[0] + level));
+        lit += u32::from(due[0] > 0.1 * level);
+    }
+    assert!(lit > 1000 && off <= 8, "{off} of 4000 points are off, {lit} are lit");
+
+    // From the grid alone, to the same bytes; and with fewer levels, which would be lost.
+    bake(&folder, &[&options[..6], &["--error", "0.05", "-o", "b.bake", "--threads", "1"]].concat());
+    let output = folder.run(&["bake", "--from-file", "a.bake", "-o", "c.json", "-o", "c.bake", "-q"]);
+    assert!(output.status.success() && file(&folder, "c.bin") == data && file(&folder, "c.bake") == kept);
+    bake(&folder, &[&options[..], &["-o", "b.bake", "--resume", "--threads", "3"]].concat());
+    assert!(file(&folder, "b.bake") == kept);
+    let again = ["bake", SCENE, "-q", "--counts", "9x7x6", "--basis", "sh1", "--resume", "-o", "b.bake"];
+    let output = folder.run(&again);
+    assert!(said(&output).contains("has 2 finer levels, which would be lost"), "{}", said(&output));
+    assert!(file(&folder, "b.bake") == kept);
+    // What has no place for them says so, and writes nothing.
+    for (name, more) in [("d.exr", &[][..]), ("d.ktx2", &["--layout", "bevy"])] {
+        let output = folder.run(&[&["bake", "--from-file", "a.bake", "-q", "-o", name], more].concat());
+        assert!(output.status.code() == Some(2) && said(&output).contains("half the spacing"), "{}", said(&output));
+        assert!(!folder.names().iter().any(|other| other == name));
+    }
+}
+
 #[test]
 fn any_number_of_threads_gives_the_same_bytes() {
     let folder = Folder::new("bake-threads");

@@ -2,7 +2,9 @@
 
 use std::path::PathBuf;
 
-use fogbow::bake::{Bake, BakeSettings, FlightMemory, OneLight, ProbeBasis, ProbeDeviation, ProbeGrid};
+use fogbow::bake::{
+    Bake, BakeMemory, BakeSettings, FlightMemory, OneLight, ProbeBasis, ProbeDeviation, ProbeGrid, ProbeLevels,
+};
 use fogbow::cache::{Asked, ERROR_BOUNDS, Kind, RadianceCaches, Settings, USUAL_ERROR};
 use fogbow::host::{Medium, Scene};
 use fogbow::light::Lights;
@@ -119,8 +121,8 @@ impl WithMedium for BakeJob<'_> {
     }
 }
 
-/// A grid, the mean cosine of the phase function, how far caches are off, and whether all is done.
-type Done = (ProbeGrid<'static>, f32, Option<ProbeDeviation>, Ending);
+/// All levels, the mean cosine of the phase function, how far caches are off, and whether all is done.
+type Done = (ProbeLevels<'static>, f32, Option<ProbeDeviation>, Ending);
 
 impl BakeJob<'_> {
     fn bake<M: Medium + Sync, S: Scene + Sync>(
@@ -145,11 +147,8 @@ impl BakeJob<'_> {
             caches = Some(filled);
         }
         let settings = self.settings(outline);
-        let begun = match self.kept.as_ref().filter(|_| self.arguments.resume) {
-            Some(file) => self.part.map_or_else(|| begun(file, self.tag), |part| part.begun(file, self.tag))?,
-            None => None,
-        };
-        let bake = match begun {
+        let mut begun = self.begun()?.into_iter();
+        let bake = match begun.next() {
             Some(grid) => Bake::resume(grid, settings)
                 .map_err(|_| "--resume: the file is of other probes: of another --box, --counts, --basis, --quantity or --orders")?,
             None => match self.arguments.many.part {
@@ -157,38 +156,78 @@ impl BakeJob<'_> {
                 None => Bake::new(settings)?,
             },
         };
-        let mut bake = match &caches {
+        let with_light = |bake: Bake<'static, 'static>| match &caches {
             Some(caches) => bake.with_caches(caches),
             None if self.method == Source::Photons => bake.with_photons(FlightMemory::default(), outline.bounds),
             None => bake,
         };
         let (clock, mut written, mut trouble) = (Stopwatch::start(), 0.0, None);
-        let ran = threads::run(&mut bake, world, &pool, &control, None, |bake| {
-            let elapsed = clock.elapsed().wall;
-            bar.share(bake.share(), elapsed);
-            if let Some(file) = self.kept.as_ref().filter(|_| elapsed - written > self.arguments.checkpoint_every) {
-                written = elapsed;
-                let kept = match self.part {
-                    Some(part) => part.write(file, bake.grid(), self.tag, false),
-                    None => write::keep(file, bake.grid(), self.tag),
-                };
-                trouble = trouble.take().or(kept.err());
-            }
-        });
+        // A level, after those that are done.
+        let mut bake_level = |bake, done: &[ProbeGrid<'static>]| {
+            let mut bake = with_light(bake);
+            let ran = threads::run(&mut bake, world, &pool, &control, None, |bake| {
+                let elapsed = clock.elapsed().wall;
+                bar.share(bake.share(), elapsed);
+                if let Some(file) = self.kept.as_ref().filter(|_| elapsed - written > self.arguments.checkpoint_every) {
+                    written = elapsed;
+                    let kept = match self.part {
+                        Some(part) => part.write(file, bake.grid(), self.tag, false),
+                        None => write::keep(file, done.iter().chain([bake.grid()]), self.tag),
+                    };
+                    trouble = trouble.take().or(kept.err());
+                }
+            });
+            (bake.finish(), ran.ending == threads::Ending::Done)
+        };
+        let (grid, mut is_done) = bake_level(bake, &[]);
         let mut deviation = None;
-        if caches.is_some() && ran.ending == threads::Ending::Done {
+        if caches.is_some() && is_done {
             bar.tell("compare", 0.0);
             let bricks: Vec<usize> = compared(self.counts).collect();
             let mut unbiased = Bake::new(settings)?.only(|brick| bricks.contains(&brick));
             let ran = threads::run(&mut unbiased, world, &pool, &control, None, |_| ());
-            deviation = (ran.ending == threads::Ending::Done).then(|| bake.grid().deviation(unbiased.grid()));
+            deviation = (ran.ending == threads::Ending::Done).then(|| grid.deviation(unbiased.grid()));
+        }
+        let mut levels = ProbeLevels::new(grid);
+        let mean = settings.level.map_or_else(|| levels.finest().level(), f64::from);
+        let mut settings = BakeSettings { level: Some(mean as f32), ..settings };
+        while let Some(error) = self.arguments.refine.filter(|_| is_done) {
+            if levels.levels().len() > self.arguments.levels as usize {
+                break;
+            }
+            let Some(mut finer) = levels.finest().finer(mean, error, BakeMemory::default())? else { break };
+            // What is known of it, whichever bricks were chosen before.
+            if let Some(left) = begun.next() {
+                finer.merge(&left)?;
+            }
+            settings.counts = settings.counts.map(|n| 2 * n);
+            let finer = Bake::resume(finer, settings)?;
+            let (finer, done) = bake_level(finer, levels.levels());
+            is_done = done;
+            levels.push(finer)?;
         }
         bar.finish();
         if let Some(trouble) = trouble {
             say!("fogbow: {trouble}");
         }
-        let ending = if ran.ending == threads::Ending::Done { Ending::Done } else { Ending::Stopped };
-        Ok((bake.finish(), outline.phase.mean_cosine().mean(), deviation, ending))
+        let ending = if is_done { Ending::Done } else { Ending::Stopped };
+        Ok((levels, outline.phase.mean_cosine().mean(), deviation, ending))
+    }
+
+    /// The levels that are to be gone on with, if there are any.
+    fn begun(&self) -> Result<Vec<ProbeGrid<'static>>, Failure> {
+        let Some(file) = self.kept.as_ref().filter(|_| self.arguments.resume) else { return Ok(Vec::new()) };
+        let begun = self.part.map_or_else(|| begun(file, self.tag), |part| part.begun(file, self.tag))?;
+        let asked = self.arguments.refine.map_or(0, |_| self.arguments.levels as usize);
+        if begun.len() > 1 + asked {
+            let levels = begun.len() - 1;
+            return Err(format!(
+                "{}: has {levels} finer levels, which would be lost: give --refine and --levels {levels}",
+                file.display()
+            )
+            .into());
+        }
+        Ok(begun)
     }
 }
 

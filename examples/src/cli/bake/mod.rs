@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 use clap::{Arg, Args, ValueEnum};
 use fogbow::bake::bytes::{self, ProbeBytesError};
-use fogbow::bake::{BakeMemory, BakeSettings, Orders, ProbeBasis, ProbeGrid, Quantity};
+use fogbow::bake::{BakeMemory, BakeSettings, Orders, ProbeBasis, ProbeGrid, ProbeLevels, Quantity};
 use fogbow::bytes::Crc;
 use fogbow::math::{Bounds, Vec3};
 use fogbow::path;
@@ -41,7 +41,7 @@ pub struct BakeArguments {
     #[command(flatten)]
     pub reading: ReadArguments,
     /// Bakes nothing but writes what is in a .bake file in other formats.
-    #[arg(long, value_name = "FILE.bake", conflicts_with_all = ["scene", "region", "spacing", "counts", "basis", "quantity", "orders", "error", "passes", "per_light", "resume", "part", "level"])]
+    #[arg(long, value_name = "FILE.bake", conflicts_with_all = ["scene", "region", "spacing", "counts", "basis", "quantity", "orders", "error", "passes", "refine", "per_light", "resume", "part", "level"])]
     pub from_file: Option<PathBuf>,
     /// The box to bake: two corners, the smaller one first [default: around all media].
     #[arg(long = "box", value_name = "MIN MAX", value_parser = corners, allow_hyphen_values = true)]
@@ -70,6 +70,13 @@ pub struct BakeArguments {
     /// Passes of each brick at most, whatever the error.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..))]
     pub passes: Option<u32>,
+    /// Adds bricks of 4x4x4 probes of half the spacing where values between probes are off by more than E of the mean because light varies faster than the grid can hold, as
+    /// second differences say; in .bake, .json and .ktx2 files of the plain layout alone.
+    #[arg(long, value_name = "E", value_parser = error)]
+    pub refine: Option<f32>,
+    /// Levels that --refine adds at most, each of half the spacing of the one before.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..fogbow::bake::MOST_LEVELS as i64), default_value_t = 2, requires = "refine")]
+    pub levels: u32,
     /// Bakes each light by itself, into files with -light0, -light1 and so on in their names, so that an engine may colour and dim them; lights are counted in the
     /// order of the scene.
     #[arg(long)]
@@ -402,10 +409,17 @@ struct Made {
 }
 
 fn from_file(file: &Path) -> Result<Made, Failure> {
-    let bytes = read_file(file)?;
-    let grid = bytes::tag(&bytes).and_then(|tag| Ok((bytes::read(&bytes, tag, BakeMemory::default())?, tag)));
-    let (grid, tag) = grid.map_err(|error| format!("{}: {error}", file.display()))?;
-    Ok(Made { baked: Baked { grid, method: None, mean_cosine: None, deviation: None, scale: 1.0 }, tag, part: None })
+    let (levels, tag) = read(&read_file(file)?).map_err(|error| format!("{}: {error}", file.display()))?;
+    Ok(Made { baked: Baked { levels, method: None, mean_cosine: None, deviation: None, scale: 1.0 }, tag, part: None })
+}
+
+/// All levels in a file, and what they were made for.
+///
+/// # Errors
+/// What is no bake, or damaged.
+pub(super) fn read(bytes: &[u8]) -> Result<(ProbeLevels<'static>, u64), ProbeBytesError> {
+    let tag = bytes::tag(bytes)?;
+    Ok((bytes::read_levels(bytes, tag, |_| BakeMemory::default())?, tag))
 }
 
 /// Bakes a scene, by all its lights or by one of them.
@@ -445,13 +459,13 @@ fn bake(arguments: &BakeArguments, file: &SceneArguments, light: Option<u32>) ->
         part: part.as_ref(),
         kept: arguments.kept()?.map(|file| light.map_or(file.to_owned(), |number| of_light(file, number))),
     };
-    let (grid, mean_cosine, deviation, ending) = world.media().with(job)?;
+    let (levels, mean_cosine, deviation, ending) = world.media().with(job)?;
     let name = match method {
         Source::RadianceCache => "radiance-cache",
         Source::Path => "path",
         Source::Photons => "photons",
     };
-    let baked = Baked { grid, method: Some(name), mean_cosine: Some(mean_cosine), deviation, scale: 1.0 };
+    let baked = Baked { levels, method: Some(name), mean_cosine: Some(mean_cosine), deviation, scale: 1.0 };
     if baked.counts()[0] == 0 && ending == Ending::Done && part.is_none() {
         let [_, in_wall, empty] = baked.counts();
         return Err(format!(
@@ -535,19 +549,19 @@ pub(super) fn is_made_for(tag: u64, scene: &SceneArguments, paths: &path::Settin
     Ok((tag >> 32) as u32 == of_scene(scene, paths)?)
 }
 
-/// The grid that was left in a file, if there is any.
-fn begun(file: &Path, tag: u64) -> Result<Option<ProbeGrid<'static>>, Failure> {
+/// The levels that were left in a file; none if there is no file.
+fn begun(file: &Path, tag: u64) -> Result<Vec<ProbeGrid<'static>>, Failure> {
     if !file.exists() {
-        return Ok(None);
+        return Ok(Vec::new());
     }
-    let read = bytes::read(&read_file(file)?, tag, BakeMemory::default());
-    let grid = read.map_err(|error| match error {
+    let read = bytes::read_levels(&read_file(file)?, tag, |_| BakeMemory::default());
+    let levels = read.map_err(|error| match error {
         ProbeBytesError::Tag { .. } => {
             format!("{}: was made for another scene, or with another --method, --seed or --error", file.display())
         }
         error => format!("{}: {error}", file.display()),
     })?;
-    Ok(Some(grid))
+    Ok(levels.into_levels().collect())
 }
 
 #[cfg(test)]

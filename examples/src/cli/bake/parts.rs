@@ -50,6 +50,9 @@ impl BakeArguments {
                     .into(),
             );
         }
+        if is_part && self.refine.is_some() {
+            return Err("--part and --refine: where bricks are finer is decided by all probes; bake and merge the parts, then refine in one piece: fogbow bake --resume --refine".into());
+        }
         match self.method {
             _ if !is_part && self.many.level.is_none() => Ok(()),
             Source::Path => Ok(()),
@@ -140,7 +143,7 @@ pub(in super::super) fn check_count(of: u32, counts: [u32; 3]) -> Result<(), Fai
 pub(super) fn run(arguments: &BakeArguments, scene: &SceneArguments) -> Result<Ending, Failure> {
     let (made, ending) = bake(arguments, scene, None)?;
     let (Some(part), [file]) = (&made.part, arguments.output.as_slice()) else { return Err("there is no part".into()) };
-    part.write(file, &made.baked.grid, made.tag, ending == Ending::Done)?;
+    part.write(file, made.baked.grid(), made.tag, ending == Ending::Done)?;
     if !arguments.quiet {
         say!("wrote {}: {}", file.display(), part.about.name());
     }
@@ -161,9 +164,9 @@ impl PartOf {
     ///
     /// # Errors
     /// A file that is damaged, or of another part.
-    pub(super) fn begun(&self, file: &Path, tag: u64) -> Result<Option<ProbeGrid<'static>>, Failure> {
+    pub(super) fn begun(&self, file: &Path, tag: u64) -> Result<Vec<ProbeGrid<'static>>, Failure> {
         if !file.exists() {
-            return Ok(None);
+            return Ok(Vec::new());
         }
         let film = FilmFile::read(file)?;
         let wrong = |what: String| Failure::from(format!("{}: {what}", file.display()));
@@ -174,7 +177,7 @@ impl PartOf {
             return Err(wrong(format!("is {}, not {}", film.about.name(), self.about.name())));
         }
         let grid = bytes::read(&film.picture, tag, BakeMemory::default());
-        Ok(Some(grid.map_err(|error| wrong(format!("its grid {error}")))?))
+        Ok(vec![grid.map_err(|error| wrong(format!("its grid {error}")))?])
     }
 }
 

@@ -41,12 +41,12 @@ pub(super) fn all(arguments: &BakeArguments, made: Made, files: &[&PathBuf]) -> 
     let Made { mut baked, tag, .. } = made;
     let mut written = Vec::new();
     for file in files.iter().filter(|file| Target::of(file) == Ok(Target::Bake)) {
-        keep(file, &baked.grid, tag)?;
+        keep(file, baked.levels.levels(), tag)?;
         written.push((*file).clone());
     }
     let [valid, in_wall, empty] = baked.counts();
-    let error = baked.grid.relative_error();
-    baked.grid.dilate();
+    let error = baked.grid().relative_error();
+    baked.levels.dilate();
     baked.scale = arguments.scale as f32;
     for file in files {
         match Target::of(file)? {
@@ -69,9 +69,9 @@ pub(super) fn all(arguments: &BakeArguments, made: Made, files: &[&PathBuf]) -> 
             }
         }
     }
-    let [x, y, z] = baked.grid.lattice().size();
+    let [x, y, z] = baked.grid().lattice().size();
     let names: Vec<_> = written.iter().map(|file| file.display().to_string()).collect();
-    let leaks = match baked.grid.leaks() {
+    let leaks = match baked.grid().leaks() {
         0 => String::new(),
         pairs => format!(
             "{pairs} pairs of neighbours have a surface between them: light leaks through it where engines mix all probes, and not where they read planes of surfaces\n"
@@ -83,16 +83,28 @@ pub(super) fn all(arguments: &BakeArguments, made: Made, files: &[&PathBuf]) -> 
             "{probes} probes are nearer than a twentieth of a cell to a surface, and photons blur what it sends to them; --method path does not\n"
         ),
     };
-    let [usual, worst] = baked.grid.relative_coarseness().map(|share| 100.0 * share);
+    let [usual, worst] = baked.levels.relative_coarseness().map(|share| 100.0 * share);
     let apart = baked.deviation.map_or(String::new(), |d| {
         let [bias, error, spread] = [d.bias, d.bias_error, d.spread].map(|share| 100.0 * share);
         format!("against path tracing of {} probes: {bias:+.2} % ± {error:.2} %, single numbers off by {spread:.1} % of the mean\n", d.probes)
     });
+    let bricks: String = baked.finer().iter().zip(1..).map(|(grid, level)| finer_level(grid, level)).collect();
     Ok(format!(
-        "{x} x {y} x {z} probes: {valid} valid, {in_wall} in walls, {empty} far from any medium; standard error of what was sampled {:.2} % of the mean\nbetween probes off by about {usual:.1} % of the mean, {worst:.0} % where light varies most\n{leaks}{near}{apart}wrote {}",
+        "{x} x {y} x {z} probes: {valid} valid, {in_wall} in walls, {empty} far from any medium; standard error of what was sampled {:.2} % of the mean\n{bricks}between probes off by about {usual:.1} % of the mean, {worst:.0} % where light varies most\n{leaks}{near}{apart}wrote {}",
         100.0 * error,
         names.join(", ")
     ))
+}
+
+/// What there is of a finer level, in a line.
+fn finer_level(grid: &ProbeGrid<'_>, level: u32) -> String {
+    let (bricks, all) = (grid.places().len(), grid.lattice().cell_count());
+    let spacing = 1 << level;
+    let error = 100.0 * grid.relative_error();
+    let share = 6400.0 * bricks as f32 / all as f32;
+    format!(
+        "at 1/{spacing} of the spacing {bricks} bricks of 64 probes, {share:.1} % of the box; standard error {error:.2} % of their mean\n"
+    )
 }
 
 /// Valid probes of a bake by photons that a surface is next to: what it sends to them changes within less than the part of the cell that photons count in.
@@ -100,7 +112,7 @@ fn near_surfaces(baked: &Baked) -> usize {
     /// One over the distance in cells.
     const NEAR: f32 = 20.0;
     let is_near = |probe: &&Probe| probe.planes().iter().any(|plane| plane.length() > NEAR);
-    let valid = baked.grid.probes().iter().filter(|probe| probe.state() == ProbeState::Valid);
+    let valid = baked.grid().probes().iter().filter(|probe| probe.state() == ProbeState::Valid);
     if baked.method == Some("photons") { valid.filter(is_near).count() } else { 0 }
 }
 
@@ -108,14 +120,18 @@ fn near_surfaces(baked: &Baked) -> usize {
 fn textures(arguments: &BakeArguments, baked: &Baked, file: &Path) -> Result<Vec<PathBuf>, String> {
     let fail = |error: String| format!("{}: {error}", file.display());
     let textures = texture::textures(baked, arguments.layout()).map_err(fail)?;
-    let bounds = baked.grid.lattice().bounds();
+    let bounds = baked.grid().lattice().bounds();
     let corner = |v: fogbow::math::Vec3| format!("{},{},{}", v.x, v.y, v.z);
     let (quantity, unit) = baked.quantity();
     let region = format!("{} {}", corner(bounds.min), corner(bounds.max));
     let (basis, scale) = (baked.basis(), baked.scale.to_string());
+    let [x, y, z] = baked.grid().lattice().size();
+    let (counts, levels) = (format!("{x},{y},{z}"), baked.finer().len().to_string());
     let about = [
         ("fogbow.box", region.as_str()),
         ("fogbow.basis", &basis),
+        ("fogbow.counts", &counts),
+        ("fogbow.levels", &levels),
         ("fogbow.orders", baked.orders()),
         ("fogbow.quantity", quantity),
         ("fogbow.scale", &scale),
@@ -124,8 +140,9 @@ fn textures(arguments: &BakeArguments, baked: &Baked, file: &Path) -> Result<Vec
     let place = |name: &str| if arguments.layout() == Layout::Plain { named(file, name) } else { file.to_owned() };
     let encoded = textures.iter().map(|one| {
         let about = [&about[..], &[("fogbow.texture", one.name.as_str())]].concat();
-        // Planes have any sign, and are read as they are.
-        let texel = if texture::WALLS.contains(&one.name.as_str()) { Texel::Rgba16F } else { arguments.texel() };
+        // Planes have any sign, and are read as they are; so are places of bricks.
+        let is_plain = texture::WALLS.contains(&one.name.as_str()) || one.name == texture::INDEX;
+        let texel = if is_plain { Texel::Rgba16F } else { arguments.texel() };
         Ok((place(&one.name), ktx2::encode(one, texel, &about)?))
     });
     // All or none.
@@ -157,8 +174,12 @@ fn named(file: &Path, name: &str) -> PathBuf {
 ///
 /// # Errors
 /// What the system says.
-pub(super) fn keep(file: &Path, grid: &ProbeGrid<'_>, tag: u64) -> Result<(), String> {
-    save(file, &to_bytes(grid, tag))
+pub(super) fn keep<'g>(
+    file: &Path,
+    levels: impl IntoIterator<Item = &'g ProbeGrid<'static>>,
+    tag: u64,
+) -> Result<(), String> {
+    save(file, &levels.into_iter().flat_map(|grid| to_bytes(grid, tag)).collect::<Vec<u8>>())
 }
 
 pub(super) fn to_bytes(grid: &ProbeGrid<'_>, tag: u64) -> Vec<u8> {
