@@ -161,11 +161,10 @@ pub fn write<F>(grid: &ProbeGrid<'_>, tag: u64, mut sink: impl FnMut(&[u8]) -> R
         ProbeBasis::AmbientCube => AMBIENT_CUBE,
         ProbeBasis::Fluence => FLUENCE,
     };
-    let BakeMemory { values, deviations, probes, bricks, places } = &grid.memory;
     let ([nx, ny, nz], bounds) = (grid.lattice.size(), grid.lattice.bounds());
     let [low, high] = [bounds.min, bounds.max].map(|corner| corner.to_array().map(f32::to_bits));
     let quantity = grid.quantity as u32 + if grid.is_sparse() { SPARSE } else { 0 };
-    let last = [basis, quantity, grid.orders as u32, bricks.len() as u32];
+    let last = [basis, quantity, grid.orders as u32, grid.memory.bricks.len() as u32];
     let words = [VERSION, nx, ny, nz].into_iter().chain(low).chain(high).chain(last);
     for (to, word) in header[8..64].chunks_exact_mut(4).zip(words) {
         to.copy_from_slice(&word.to_le_bytes());
@@ -173,24 +172,21 @@ pub fn write<F>(grid: &ProbeGrid<'_>, tag: u64, mut sink: impl FnMut(&[u8]) -> R
     header[64..72].copy_from_slice(&tag.to_le_bytes());
     let mut crc = Crc::new();
     crc.add(&header[..72]);
-    fn all<F>(
-        memory: (&[Spectrum], &[f32], &[Probe], &[Brick], &[u32]),
-        sink: &mut impl FnMut(&[u8]) -> Result<(), F>,
-    ) -> Result<(), F> {
-        elements(memory.0, sink)?;
-        elements(memory.1, sink)?;
-        elements(memory.2, sink)?;
-        elements(memory.3, sink)?;
-        elements(memory.4, sink)
+    fn all<F>(memory: &BakeMemory<'_>, sink: &mut impl FnMut(&[u8]) -> Result<(), F>) -> Result<(), F> {
+        let BakeMemory { values, deviations, probes, bricks, places } = memory;
+        elements(values.as_slice(), sink)?;
+        elements(deviations.as_slice(), sink)?;
+        elements(probes.as_slice(), sink)?;
+        elements(bricks.as_slice(), sink)?;
+        elements(places.as_slice(), sink)
     }
-    let memory = (values.as_slice(), deviations.as_slice(), probes.as_slice(), bricks.as_slice(), places.as_slice());
-    let Ok(()) = all(memory, &mut |bytes: &[u8]| {
+    let Ok(()) = all(&grid.memory, &mut |bytes: &[u8]| {
         crc.add(bytes);
         Ok::<(), core::convert::Infallible>(())
     });
     header[72..].copy_from_slice(&crc.value().to_le_bytes());
     sink(&header)?;
-    all(memory, &mut sink)
+    all(&grid.memory, &mut sink)
 }
 
 /// What a grid was made for: for hosts that want any.

@@ -106,7 +106,6 @@ impl<'s> ProbeLevels<'s> {
     }
 
     /// The levels by themselves.
-    #[must_use]
     pub fn into_levels(self) -> impl Iterator<Item = ProbeGrid<'s>> {
         self.levels.into_iter()
     }
@@ -300,7 +299,7 @@ impl ProbeGrid<'_> {
                 first[axis].saturating_sub(AROUND_BRICKS)..end
             };
             let mut cells = range(2).flat_map(|z| range(1).flat_map(move |y| range(0).map(move |x| [x, y, z])));
-            let is_wanted = cells.any(|at| self.number_of(self.flat(at)).is_some_and(|number| is_coarse(number)));
+            let is_wanted = cells.any(|at| self.number_of(self.flat(at)).is_some_and(is_coarse));
             if is_wanted {
                 bricks += 1;
                 finer.memory.places.push(place as u32).map_err(|Full| BakeError::Memory)?;

@@ -136,18 +136,19 @@ void main() {
       device.queue.writeBuffer(made, 0, data);
       return { buffer: made };
     };
-    const probed = new ArrayBuffer(32);
+    // Without finer levels: no counts, no index.
+    const probed = new ArrayBuffer(48);
     new Float32Array(probed).set([...box[0], 1, ...box[1]]);
     new Uint32Array(probed)[7] = harmonics.length;
-    const volume = (data) => {
-      const texture = device.createTexture({ size: counts, dimension: "3d", format: "rgba32float", usage: GPUTextureUsage.TEXTURE_BINDING | GPUTextureUsage.COPY_DST });
-      device.queue.writeTexture({ texture }, data, { bytesPerRow: 16 * counts[0], rowsPerImage: counts[1] }, counts);
+    const volume = (data, size = counts) => {
+      const texture = device.createTexture({ size, dimension: "3d", format: "rgba32float", usage: GPUTextureUsage.TEXTURE_BINDING | GPUTextureUsage.COPY_DST });
+      device.queue.writeTexture({ texture }, data, { bytesPerRow: 16 * size[0], rowsPerImage: size[1] }, size);
       return texture.createView();
     };
     const told = device.createBuffer({ size: 48 * W * H, usage: GPUBufferUsage.STORAGE | GPUBufferUsage.COPY_SRC });
     const readable = device.createBuffer({ size: 48 * W * H, usage: GPUBufferUsage.MAP_READ | GPUBufferUsage.COPY_DST });
     const groups = [
-      [buffer(probed, GPUBufferUsage.UNIFORM), ...[...harmonics, medium, ...walls].map(volume)],
+      [buffer(probed, GPUBufferUsage.UNIFORM), ...[...harmonics, medium, ...walls].map((data) => volume(data)), volume(new Float32Array(4), [1, 1, 1])],
       [buffer(points, GPUBufferUsage.STORAGE), buffer(directions, GPUBufferUsage.STORAGE), { buffer: told }],
     ];
     const encoder = device.createCommandEncoder();

@@ -1,7 +1,7 @@
 //! The shader at work.
 
 use bytemuck::{Pod, Zeroable};
-use fogbow::bake::{ProbeGrid, ProbeState};
+use fogbow::bake::{Probe, ProbeGrid, ProbeLevels, ProbeState};
 use half::f16;
 use wgpu::util::{BufferInitDescriptor, DeviceExt, TextureDataOrder};
 use wgpu::{
@@ -36,6 +36,54 @@ struct Probes {
     scale: f32,
     size: [f32; 3],
     numbers: u32,
+    counts: [u32; 3],
+    levels: u32,
+}
+
+/// Texels along a side of a brick of a finer level.
+const BRICK: u32 = 4;
+
+/// An atlas: the probes of all cells, above them in z the bricks of finer levels, one on the other. What `of` says of each probe, colour and alpha.
+fn atlas(levels: &ProbeLevels<'_>, of: impl Fn(&ProbeGrid<'_>, usize) -> ([f32; 3], f32)) -> ([u32; 3], Vec<f16>) {
+    let [grid, finer @ ..] = levels.levels() else { return ([0; 3], Vec::new()) };
+    let [nx, ny, nz] = grid.lattice().size();
+    let bricks: usize = finer.iter().map(|grid| grid.places().len()).sum();
+    let size = if bricks == 0 { [nx, ny, nz] } else { [nx.max(BRICK), ny.max(BRICK), nz + BRICK * bricks as u32] };
+    let mut all = vec![([0.0; 3], 0.0); size.iter().product::<u32>() as usize];
+    let mut put = |[x, y, z]: [u32; 3], texel| all[(x + size[0] * (y + size[1] * z)) as usize] = texel;
+    for index in 0..grid.probes().len() {
+        let i = index as u32;
+        put([i % nx, i / nx % ny, i / (nx * ny)], of(grid, index));
+    }
+    let mut first = nz;
+    for grid in finer {
+        for index in 0..grid.probes().len() {
+            let i = index as u32;
+            put([i % BRICK, i / BRICK % BRICK, first + i / (BRICK * BRICK)], of(grid, index));
+        }
+        first += BRICK * grid.places().len() as u32;
+    }
+    (size, texels(all.into_iter()))
+}
+
+/// Where each brick of each finer level begins; one texel without finer levels.
+fn index(levels: &ProbeLevels<'_>) -> ([u32; 3], Vec<f16>) {
+    let [grid, finer @ ..] = levels.levels() else { return ([0; 3], Vec::new()) };
+    let places = |grid: &ProbeGrid<'_>| grid.lattice().size().map(|n| n.div_ceil(BRICK));
+    let most = |axis: usize| finer.iter().map(|grid| places(grid)[axis]).max().unwrap_or(1);
+    let size = [most(0), most(1), finer.iter().map(|grid| places(grid)[2]).sum::<u32>().max(1)];
+    let mut all = vec![([0.0; 3], 0.0); size.iter().product::<u32>() as usize];
+    let (mut first, mut layer) = (grid.lattice().size()[2], 0);
+    for grid in finer {
+        let [px, py, pz] = places(grid);
+        for place in grid.places() {
+            let [x, y, z] = [place % px, place / px % py, place / (px * py) + layer];
+            all[(x + size[0] * (y + size[1] * z)) as usize] = ([0.0, 0.0, first as f32], 1.0);
+            first += BRICK;
+        }
+        layer += pz;
+    }
+    (size, texels(all.into_iter()))
 }
 
 /// As `fogbow bake` writes them: half floats, colour and what is in alpha.
@@ -44,7 +92,7 @@ fn texels(colours: impl Iterator<Item = ([f32; 3], f32)>) -> Vec<f16> {
 }
 
 /// Two answers to each question: light in alpha nothing, and fog with transmittance in alpha.
-pub fn answers(grid: &ProbeGrid<'_>, questions: &[Question]) -> Result<Vec<[f32; 4]>, Box<dyn std::error::Error>> {
+pub fn answers(levels: &ProbeLevels<'_>, questions: &[Question]) -> Result<Vec<[f32; 4]>, Box<dyn std::error::Error>> {
     let instance = Instance::new(InstanceDescriptor::new_without_display_handle());
     let adapter = pollster::block_on(instance.request_adapter(&Default::default()))
         .map_err(|error| format!("no graphics: {error}; Debian's mesa-vulkan-drivers has a driver in software"))?;
@@ -74,14 +122,22 @@ pub fn answers(grid: &ProbeGrid<'_>, questions: &[Question]) -> Result<Vec<[f32;
         cache: None,
     });
 
+    let grid = &levels.levels()[0];
     let bounds = grid.lattice().bounds();
     let count = grid.basis().count();
-    let probes = Probes { corner: bounds.min.into(), scale: 1.0, size: bounds.size().into(), numbers: count as u32 };
+    let probes = Probes {
+        corner: bounds.min.into(),
+        scale: 1.0,
+        size: bounds.size().into(),
+        numbers: count as u32,
+        counts: grid.lattice().size(),
+        levels: levels.levels().len() as u32 - 1,
+    };
     let buffer =
         |contents: &[u8], usage| device.create_buffer_init(&BufferInitDescriptor { label: None, contents, usage });
     let uniform = buffer(bytemuck::bytes_of(&probes), BufferUsages::UNIFORM);
-    let [width, height, depth_or_array_layers] = grid.lattice().size();
-    let texture = |texels: Vec<f16>| {
+    let texture = |(size, texels): ([u32; 3], Vec<f16>)| {
+        let [width, height, depth_or_array_layers] = size;
         let descriptor = TextureDescriptor {
             label: None,
             size: Extent3d { width, height, depth_or_array_layers },
@@ -97,23 +153,28 @@ pub fn answers(grid: &ProbeGrid<'_>, questions: &[Question]) -> Result<Vec<[f32;
             .create_texture_with_data(&queue, &descriptor, TextureDataOrder::LayerMajor, &bytes)
             .create_view(&Default::default())
     };
-    let valid = |index: usize| if grid.probes()[index].state() == ProbeState::Valid { 1.0 } else { 0.0 };
+    let valid = |probe: &Probe| if probe.state() == ProbeState::Valid { 1.0 } else { 0.0 };
     let mut views: Vec<_> = (0..NUMBERS)
         .map(|number| {
             // What lies beyond the numbers of a probe is bound, but must not be read.
-            let held = |index| grid.held(index).get(number).map_or([f32::NAN; 3], |held| [held[0], held[1], held[2]]);
-            texture(texels((0..grid.probes().len()).map(|index| (held(index), valid(index)))))
+            texture(atlas(levels, |grid, index| {
+                let held = grid.held(index).get(number).map_or([f32::NAN; 3], |held| [held[0], held[1], held[2]]);
+                (held, valid(&grid.probes()[index]))
+            }))
         })
         .collect();
-    let matter = grid.probes().iter().map(|probe| {
-        let albedo = probe.albedo;
-        ([albedo[0], albedo[1], albedo[2]], probe.extinction.mean())
-    });
-    views.push(texture(texels(matter)));
+    views.push(texture(atlas(levels, |grid, index| {
+        let probe = &grid.probes()[index];
+        (probe.albedo.0, probe.extinction.mean())
+    })));
     for number in 0..2 {
-        let planes = grid.probes().iter().map(|probe| (probe.planes()[number].to_array(), 0.0));
-        views.push(texture(texels(planes)));
+        views.push(texture(atlas(levels, |grid, index| {
+            let probe = &grid.probes()[index];
+            let inner = if number == 0 && probe.is_inner() { 1.0 } else { 0.0 };
+            (probe.planes()[number].to_array(), inner)
+        })));
     }
+    views.push(texture(index(levels)));
 
     let asked = buffer(bytemuck::cast_slice(questions), BufferUsages::STORAGE);
     let size = (questions.len() * 2 * size_of::<[f32; 4]>()) as u64;
