@@ -6,9 +6,7 @@
 
 enum { SIDE = 128, SAMPLES = 4 };
 
-static void check(fogbow_status status) {
-    if (status) exit((fprintf(stderr, "%s\n", fogbow_message()), 1));
-}
+static void check(fogbow_status status) { if (status) exit((fprintf(stderr, "%s\n", fogbow_message()), 1)); }
 
 /* A room from -1 to 1, red on the left and green on the right, seen from within. */
 static int32_t closest_hit(void *context, const fogbow_ray *ray, fogbow_hit *hit) {
@@ -29,7 +27,6 @@ int main(void) {
     fogbow_properties fog = {.absorption = {0.1f, 0.1f, 0.1f}, .scattering = {0.9f, 0.9f, 0.9f}, .phase = {FOGBOW_PHASE_RAYLEIGH, 0, 0}};
     fogbow_light lamp = {.kind = FOGBOW_LIGHT_POINT, .position = {-0.3f, 0.4f, 0}, .emission = {0.3f, 0.27f, 0.2f}};
     fogbow_host_scene room = {.size = sizeof room, .closest_hit = closest_hit};
-    fogbow_world_parts parts = {sizeof parts, .scene = &room, .lights = &lamp, .light_count = 1, .bounds = {{-1, -1, -1}, {1, 1, 1}}};
     fogbow_camera camera = {.eye = {0, 0, 0.95f}, .target = {0, 0, 0}, .up = {0, 1, 0}, .field_of_view = 1.2f, .aspect = 1};
     fogbow_view view = {.size = sizeof view, .pixel = 1.2f / SIDE, .context = &camera, .ray = fogbow_camera_ray};
     fogbow_settings settings = {.size = sizeof settings, .error = 0.1f};
@@ -38,7 +35,8 @@ int main(void) {
     fogbow_caches *caches;
     fogbow_work *work;
     check(fogbow_medium_homogeneous(&fog, &medium));
-    parts.medium = medium;
+    fogbow_world_parts parts = {.size = sizeof parts, .medium = medium, .scene = &room, .lights = &lamp, .light_count = 1,
+                                .bounds = {{-1, -1, -1}, {1, 1, 1}}};
     check(fogbow_world_new(&parts, &world));
     check(fogbow_caches_new(world, &settings, &caches));
     check(fogbow_fill_view(caches, world, &view, &work));

@@ -34,6 +34,9 @@ for compilers in "gcc g++" "clang clang++"; do
 done
 cat "$out/formulas" "$out/smoke_box" "$out/atrium"
 (cd "$out" && gcc/bake && gcc/jobs && gcc/misuse)
+lines=$(wc -l <examples/fog.c)
+((lines < 60))
+echo "fog.c, a world and a ray caster: $lines lines"
 
 gcc -std=c99 "${flags[@]}" -o "$out/static" examples/smoke_box.c -L"$prefix/lib" "${static[@]}" -lm
 env -u LD_LIBRARY_PATH "$out/static" | diff examples/smoke_box.txt -

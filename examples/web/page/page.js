@@ -150,9 +150,9 @@ function redraw() {
 }
 
 let movedAt = -Infinity;
-/** Still pictures have more pixels than those of a walk. */
+/** Still pictures have more pixels than those of a walk, and than those before there is baked light: until then, the processor is to bake. */
 const REST = 2.2;
-const isMoving = (now) => held.size > 0 || now - movedAt < 400;
+const isMoving = (now) => held.size > 0 || now - movedAt < 400 || frames.firstLight === undefined;
 
 function moved() {
   movedAt = performance.now();
@@ -309,7 +309,7 @@ for (const id of [...SLIDERS, "colour"]) element(id).addEventListener("input", c
 for (const radio of document.querySelectorAll("input[name=mode]")) {
   radio.addEventListener("change", () => {
     canvas.width = 0;
-    moved();
+    redraw();
     truth.run();
   });
 }
@@ -425,13 +425,17 @@ tabs.forEach((tab, i) => {
 
 // ---------------------------------------------------------------------------------------------
 
+async function draw() {
+  const response = await fetch(new URL("./fog.glsl", import.meta.url));
+  renderer = new Renderer(canvas, await response.text());
+  redraw();
+}
+
 showValues();
 try {
-  const fog = await fetch(new URL("./fog.glsl", import.meta.url)).then((response) => response.text());
-  renderer = new Renderer(canvas, fog);
-  redraw();
   const count = Math.max(1, Math.min(3, (navigator.hardwareConcurrency ?? 2) - 1));
-  workers = await Workers.start({ count });
+  // The module is compiled while the shaders are.
+  [workers] = await Promise.all([Workers.start({ count }), draw()]);
   await bake();
 } catch (error) {
   problem(error);

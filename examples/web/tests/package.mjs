@@ -9,7 +9,7 @@ import { tmpdir } from "node:os";
 import { dirname, join, resolve } from "node:path";
 import { fileURLToPath, pathToFileURL } from "node:url";
 import { promisify } from "node:util";
-import { brotliCompressSync, constants, gzipSync } from "node:zlib";
+import { brotliCompressSync, constants } from "node:zlib";
 
 const run = promisify(execFile);
 const [given, full] = process.argv.slice(2);
@@ -24,8 +24,10 @@ const check = (name, holds, told = "") => {
 for (const file of ["fogbow.wasm", "fogbow-simd.wasm"]) {
   const bytes = await readFile(join(folder, file));
   const brotli = brotliCompressSync(bytes, { params: { [constants.BROTLI_PARAM_QUALITY]: 11 } }).length;
-  const told = `${bytes.length} bytes, ${brotli} by brotli, ${gzipSync(bytes, { level: 9 }).length} by gzip`;
-  check(`${file} has at most 600 kB, 250 kB compressed`, bytes.length <= 600_000 && brotli <= 250_000, told);
+  // Of gzip itself: Node's zlib makes more of the same.
+  const gzip = (await run("gzip", ["-9", "-c", join(folder, file)], { encoding: "buffer", maxBuffer: 1 << 21 })).stdout.length;
+  const told = `${bytes.length} bytes, ${gzip} by gzip, ${brotli} by brotli`;
+  check(`${file} has at most 600 kB, 250 kB compressed`, bytes.length <= 600_000 && gzip <= 250_000, told);
   const imports = WebAssembly.Module.imports(new WebAssembly.Module(bytes));
   check(`${file} imports nothing`, imports.length === 0, imports.map(({ name }) => name).join());
 }
