@@ -1,9 +1,184 @@
-//! Layer 0a: what is saved and sent: little-endian elements and a checksum.
+//! Layer 0a: what is saved and sent: little-endian elements, headers and a checksum.
+
+use core::fmt;
 
 use bytemuck::Pod;
 
+/// Why bytes are not what they should be, in the order of the checks: what all formats of this crate have in common.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Damage {
+    /// Other first bytes: something else altogether.
+    Magic {
+        /// What they should be the bytes of.
+        due: &'static str,
+    },
+    /// Fewer bytes than a header.
+    NoHeader {
+        /// How many there are.
+        found: usize,
+        /// How many a header has.
+        due: usize,
+    },
+    /// Of another version of the format.
+    Version {
+        /// The one that is there.
+        found: u32,
+        /// The one that is read.
+        known: u32,
+    },
+    /// Not as many bytes as the header says.
+    Length {
+        /// How many there are.
+        found: u64,
+        /// How many the header says.
+        due: u64,
+    },
+    /// Another checksum.
+    Checksum,
+    /// Made for something else.
+    Tag {
+        /// What it was made for.
+        found: u64,
+        /// What was asked for.
+        due: u64,
+    },
+}
+
+impl fmt::Display for Damage {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match *self {
+            Self::Magic { due } => write!(f, "is no {due}: other first bytes"),
+            Self::NoHeader { found, due } => write!(f, "ends after {found} bytes, before its header of {due} does"),
+            Self::Version { found, known } => write!(f, "has version {found} of the format; {known} is known"),
+            Self::Length { found, due } if found < due => {
+                write!(f, "is cut off: {due} bytes are due, {found} are there")
+            }
+            Self::Length { found, due } => write!(f, "goes on after its end: {due} bytes are due, {found} are there"),
+            Self::Checksum => f.write_str("is damaged: the checksum is another"),
+            Self::Tag { found, due } => write!(f, "was made for something else (tag {found:016x}, not {due:016x})"),
+        }
+    }
+}
+
+impl core::error::Error for Damage {}
+
+impl Damage {
+    /// An error unless a tag is the one asked for.
+    pub(crate) fn unless_tag(found: u64, due: u64) -> Result<(), Self> {
+        if found == due { Ok(()) } else { Err(Self::Tag { found, due }) }
+    }
+
+    /// An error unless there are as many bytes as are due.
+    pub(crate) fn unless_length(found: usize, due: u64) -> Result<(), Self> {
+        let found = found as u64;
+        if found == due { Ok(()) } else { Err(Self::Length { found, due }) }
+    }
+}
+
+/// What is written part after part, to a sink.
+pub(crate) type Sink<'a, F> = &'a mut dyn FnMut(&[u8]) -> Result<(), F>;
+
+/// How bytes of a kind begin: 8 that tell the kind, the version, words of its own, and at the end of this header the [`Crc`] of all but itself.
+pub(crate) struct Format {
+    /// The first bytes: not text, and damaged by whatever changes ends of lines.
+    pub(crate) magic: [u8; 8],
+    pub(crate) version: u32,
+    /// Length of the header, at most [`MOST_HEADER`] (bytes).
+    pub(crate) header: usize,
+    /// What it is, for messages.
+    pub(crate) what: &'static str,
+}
+
+/// No header is longer (bytes).
+const MOST_HEADER: usize = 128;
+
+const CHECKSUM: usize = 8;
+
+impl Format {
+    /// Writes a header with `words` of its own, and the `body`, which is gone through twice, since its checksum comes before it.
+    pub(crate) fn write<F>(
+        &self,
+        words: impl IntoIterator<Item = u32>,
+        body: &dyn Fn(Sink<'_, F>) -> Result<(), F>,
+        sink: Sink<'_, F>,
+    ) -> Result<(), F> {
+        let mut header = [0; MOST_HEADER];
+        let (header, crc_at) = (&mut header[..self.header], self.header - CHECKSUM);
+        header[..8].copy_from_slice(&self.magic);
+        let words = [self.version].into_iter().chain(words);
+        for (to, word) in header[8..crc_at].chunks_exact_mut(4).zip(words) {
+            to.copy_from_slice(&word.to_le_bytes());
+        }
+        let mut crc = Crc::new();
+        crc.add(&header[..crc_at]);
+        body(&mut |part| {
+            crc.add(part);
+            Ok(())
+        })?;
+        header[crc_at..].copy_from_slice(&crc.value().to_le_bytes());
+        sink(header)?;
+        body(sink)
+    }
+
+    /// The header, after a look at its first bytes, length and version.
+    pub(crate) fn header<'b>(&self, bytes: &'b [u8]) -> Result<Header<'b>, Damage> {
+        let start = bytes.len().min(self.magic.len());
+        if bytes[..start] != self.magic[..start] {
+            return Err(Damage::Magic { due: self.what });
+        }
+        let due = self.header;
+        let (header, _) = bytes.split_at_checked(due).ok_or(Damage::NoHeader { found: bytes.len(), due })?;
+        let header = Header(header);
+        match header.word(8) {
+            version if version == self.version => Ok(header),
+            found => Err(Damage::Version { found, known: self.version }),
+        }
+    }
+}
+
+/// The header of a [`Format`]; places are in bytes from its beginning.
+#[derive(Clone, Copy)]
+pub(crate) struct Header<'b>(&'b [u8]);
+
+impl Header<'_> {
+    pub(crate) fn word(&self, at: usize) -> u32 {
+        word(self.0, at)
+    }
+
+    pub(crate) fn long(&self, at: usize) -> u64 {
+        long(self.0, at)
+    }
+
+    pub(crate) fn numbers<const N: usize>(&self, at: usize) -> [f32; N] {
+        core::array::from_fn(|i| f32::from_bits(self.word(at + 4 * i)))
+    }
+
+    /// An error unless the checksum is that of the header and `body`.
+    pub(crate) fn check(&self, body: &[u8]) -> Result<(), Damage> {
+        let (own, checksum) = self.0.split_at(self.0.len() - CHECKSUM);
+        let mut crc = Crc::new();
+        crc.add(own);
+        crc.add(body);
+        if crc.value() == long(checksum, 0) { Ok(()) } else { Err(Damage::Checksum) }
+    }
+}
+
+/// A long as two words of a header.
+pub(crate) const fn halves(long: u64) -> [u32; 2] {
+    [long as u32, (long >> 32) as u32]
+}
+
+pub(crate) fn word(bytes: &[u8], at: usize) -> u32 {
+    u32::from_le_bytes([bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]])
+}
+
+pub(crate) fn long(bytes: &[u8], at: usize) -> u64 {
+    u64::from(word(bytes, at)) | u64::from(word(bytes, at + 4)) << 32
+}
+
 /// Elements in little-endian bytes, one at a time.
-pub(crate) fn elements<T: Pod, F>(all: &[T], sink: &mut impl FnMut(&[u8]) -> Result<(), F>) -> Result<(), F> {
+pub(crate) fn elements<T: Pod, F>(all: &[T], sink: Sink<'_, F>) -> Result<(), F> {
     if cfg!(target_endian = "little") {
         return if all.is_empty() { Ok(()) } else { sink(bytemuck::cast_slice(all)) };
     }

@@ -119,8 +119,8 @@ fn caches_of_anything_else_are_refused() {
     let cases: &[(Vec<&str>, &[&str])] = &[
         (with("none", &[]), &["none: ", "No such file"]),
         (with(".", &[]), &[".: is not a file"]),
-        (with("empty", &[]), &["empty: is not a file of radiance caches"]),
-        (with("a.png", &[]), &["a.png: is not a file of radiance caches"]),
+        (with("empty", &[]), &["empty: ends after 0 bytes"]),
+        (with("a.png", &[]), &["a.png: is no file of radiance caches"]),
         (with("cut", &[]), &["cut: is cut off"]),
         (with("flipped", &[]), &["flipped: ", "damaged"]),
         (
@@ -138,7 +138,7 @@ fn caches_of_anything_else_are_refused() {
             &["--cache-out has no effect with --method path", "any depth", "--method radiance-cache"],
         ),
         (vec!["records", SCENE, "--cache-in", "a.caches", "-o", "a.gif"], &["a.gif: the extension"]),
-        (vec!["records", SCENE, "--cache-in", "a.png", "-o", "b.png"], &["a.png: is not a file of radiance caches"]),
+        (vec!["records", SCENE, "--cache-in", "a.png", "-o", "b.png"], &["a.png: is no file of radiance caches"]),
         (vec!["records", SCENE, "--height", "1", "-o", "b.png"], &["--section"]),
         (vec!["records", SCENE, "--section", "--height", "nan", "-o", "b.png"], &["--height"]),
         (vec!["records", SCENE, "--kind", "magic", "-o", "b.png"], &["magic"]),

@@ -357,7 +357,7 @@ fn a_probe_writes_a_row_per_point_and_refuses_what_it_cannot_answer() {
         (&["--at", "0,0,0", "--grid", "2x2x2"][..], "cannot be used with"),
         (&[][..], "--at <X,Y,Z>|--line <FROM TO>|--grid <NxNxN>"),
         (&["--at", "0,0,0", "--grid-in", "grid", "--max-depth", "3"][..], "another scene, or with another --max-depth"),
-        (&["--at", "0,0,0", "--grid-in", "line.csv"][..], "this is no covariance grid"),
+        (&["--at", "0,0,0", "--grid-in", "line.csv"][..], "is no covariance grid"),
         (&["--at", "0,0,0", "-o", "nowhere/a.csv"][..], "cannot be written"),
     ] {
         let output = run(arguments);

@@ -3,7 +3,7 @@
 
     tests/acceptance/fuzz.py [SECONDS] [WORD]
 
-Only tests with the word in their name, if there is one: sparse, gltf, fog, meshes, images, volumes, scenes.
+Only tests with the word in their name, if there is one: sparse, gltf, pbrt, fog, meshes, images, volumes, scenes.
 """
 import json
 import os

@@ -4,6 +4,7 @@
 use std::path::{Path, PathBuf};
 
 use fogbow::bytes::Crc;
+use fogbow::bytes::Damage;
 use fogbow::cache::bytes::{self, Attachment, BytesError, HEADER_BYTES, Header, RecordKind, byte_count, read_into};
 use fogbow::cache::{
     Asked, Basis, Cache, CachesError, Effort, Facing, FilledRecords, Kind, Limits, RadianceCaches, Reading, Record,
@@ -190,10 +191,10 @@ fn every_other_byte_is_found_and_every_cut() {
             assert!(read(&with(&whole, at, &[whole[at] ^ change])).is_err(), "byte {at}");
         }
         let expected = match at {
-            0..HEADER_BYTES => BytesError::NoHeader { found: at },
-            _ => BytesError::Length { found: at, due: whole.len() },
+            0..HEADER_BYTES => Damage::NoHeader { found: at, due: HEADER_BYTES },
+            _ => Damage::Length { found: at as u64, due: whole.len() as u64 },
         };
-        assert_eq!(read(&whole[..at]), Err(expected));
+        assert_eq!(read(&whole[..at]), Err(expected.into()));
     }
 }
 
@@ -203,11 +204,12 @@ fn what_is_wrong_is_said() {
     let number = |at: usize, value: u32| with(&whole, at, &value.to_le_bytes());
     let float = |at: usize, value: f32| sealed(with(&whole, at, &value.to_le_bytes()));
     let more = [&whole[..], b"x"].concat();
+    let magic = BytesError::from(Damage::Magic { due: "radiance cache" });
     let cases: &[(&[u8], BytesError, &str)] = &[
-        (b"", BytesError::NoHeader { found: 0 }, "ends after 0 bytes"),
-        (&[0; 40], BytesError::Magic, "not a radiance cache"),
-        (&with(&whole, 0, b"\x89PNG\r\n\x1a\n"), BytesError::Magic, "not a radiance cache"),
-        (&number(8, 2), BytesError::Version(2), "version 2 of the format; 1 is known"),
+        (b"", Damage::NoHeader { found: 0, due: 40 }.into(), "ends after 0 bytes"),
+        (&[0; 40], magic, "no radiance cache"),
+        (&with(&whole, 0, b"\x89PNG\r\n\x1a\n"), magic, "no radiance cache"),
+        (&number(8, 2), Damage::Version { found: 2, known: 1 }.into(), "version 2 of the format; 1 is known"),
         (&number(12, 3), BytesError::UnknownKind(3), "unknown kind 3"),
         (
             &sealed(number(12, 2)),
@@ -215,11 +217,11 @@ fn what_is_wrong_is_said() {
             "on surfaces where records in a medium",
         ),
         (&number(16, 300), BytesError::Size { stride: 300, count: 4 }, "300 attachments"),
-        (&number(20, 5), BytesError::Length { found: 296, due: 360 }, "cut off: 360 bytes are due, 296"),
-        (&number(20, 3), BytesError::Length { found: 296, due: 232 }, "goes on after its end"),
-        (&more, BytesError::Length { found: 297, due: 296 }, "goes on after its end"),
-        (&with(&whole, 100, &[whole[100] ^ 4]), BytesError::Checksum, "damaged"),
-        (&sealed(with(&whole, 24, &[0; 8])), BytesError::Tag { found: 0, due: TAG }, "something else"),
+        (&number(20, 5), Damage::Length { found: 296, due: 360 }.into(), "cut off: 360 bytes are due, 296"),
+        (&number(20, 3), Damage::Length { found: 296, due: 232 }.into(), "goes on after its end"),
+        (&more, Damage::Length { found: 297, due: 296 }.into(), "goes on after its end"),
+        (&with(&whole, 100, &[whole[100] ^ 4]), Damage::Checksum.into(), "damaged"),
+        (&sealed(with(&whole, 24, &[0; 8])), Damage::Tag { found: 0, due: TAG }.into(), "something else"),
         (&float(40, f32::NAN), BytesError::Record(0), "number 0"),
         (&float(40 + 64 + 8, f32::INFINITY), BytesError::Record(1), "number 1"),
         (&float(40 + 2 * 64 + 12, -0.5), BytesError::Record(2), "number 2"),

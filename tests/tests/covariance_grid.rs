@@ -4,6 +4,7 @@
 use std::path::PathBuf;
 
 use fogbow::bytes::Crc;
+use fogbow::bytes::Damage;
 use fogbow::covariance::bytes::{self, GridBytesError, HEADER_BYTES, VERSION};
 use fogbow::covariance::{
     AdaptiveSteps, CellCrossing, CovarianceGrid, Fill, FrequencyPhotons, GridView, Lattice, OccluderCell, Occluders,
@@ -190,7 +191,12 @@ fn small() -> Vec<u8> {
 
 #[test]
 fn broken_bytes_are_refused_with_the_reason() {
-    use GridBytesError::*;
+    use GridBytesError::{Lattice, Storage, Voxel};
+    let length = |found: usize, due: usize| Damage::Length { found: found as u64, due: due as u64 }.into();
+    let header = |found| Damage::NoHeader { found, due: HEADER_BYTES }.into();
+    let (magic, checksum) =
+        (GridBytesError::from(Damage::Magic { due: "covariance grid" }), GridBytesError::from(Damage::Checksum));
+    let version = |found| Damage::Version { found, known: VERSION }.into();
     let good = small();
     assert!(read(&good).is_ok());
     let word = |at: usize, value: u32| sealed(with(&good, at, &value.to_le_bytes()));
@@ -202,31 +208,35 @@ fn broken_bytes_are_refused_with_the_reason() {
     longer.push(0);
     let text = String::from_utf8_lossy(&good).replace('\n', "\r\n").into_bytes();
     let cases: Vec<(&str, Vec<u8>, GridBytesError)> = vec![
-        ("empty", Vec::new(), NoHeader { found: 0 }),
-        ("a header short of a byte", good[..71].to_vec(), NoHeader { found: 71 }),
-        ("a header alone", good[..72].to_vec(), Length { found: 72, due }),
-        ("a byte short", good[..due - 1].to_vec(), Length { found: due - 1, due }),
-        ("a byte more", longer, Length { found: due + 1, due }),
-        ("foreign magic", with(&good, 0, b"\x89PNG\r\n\x1a\n"), Magic),
-        ("a radiance cache", with(&good, 0, b"\x89FOGBOW\n"), Magic),
-        ("sent as text", text, Magic),
-        ("version 0", word(8, 0), Version(0)),
-        ("the next version", word(8, VERSION + 1), Version(VERSION + 1)),
+        ("empty", Vec::new(), header(0)),
+        ("a header short of a byte", good[..71].to_vec(), header(71)),
+        ("a header alone", good[..72].to_vec(), length(72, due)),
+        ("a byte short", good[..due - 1].to_vec(), length(due - 1, due)),
+        ("a byte more", longer, length(due + 1, due)),
+        ("foreign magic", with(&good, 0, b"\x89PNG\r\n\x1a\n"), magic),
+        ("a radiance cache", with(&good, 0, b"\x89FOGBOW\n"), magic),
+        ("sent as text", text, magic),
+        ("version 0", word(8, 0), version(0)),
+        ("the next version", word(8, VERSION + 1), version(VERSION + 1)),
         ("no cells across", word(12, 0), Lattice),
         ("too many cells across", word(16, 1025), Lattice),
         ("endless cells across", word(20, u32::MAX), Lattice),
-        ("one layer more", word(20, 3), Length { found: due, due: due + 6 * 28 }),
-        ("one layer less", word(20, 1), Length { found: due, due: due - 6 * 28 }),
+        ("one layer more", word(20, 3), length(due, due + 6 * 28)),
+        ("one layer less", word(20, 1), length(due, due - 6 * 28)),
         ("a corner that is no number", float(24, f32::NAN), Lattice),
         ("a corner without end", float(44, f32::INFINITY), Lattice),
         ("corners the wrong way round", float(28, 5.0), Lattice),
         ("corners too far apart", sealed(with(&float(24, -3e38), 36, &3e38_f32.to_le_bytes())), Lattice),
         ("a box without extent", sealed(with(&good, 36, &[0; 12])), Lattice),
-        ("another tag", sealed(with(&good, 48, &[7; 8])), Tag { found: 0x0707_0707_0707_0707, due: TAG }),
-        ("another tag, unsealed", with(&good, 48, &[7; 8]), Checksum),
-        ("another number of photons", with(&good, 56, &[7; 8]), Checksum),
-        ("another checksum", with(&good, 64, &[7; 8]), Checksum),
-        ("one bit of a voxel", with(&good, 200, &[good[200] ^ 1]), Checksum),
+        (
+            "another tag",
+            sealed(with(&good, 48, &[7; 8])),
+            Damage::Tag { found: 0x0707_0707_0707_0707, due: TAG }.into(),
+        ),
+        ("another tag, unsealed", with(&good, 48, &[7; 8]), checksum),
+        ("another number of photons", with(&good, 56, &[7; 8]), checksum),
+        ("another checksum", with(&good, 64, &[7; 8]), checksum),
+        ("one bit of a voxel", with(&good, 200, &[good[200] ^ 1]), checksum),
         ("a weight that is no number", voxel(3, 6, f32::NAN), Voxel(3)),
         ("a sum that is no number", voxel(11, 1, f32::NAN), Voxel(11)),
         ("a sum without end", voxel(0, 4, f32::NEG_INFINITY), Voxel(0)),
@@ -243,7 +253,7 @@ fn broken_bytes_are_refused_with_the_reason() {
         assert!(matches!(error.problem, Problem::Content(found) if found == expected), "{name}: {error}");
         assert!(error.to_string().contains(&expected.to_string()));
     }
-    assert_eq!(bytes::header(&good, 1).unwrap_err(), Tag { found: TAG, due: 1 });
+    assert_eq!(bytes::header(&good, 1).unwrap_err(), Damage::Tag { found: TAG, due: 1 }.into());
     let mut few = [fogbow::covariance::Voxel::EMPTY; 11];
     assert_eq!(bytes::read_into(&good, TAG, &mut few), Err(Storage));
 }
@@ -264,10 +274,10 @@ fn every_truncation_and_every_flipped_bit_is_found() {
     for length in 0..good.len() {
         let error = read(&good[..length]).unwrap_err();
         let expected = match length {
-            0..HEADER_BYTES => GridBytesError::NoHeader { found: length },
-            _ => GridBytesError::Length { found: length, due: good.len() },
+            0..HEADER_BYTES => Damage::NoHeader { found: length, due: HEADER_BYTES },
+            _ => Damage::Length { found: length as u64, due: good.len() as u64 },
         };
-        assert_eq!(error, expected);
+        assert_eq!(error, expected.into());
     }
     for bit in 0..8 * good.len() {
         let broken = with(&good, bit / 8, &[good[bit / 8] ^ 1 << (bit % 8)]);

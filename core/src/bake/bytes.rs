@@ -13,7 +13,7 @@
 //! | 56 | 4 | orders: 0 all, 1 indirect, 2 multiple |
 //! | 60 | 4 | number of bricks `b` |
 //! | 64 | 8 | tag: what the grid was made for, a number of the host's choice |
-//! | 72 | 8 | [`Crc`] of bytes 0 to 72 and of all from 80 on |
+//! | 72 | 8 | [`Crc`](crate::bytes::Crc) of bytes 0 to 72 and of all from 80 on |
 //! | 80 | 12 n k | numbers in colour, `k` of each of `n` probes, as `f32` |
 //! | | 4 n k | their sums of squared deviations over passes, a mean over channels, as `f32` |
 //! | | 80 n | extinction and albedo in colour, planes of four surfaces, share of its cell, as `f32`; as `u32` state in bits 0 to 2, [`Probe::is_inner`] in bit 3, surfaces before the next probes in bits 4 to 6 |
@@ -24,13 +24,11 @@
 
 use core::fmt;
 
-use glam::Vec3;
-
 use super::basis::{Orders, ProbeBasis, Quantity};
 use super::grid::{BakeMemory, Brick, INNER, PROBES, Probe, ProbeGrid, ProbeState, STATE, WALLS};
 use super::levels::ProbeLevels;
 use super::settings::MOST_PROBES;
-use crate::bytes::{Crc, element, elements};
+use crate::bytes::{Damage, Format, Header, Sink, element, elements, halves};
 use crate::covariance::Lattice;
 use crate::math::Bounds;
 use crate::spectrum::Spectrum;
@@ -54,56 +52,33 @@ const SPARSE: u32 = 256;
 const AMBIENT_CUBE: u32 = 16;
 const FLUENCE: u32 = 17;
 
-/// Why bytes are not the grid asked for, in the order of the checks.
+const FORMAT: Format = Format { magic: MAGIC, version: VERSION, header: HEADER_BYTES, what: "grid of probes" };
+
+/// Why bytes are not the grid asked for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum ProbeBytesError {
-    /// Fewer bytes than a header.
-    NoHeader {
-        /// How many there are.
-        found: usize,
-    },
-    /// Other first bytes: something else altogether.
-    Magic,
-    /// Of another version than [`VERSION`].
-    Version(u32),
+    /// No such bytes, or damaged ones, or made for something else.
+    Damage(Damage),
     /// Bounds, numbers of probes or a basis that no grid has.
     Layout,
-    /// Not as many bytes as the header says.
-    Length {
-        /// How many there are.
-        found: usize,
-        /// How many the header says.
-        due: usize,
-    },
-    /// Damaged.
-    Checksum,
-    /// Made for something else.
-    Tag {
-        /// What it was made for.
-        found: u64,
-        /// What was asked for.
-        due: u64,
-    },
     /// A probe that holds what no bake leaves: a number that is not finite, a state that is not known.
     Probe(usize),
     /// The storage is too small.
     Storage,
 }
 
+impl From<Damage> for ProbeBytesError {
+    fn from(damage: Damage) -> Self {
+        Self::Damage(damage)
+    }
+}
+
 impl fmt::Display for ProbeBytesError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::NoHeader { found } => write!(f, "ends after {found} bytes, before its header of {HEADER_BYTES} does"),
-            Self::Magic => f.write_str("is no grid of probes: other first bytes"),
-            Self::Version(version) => write!(f, "has version {version} of the format; {VERSION} is known"),
+            Self::Damage(damage) => damage.fmt(f),
             Self::Layout => f.write_str("has bounds, numbers of probes or a basis that no grid has"),
-            Self::Length { found, due } if found < due => {
-                write!(f, "is cut off: {due} bytes are due, {found} are there")
-            }
-            Self::Length { found, due } => write!(f, "goes on after its end: {due} bytes are due, {found} are there"),
-            Self::Checksum => f.write_str("is damaged: the checksum is another"),
-            Self::Tag { found, due } => write!(f, "was made for something else (tag {found:016x}, not {due:016x})"),
             Self::Probe(index) => write!(f, "has a probe that is not valid: number {index}"),
             Self::Storage => f.write_str("has more probes than there is memory for"),
         }
@@ -138,7 +113,7 @@ pub fn byte_count(grid: &ProbeGrid<'_>) -> usize {
 ///
 /// ```
 /// # use fogbow::{host::Empty, math::{Bounds, Vec3}, storage::List, world::{Outline, World}};
-/// # use fogbow::bake::{Bake, BakeMemory, BakeSettings, bytes::{self, ProbeBytesError}};
+/// # use fogbow::{bake::{Bake, BakeMemory, BakeSettings, bytes}, bytes::Damage};
 /// # #[cfg(feature = "alloc")] {
 /// # let bounds = Bounds { min: Vec3::ZERO, max: Vec3::ONE };
 /// # let outline = Outline::of(&World { medium: &Empty, scene: &Empty, lights: (&[]).into() }, bounds);
@@ -149,44 +124,30 @@ pub fn byte_count(grid: &ProbeGrid<'_>) -> usize {
 /// let copy = bytes::read(&file, 7, BakeMemory::default())?;
 /// assert_eq!((copy.lattice(), copy.basis()), (grid.lattice(), grid.basis()));
 /// let other = bytes::read(&file, 8, BakeMemory::default());
-/// assert_eq!(other.err(), Some(ProbeBytesError::Tag { found: 7, due: 8 }));
+/// assert_eq!(other.err(), Some(Damage::Tag { found: 7, due: 8 }.into()));
 /// # }
 /// # Ok::<(), Box<dyn core::error::Error>>(())
 /// ```
 pub fn write<F>(grid: &ProbeGrid<'_>, tag: u64, mut sink: impl FnMut(&[u8]) -> Result<(), F>) -> Result<(), F> {
-    let mut header = [0; HEADER_BYTES];
-    header[..8].copy_from_slice(&MAGIC);
     let basis = match grid.basis {
         ProbeBasis::SphericalHarmonics { degree } => degree,
         ProbeBasis::AmbientCube => AMBIENT_CUBE,
         ProbeBasis::Fluence => FLUENCE,
     };
-    let ([nx, ny, nz], bounds) = (grid.lattice.size(), grid.lattice.bounds());
-    let [low, high] = [bounds.min, bounds.max].map(|corner| corner.to_array().map(f32::to_bits));
+    let BakeMemory { values, deviations, probes, bricks, places } = &grid.memory;
+    let bounds = grid.lattice.bounds();
+    let corners = [bounds.min, bounds.max].into_iter().flat_map(|corner| corner.to_array().map(f32::to_bits));
     let quantity = grid.quantity as u32 + if grid.is_sparse() { SPARSE } else { 0 };
-    let last = [basis, quantity, grid.orders as u32, grid.memory.bricks.len() as u32];
-    let words = [VERSION, nx, ny, nz].into_iter().chain(low).chain(high).chain(last);
-    for (to, word) in header[8..64].chunks_exact_mut(4).zip(words) {
-        to.copy_from_slice(&word.to_le_bytes());
-    }
-    header[64..72].copy_from_slice(&tag.to_le_bytes());
-    let mut crc = Crc::new();
-    crc.add(&header[..72]);
-    fn all<F>(memory: &BakeMemory<'_>, sink: &mut impl FnMut(&[u8]) -> Result<(), F>) -> Result<(), F> {
-        let BakeMemory { values, deviations, probes, bricks, places } = memory;
+    let last = [basis, quantity, grid.orders as u32, bricks.len() as u32];
+    let words = grid.lattice.size().into_iter().chain(corners).chain(last).chain(halves(tag));
+    let body = |sink: Sink<'_, F>| {
         elements(values.as_slice(), sink)?;
         elements(deviations.as_slice(), sink)?;
         elements(probes.as_slice(), sink)?;
         elements(bricks.as_slice(), sink)?;
         elements(places.as_slice(), sink)
-    }
-    let Ok(()) = all(&grid.memory, &mut |bytes: &[u8]| {
-        crc.add(bytes);
-        Ok::<(), core::convert::Infallible>(())
-    });
-    header[72..].copy_from_slice(&crc.value().to_le_bytes());
-    sink(&header)?;
-    all(&grid.memory, &mut sink)
+    };
+    FORMAT.write(words, &body, &mut sink)
 }
 
 /// What a grid was made for: for hosts that want any.
@@ -195,31 +156,11 @@ pub fn write<F>(grid: &ProbeGrid<'_>, tag: u64, mut sink: impl FnMut(&[u8]) -> R
 /// Bytes that do not begin as those of a grid do; no more is looked at.
 ///
 /// ```
-/// # use fogbow::bake::bytes::{ProbeBytesError, tag};
-/// assert_eq!(tag(&[0; 99]), Err(ProbeBytesError::Magic));
+/// # use fogbow::bake::bytes::tag;
+/// assert!(tag(&[0; 99]).is_err());
 /// ```
 pub fn tag(bytes: &[u8]) -> Result<u64, ProbeBytesError> {
-    let header = header(bytes)?;
-    Ok(long(header, TAG_AT))
-}
-
-fn header(bytes: &[u8]) -> Result<&[u8; HEADER_BYTES], ProbeBytesError> {
-    let header = bytes.first_chunk::<HEADER_BYTES>().ok_or(ProbeBytesError::NoHeader { found: bytes.len() })?;
-    if !header.starts_with(&MAGIC) {
-        return Err(ProbeBytesError::Magic);
-    }
-    match word(header, 8) {
-        VERSION => Ok(header),
-        other => Err(ProbeBytesError::Version(other)),
-    }
-}
-
-fn word(header: &[u8; HEADER_BYTES], at: usize) -> u32 {
-    u32::from_le_bytes([header[at], header[at + 1], header[at + 2], header[at + 3]])
-}
-
-fn long(header: &[u8; HEADER_BYTES], at: usize) -> u64 {
-    u64::from(word(header, at)) | u64::from(word(header, at + 4)) << 32
+    Ok(FORMAT.header(bytes)?.long(TAG_AT))
 }
 
 /// Reads what was written as `bytes` with the same `tag`, into `memory`.
@@ -228,29 +169,18 @@ fn long(header: &[u8; HEADER_BYTES], at: usize) -> u64 {
 /// The first check that fails.
 ///
 /// ```
-/// # use fogbow::bake::{BakeMemory, bytes::{self, ProbeBytesError}};
+/// # use fogbow::bake::{BakeMemory, bytes};
 /// # #[cfg(feature = "alloc")] {
 /// let nothing = bytes::read(b"P6", 7, BakeMemory::default());
-/// assert_eq!(nothing.err(), Some(ProbeBytesError::NoHeader { found: 2 }));
+/// assert_eq!(nothing.err().unwrap().to_string(), "is no grid of probes: other first bytes");
 /// # }
 /// ```
 pub fn read<'s>(bytes: &[u8], tag: u64, memory: BakeMemory<'s>) -> Result<ProbeGrid<'s>, ProbeBytesError> {
-    let header = header(bytes)?;
-    let long = |at: usize| long(header, at);
-    let (mut grid, sizes) = layout(header, memory)?;
-    let due = HEADER_BYTES + sizes.iter().sum::<usize>();
-    if bytes.len() != due {
-        return Err(ProbeBytesError::Length { found: bytes.len(), due });
-    }
-    let mut crc = Crc::new();
-    crc.add(&header[..72]);
-    crc.add(&bytes[HEADER_BYTES..]);
-    if crc.value() != long(72) {
-        return Err(ProbeBytesError::Checksum);
-    }
-    if long(TAG_AT) != tag {
-        return Err(ProbeBytesError::Tag { found: long(TAG_AT), due: tag });
-    }
+    let header = FORMAT.header(bytes)?;
+    let (mut grid, sizes) = layout(&header, memory)?;
+    Damage::unless_length(bytes.len(), (HEADER_BYTES + sizes.iter().sum::<usize>()) as u64)?;
+    header.check(&bytes[HEADER_BYTES..])?;
+    Damage::unless_tag(header.long(TAG_AT), tag)?;
     let (values, rest) = bytes[HEADER_BYTES..].split_at(sizes[0]);
     let (deviations, rest) = rest.split_at(sizes[1]);
     let (states, rest) = rest.split_at(sizes[2]);
@@ -293,13 +223,9 @@ pub fn read<'s>(bytes: &[u8], tag: u64, memory: BakeMemory<'s>) -> Result<ProbeG
 }
 
 /// What a header says, and how many bytes each part takes: numbers, deviations, probes, bricks, places.
-fn layout<'s>(
-    header: &[u8; HEADER_BYTES],
-    memory: BakeMemory<'s>,
-) -> Result<(ProbeGrid<'s>, [usize; 5]), ProbeBytesError> {
-    let word = |at: usize| word(header, at);
-    let counts = [word(12), word(16), word(20)];
-    let corner = |at: usize| Vec3::from_array([0, 4, 8].map(|i| f32::from_bits(word(at + i))));
+fn layout<'s>(header: &Header<'_>, memory: BakeMemory<'s>) -> Result<(ProbeGrid<'s>, [usize; 5]), ProbeBytesError> {
+    let word = |at: usize| header.word(at);
+    let counts = [12, 16, 20].map(word);
     let basis = match word(48) {
         degree @ 0..=3 => ProbeBasis::SphericalHarmonics { degree },
         AMBIENT_CUBE => ProbeBasis::AmbientCube,
@@ -318,7 +244,7 @@ fn layout<'s>(
         2 => Orders::Multiple,
         _ => return Err(ProbeBytesError::Layout),
     };
-    let bounds = Bounds { min: corner(24), max: corner(36) };
+    let bounds = Bounds { min: header.numbers(24).into(), max: header.numbers(36).into() };
     let lattice = Lattice::new(bounds, counts).ok().filter(|lattice| lattice.bounds() == bounds);
     let lattice = lattice.ok_or(ProbeBytesError::Layout)?;
     let grid = ProbeGrid { lattice, basis, quantity, orders, memory };
@@ -347,7 +273,7 @@ fn layout<'s>(
 ///
 /// ```
 /// # use fogbow::{host::Empty, math::{Bounds, Vec3}, world::{Outline, World}};
-/// # use fogbow::bake::{Bake, BakeMemory, BakeSettings, ProbeLevels, bytes::{self, ProbeBytesError}};
+/// # use fogbow::bake::{Bake, BakeMemory, BakeSettings, ProbeLevels, bytes};
 /// # #[cfg(feature = "alloc")] {
 /// # let bounds = Bounds { min: Vec3::ZERO, max: Vec3::ONE };
 /// # let outline = Outline::of(&World { medium: &Empty, scene: &Empty, lights: (&[]).into() }, bounds);
@@ -372,10 +298,10 @@ pub fn write_levels<F>(
 /// The first check that fails; [`ProbeBytesError::Layout`] for levels that do not belong to each other.
 ///
 /// ```
-/// # use fogbow::bake::{BakeMemory, bytes::{self, ProbeBytesError}};
+/// # use fogbow::bake::{BakeMemory, bytes};
 /// # #[cfg(feature = "alloc")] {
 /// let nothing = bytes::read_levels(b"P6", 7, |_| BakeMemory::default());
-/// assert_eq!(nothing.err(), Some(ProbeBytesError::NoHeader { found: 2 }));
+/// assert_eq!(nothing.err().unwrap().to_string(), "is no grid of probes: other first bytes");
 /// # }
 /// ```
 pub fn read_levels<'s>(
@@ -387,9 +313,10 @@ pub fn read_levels<'s>(
     let mut next = |number: usize| {
         let sizes = levels_sizes(rest)?;
         let due = HEADER_BYTES + sizes.iter().sum::<usize>();
-        let (grid, after) = rest.split_at_checked(due).ok_or(ProbeBytesError::Length { found: rest.len(), due })?;
+        let cut = Damage::Length { found: rest.len() as u64, due: due as u64 };
+        let (grid, after) = rest.split_at_checked(due).ok_or(cut)?;
         rest = after;
-        Ok((read(grid, tag, memory(number))?, after.is_empty()))
+        Ok::<_, ProbeBytesError>((read(grid, tag, memory(number))?, after.is_empty()))
     };
     let (grid, mut is_last) = next(0)?;
     if grid.is_sparse() {
@@ -405,7 +332,7 @@ pub fn read_levels<'s>(
 }
 
 fn levels_sizes(bytes: &[u8]) -> Result<[usize; 5], ProbeBytesError> {
-    Ok(layout(header(bytes)?, BakeMemory::nothing())?.1)
+    Ok(layout(&FORMAT.header(bytes)?, BakeMemory::nothing())?.1)
 }
 
 fn fill<T: bytemuck::Pod>(list: &mut List<'_, T>, bytes: &[u8]) -> Result<(), Full> {

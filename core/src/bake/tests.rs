@@ -6,6 +6,7 @@ use glam::{Vec3, Vec3Swizzles};
 
 use super::bytes::{self, ProbeBytesError};
 use super::*;
+use crate::bytes::Damage;
 use crate::host::{Empty, Hit, Medium, Scene};
 use crate::light::{Light, Lights, PointLight};
 use crate::math::float::{INV_FOUR_PI, PI};
@@ -615,7 +616,7 @@ fn damaged_bytes_are_no_grid() {
     for length in 0..file.len() {
         assert!(read(&file[..length]).is_err(), "{length} bytes");
     }
-    assert!(matches!(read(&[&file[..], &[0]].concat()).err(), Some(ProbeBytesError::Length { .. })));
+    assert!(matches!(read(&[&file[..], &[0]].concat()).err(), Some(ProbeBytesError::Damage(Damage::Length { .. }))));
     let mut few = [Spectrum::ZERO; 3];
     let memory = BakeMemory { values: (&mut few[..]).into(), ..BakeMemory::default() };
     assert_eq!(bytes::read(&file, 0, memory).err(), Some(ProbeBytesError::Storage));

@@ -10,7 +10,7 @@
 //! | 16 | 4 | stride `s`: attachments per record, `(degree + 1)² − 1` in a medium, two more with light towards an eye, 1 on surfaces |
 //! | 20 | 4 | number of records `n` |
 //! | 24 | 8 | tag: what the cache was made for, a number of the host's choice |
-//! | 32 | 8 | [`Crc`] of bytes 0 to 32 and of all from 40 on |
+//! | 32 | 8 | [`Crc`](crate::bytes::Crc) of bytes 0 to 32 and of all from 40 on |
 //! | 40 | 64 n | records: position, radius, value (r, g, b), gradient (along x: r, g, b; along y; along z) as `f32` |
 //! | 40 + 64 n | 48 n s | attachments, record after record: 12 `f32` each, [`Coefficient`] or [`Facing`](super::Facing) |
 //!
@@ -38,7 +38,7 @@
 //! assert_eq!(copy.records(), cache.records());
 //!
 //! file[99] ^= 1;
-//! assert_eq!(bytes::read_into(&file, 7, &mut copy), Err(bytes::BytesError::Checksum));
+//! assert_eq!(bytes::read_into(&file, 7, &mut copy), Err(fogbow::bytes::Damage::Checksum.into()));
 //! # }
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
@@ -49,7 +49,7 @@ use super::Record;
 pub use super::record::Attachment;
 use super::record::MAX_STRIDE;
 use super::store::Cache;
-use crate::bytes::{Crc, element, elements};
+use crate::bytes::{Damage, Format, Sink, element, elements, halves};
 use crate::sh::Coefficient;
 use crate::storage::Full;
 
@@ -61,6 +61,8 @@ pub const VERSION: u32 = 1;
 
 /// Length of a [`Header`] (bytes).
 pub const HEADER_BYTES: usize = 40;
+
+const FORMAT: Format = Format { magic: MAGIC, version: VERSION, header: HEADER_BYTES, what: "radiance cache" };
 
 /// Which cache.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -81,19 +83,12 @@ impl fmt::Display for RecordKind {
     }
 }
 
-/// Why bytes are not the cache asked for. The variants are in the order of the checks.
+/// Why bytes are not the cache asked for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum BytesError {
-    /// Fewer bytes than a header.
-    NoHeader {
-        /// How many there are.
-        found: usize,
-    },
-    /// Other first bytes: something else altogether.
-    Magic,
-    /// Of another version than [`VERSION`].
-    Version(u32),
+    /// No such bytes, or damaged ones, or made for something else.
+    Damage(Damage),
     /// A kind that is not known.
     UnknownKind(u32),
     /// A stride or a number of records that no cache has.
@@ -103,15 +98,6 @@ pub enum BytesError {
         /// Records.
         count: u32,
     },
-    /// Not as many bytes as the header says.
-    Length {
-        /// How many there are.
-        found: usize,
-        /// How many the header says.
-        due: usize,
-    },
-    /// Damaged.
-    Checksum,
     /// The other kind of cache.
     Kind {
         /// What it is.
@@ -126,19 +112,18 @@ pub enum BytesError {
         /// As many as were asked for.
         due: u32,
     },
-    /// Made for something else.
-    Tag {
-        /// What it was made for.
-        found: u64,
-        /// What was asked for.
-        due: u64,
-    },
     /// A record that is not valid, see [`Record::is_valid`].
     Record(u32),
     /// An attachment that is not valid, of this record.
     Attachment(u32),
     /// The cache's lent storage is too small.
     Full,
+}
+
+impl From<Damage> for BytesError {
+    fn from(damage: Damage) -> Self {
+        Self::Damage(damage)
+    }
 }
 
 impl From<Full> for BytesError {
@@ -150,23 +135,15 @@ impl From<Full> for BytesError {
 impl fmt::Display for BytesError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match *self {
-            Self::NoHeader { found } => write!(f, "ends after {found} bytes, before its header of {HEADER_BYTES} does"),
-            Self::Magic => f.write_str("is not a radiance cache: other first bytes"),
-            Self::Version(found) => write!(f, "has version {found} of the format; {VERSION} is known"),
+            Self::Damage(damage) => damage.fmt(f),
             Self::UnknownKind(found) => write!(f, "holds a cache of unknown kind {found}"),
             Self::Size { stride, count } => {
                 write!(f, "claims {count} records with {stride} attachments each, which no cache has")
             }
-            Self::Length { found, due } if found < due => {
-                write!(f, "is cut off: {due} bytes are due, {found} are there")
-            }
-            Self::Length { found, due } => write!(f, "goes on after its end: {due} bytes are due, {found} are there"),
-            Self::Checksum => f.write_str("is damaged: the checksum is another"),
             Self::Kind { found, due } => write!(f, "holds {found} where {due} are due"),
             Self::Stride { found, due } => {
                 write!(f, "has {found} attachments per record where {due} are due: expansions of another degree")
             }
-            Self::Tag { found, due } => write!(f, "was made for something else (tag {found:016x}, not {due:016x})"),
             Self::Record(index) => write!(f, "has a record that is not valid: number {index}"),
             Self::Attachment(index) => write!(f, "has an attachment that is not valid: of record {index}"),
             Self::Full => f.write_str("has more records than the lent storage holds"),
@@ -198,26 +175,19 @@ impl Header {
     /// What is wrong with it.
     ///
     /// ```
-    /// # use fogbow::cache::bytes::{BytesError, Header};
-    /// assert_eq!(Header::read(b"P6"), Err(BytesError::NoHeader { found: 2 }));
-    /// assert_eq!(Header::read(&[0; 64]), Err(BytesError::Magic));
+    /// # use fogbow::{bytes::Damage, cache::bytes::Header};
+    /// assert_eq!(Header::read(&[]), Err(Damage::NoHeader { found: 0, due: 40 }.into()));
+    /// assert_eq!(Header::read(b"P6"), Err(Damage::Magic { due: "radiance cache" }.into()));
     /// ```
     pub fn read(bytes: &[u8]) -> Result<Self, BytesError> {
-        let header = bytes.first_chunk::<HEADER_BYTES>().ok_or(BytesError::NoHeader { found: bytes.len() })?;
-        if !header.starts_with(&MAGIC) {
-            return Err(BytesError::Magic);
-        }
-        let word = |at: usize| u32::from_le_bytes([header[at], header[at + 1], header[at + 2], header[at + 3]]);
-        let long = |at: usize| u64::from(word(at)) | u64::from(word(at + 4)) << 32;
-        if word(8) != VERSION {
-            return Err(BytesError::Version(word(8)));
-        }
-        let kind = match word(12) {
+        let header = FORMAT.header(bytes)?;
+        let kind = match header.word(12) {
             1 => RecordKind::Volume,
             2 => RecordKind::Surface,
             unknown => return Err(BytesError::UnknownKind(unknown)),
         };
-        let header = Self { kind, stride: word(16), count: word(20), tag: long(24), checksum: long(32) };
+        let [stride, count] = [16, 20].map(|at| header.word(at));
+        let header = Self { kind, stride, count, tag: header.long(24), checksum: header.long(32) };
         let size = BytesError::Size { stride: header.stride, count: header.count };
         if header.stride as usize > MAX_STRIDE {
             return Err(size);
@@ -289,25 +259,13 @@ pub fn write<E: Attachment, F>(
     tag: u64,
     mut sink: impl FnMut(&[u8]) -> Result<(), F>,
 ) -> Result<(), F> {
-    let mut header = [0; HEADER_BYTES];
-    header[..8].copy_from_slice(&MAGIC);
     // Numbers of records are `u32` everywhere in a cache, and strides are small.
-    let words = [VERSION, E::KIND as u32, cache.stride() as u32, cache.len() as u32];
-    for (to, word) in header[8..24].chunks_exact_mut(4).zip(words) {
-        to.copy_from_slice(&word.to_le_bytes());
-    }
-    header[24..32].copy_from_slice(&tag.to_le_bytes());
-    let mut crc = Crc::new();
-    crc.add(&header[..32]);
-    let mut add = |bytes: &[u8]| {
-        crc.add(bytes);
-        Ok::<(), core::convert::Infallible>(())
+    let words = [E::KIND as u32, cache.stride() as u32, cache.len() as u32].into_iter().chain(halves(tag));
+    let body = |sink: Sink<'_, F>| {
+        elements(cache.records(), sink)?;
+        elements(cache.attachments(), sink)
     };
-    let (Ok(()), Ok(())) = (elements(cache.records(), &mut add), elements(cache.attachments(), &mut add));
-    header[32..].copy_from_slice(&crc.value().to_le_bytes());
-    sink(&header)?;
-    elements(cache.records(), &mut sink)?;
-    elements(cache.attachments(), &mut sink)
+    FORMAT.write(words, &body, &mut sink)
 }
 
 /// Replaces what `cache` holds by what was written as `bytes` with the same `tag`, and brings it into the index.
@@ -316,7 +274,7 @@ pub fn write<E: Attachment, F>(
 /// The first check that fails. The cache is then as before, or empty after [`BytesError::Full`].
 ///
 /// ```
-/// # use fogbow::cache::{Cache, VolumeCache, bytes::{self, BytesError}};
+/// # use fogbow::{bytes::Damage, cache::{Cache, VolumeCache, bytes}};
 /// # #[cfg(feature = "alloc")] {
 /// let mut cache: VolumeCache = Cache::growing(0);
 /// let mut file = Vec::new();
@@ -324,33 +282,23 @@ pub fn write<E: Attachment, F>(
 ///     file.extend_from_slice(part);
 ///     Ok::<_, core::convert::Infallible>(())
 /// });
-/// assert_eq!(bytes::read_into(&file, 8, &mut cache), Err(BytesError::Tag { found: 7, due: 8 }));
+/// assert_eq!(bytes::read_into(&file, 8, &mut cache), Err(Damage::Tag { found: 7, due: 8 }.into()));
 /// file[30] ^= 1;   // a bit of the tag
-/// assert_eq!(bytes::read_into(&file, 7, &mut cache), Err(BytesError::Checksum));
+/// assert_eq!(bytes::read_into(&file, 7, &mut cache), Err(Damage::Checksum.into()));
 /// # }
 /// ```
 pub fn read_into<E: Attachment>(bytes: &[u8], tag: u64, cache: &mut Cache<'_, E>) -> Result<(), BytesError> {
     let header = Header::read(bytes)?;
-    let due = header.byte_count();
-    if bytes.len() != due {
-        return Err(BytesError::Length { found: bytes.len(), due });
-    }
-    let (head, body) = bytes.split_at(HEADER_BYTES);
-    let mut crc = Crc::new();
-    crc.add(&head[..32]);
-    crc.add(body);
-    if crc.value() != header.checksum {
-        return Err(BytesError::Checksum);
-    }
+    Damage::unless_length(bytes.len(), header.byte_count() as u64)?;
+    let body = &bytes[HEADER_BYTES..];
+    FORMAT.header(bytes)?.check(body)?;
     if header.kind != E::KIND {
         return Err(BytesError::Kind { found: header.kind, due: E::KIND });
     }
     if header.stride as usize != cache.stride() {
         return Err(BytesError::Stride { found: header.stride, due: cache.stride() as u32 });
     }
-    if header.tag != tag {
-        return Err(BytesError::Tag { found: header.tag, due: tag });
-    }
+    Damage::unless_tag(header.tag, tag)?;
     let stride = header.stride as usize;
     let (records, attached) = body.split_at(header.count as usize * size_of::<Record>());
     let records = records.chunks_exact(size_of::<Record>());

@@ -25,7 +25,7 @@ use super::record::Attachment;
 use super::settings::Effort;
 use super::slot::Slot;
 use super::store::Cache;
-use crate::bytes::Crc;
+use crate::bytes::{Damage, Format, Sink, halves, long, word};
 use crate::math::digits::Digits;
 use crate::storage::Full;
 
@@ -35,37 +35,21 @@ const MAGIC: [u8; 8] = *b"\x89FOGSET\n";
 /// Of the layout above.
 const VERSION: u32 = 5;
 
+const FORMAT: Format = Format { magic: MAGIC, version: VERSION, header: HEADER, what: "file of radiance caches" };
+
 /// Length of the header, of a part's row and of a view's (bytes).
 const HEADER: usize = 40;
 const ROW: usize = 40;
 const VIEW: usize = 8;
 
-/// Why bytes are not the caches asked for, in the order of the checks.
+/// Why bytes are not the caches asked for.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub enum CachesError {
-    /// Other first bytes: something else altogether.
-    Magic,
-    /// Of another version of the format.
-    Version(u32),
-    /// Not as long as its header and tables say.
-    Length {
-        /// Its length (bytes).
-        found: u64,
-        /// What it says.
-        due: u64,
-    },
-    /// Header or tables are damaged.
-    Checksum,
+    /// No such bytes, damaged tables, or made for something else.
+    Damage(Damage),
     /// The tables name no caches, or the same twice.
     Parts,
-    /// Made for something else.
-    Tag {
-        /// What it was made for.
-        found: u64,
-        /// What was asked for.
-        due: u64,
-    },
     /// Holds other caches than are asked for.
     Absent {
         /// The cache in question.
@@ -95,6 +79,12 @@ pub enum CachesError {
     Full,
 }
 
+impl From<Damage> for CachesError {
+    fn from(damage: Damage) -> Self {
+        Self::Damage(damage)
+    }
+}
+
 impl From<Full> for CachesError {
     fn from(_: Full) -> Self {
         Self::Full
@@ -104,15 +94,8 @@ impl From<Full> for CachesError {
 impl fmt::Display for CachesError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Magic => f.write_str("is not a file of radiance caches: other first bytes"),
-            Self::Version(found) => write!(f, "has version {found} of the format; {VERSION} is known"),
-            Self::Length { found, due } if found < due => {
-                write!(f, "is cut off: {due} bytes are due, {found} are there")
-            }
-            Self::Length { found, due } => write!(f, "goes on after its end: {due} bytes are due, {found} are there"),
-            Self::Checksum => f.write_str("is damaged: the checksum of its header is another"),
+            Self::Damage(damage) => damage.fmt(f),
             Self::Parts => f.write_str("names caches that are not known, or one of them twice"),
-            Self::Tag { found, due } => write!(f, "was made for something else (tag {found:016x}, not {due:016x})"),
             Self::Absent { part, is_asked_for: true } => {
                 write!(f, "has no cache \"{}\", which is asked for", part.name())
             }
@@ -162,7 +145,8 @@ impl RadianceCaches<'_> {
     /// # Errors
     /// Those of `sink`.
     pub fn write<X>(&self, tag: u64, mut sink: impl FnMut(&[u8]) -> Result<(), X>) -> Result<(), X> {
-        let tables = |each: &mut dyn FnMut(&[u8]) -> Result<(), X>| {
+        let counts = [self.parts().count() as u32, self.views.len() as u32, u32::from(self.is_open())];
+        let tables = |each: Sink<'_, X>| {
             for (kind, effort, length) in self.parts() {
                 let Limits { min, max } = effort.limits;
                 let words = [kind as u32, effort.degree as u32, effort.tolerance.to_bits(), effort.samples];
@@ -172,22 +156,7 @@ impl RadianceCaches<'_> {
             }
             self.views.as_slice().iter().try_for_each(|view| each(&view.to_le_bytes()))
         };
-        let mut header = [0; HEADER];
-        header[..8].copy_from_slice(&MAGIC);
-        let counts = [VERSION, self.parts().count() as u32, self.views.len() as u32, u32::from(self.is_open())];
-        for (slot, count) in header[8..24].chunks_exact_mut(4).zip(counts) {
-            slot.copy_from_slice(&count.to_le_bytes());
-        }
-        header[24..32].copy_from_slice(&tag.to_le_bytes());
-        let mut crc = Crc::new();
-        crc.add(&header[..32]);
-        tables(&mut |bytes| {
-            crc.add(bytes);
-            Ok(())
-        })?;
-        header[32..].copy_from_slice(&crc.value().to_le_bytes());
-        sink(&header)?;
-        tables(&mut sink)?;
+        FORMAT.write(counts.into_iter().chain(halves(tag)), &tables, &mut sink)?;
         for (kind, ..) in self.parts() {
             match &self.slots[kind] {
                 Slot::Off => {}
@@ -282,13 +251,6 @@ impl RadianceCaches<'_> {
     }
 }
 
-fn checksum(header: &[u8], tables: &[u8]) -> u64 {
-    let mut crc = Crc::new();
-    crc.add(header);
-    crc.add(tables);
-    crc.value()
-}
-
 /// A part as the table has it.
 #[derive(Clone, Copy)]
 struct Row<'a> {
@@ -301,30 +263,18 @@ type Rows<'a> = ([Option<Row<'a>>; Kind::COUNT], &'a [u8]);
 
 /// What the tables say, once header and length are found sound.
 fn rows(file: &[u8], tag: u64) -> Result<Rows<'_>, CachesError> {
-    let length = |due: u64| CachesError::Length { found: file.len() as u64, due };
-    if !file.starts_with(&MAGIC) {
-        // A few bytes of a header are a set cut off; nothing, or anything else, is not one.
-        let is_start = !file.is_empty() && MAGIC.starts_with(file);
-        return Err(if is_start { length(HEADER as u64) } else { CachesError::Magic });
-    }
-    let (header, rest) = file.split_at_checked(HEADER).ok_or_else(|| length(HEADER as u64))?;
-    if word(header, 8) != VERSION {
-        return Err(CachesError::Version(word(header, 8)));
-    }
-    let (parts, views) = (u64::from(word(header, 12)), u64::from(word(header, 16)));
+    let header = FORMAT.header(file)?;
+    let rest = &file[HEADER..];
+    let (parts, views) = (u64::from(header.word(12)), u64::from(header.word(16)));
     let tables = parts * ROW as u64 + views * VIEW as u64;
     let split = usize::try_from(tables).ok().and_then(|tables| rest.split_at_checked(tables));
-    let (tables, mut rest) = split.ok_or_else(|| length(HEADER as u64 + tables))?;
-    if checksum(&header[..32], tables) != long(header, 32) {
-        return Err(CachesError::Checksum);
-    }
+    let cut = Damage::Length { found: file.len() as u64, due: HEADER as u64 + tables };
+    let (tables, mut rest) = split.ok_or(cut)?;
+    header.check(tables)?;
     let (table, views) = tables.split_at(parts as usize * ROW);
     let lengths = table.chunks_exact(ROW).map(|row| long(row, 32));
     let before = (HEADER + tables.len()) as u64;
-    let due = lengths.fold(before, u64::saturating_add);
-    if due != file.len() as u64 {
-        return Err(length(due));
-    }
+    Damage::unless_length(file.len(), lengths.fold(before, u64::saturating_add))?;
     let mut rows = [None; Kind::COUNT];
     for row in table.chunks_exact(ROW) {
         let slot = rows.get_mut(word(row, 0) as usize).filter(|slot| slot.is_none()).ok_or(CachesError::Parts)?;
@@ -341,16 +291,6 @@ fn rows(file: &[u8], tag: u64) -> Result<Rows<'_>, CachesError> {
         let (bytes, others) = rest.split_at_checked(long(row, 32) as usize).ok_or(CachesError::Parts)?;
         (*slot, rest) = (Some(Row { effort, bytes }), others);
     }
-    if long(header, 24) != tag {
-        return Err(CachesError::Tag { found: long(header, 24), due: tag });
-    }
+    Damage::unless_tag(header.long(24), tag)?;
     Ok((rows, views))
-}
-
-fn word(bytes: &[u8], at: usize) -> u32 {
-    u32::from_le_bytes([bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]])
-}
-
-fn long(bytes: &[u8], at: usize) -> u64 {
-    u64::from(word(bytes, at)) | u64::from(word(bytes, at + 4)) << 32
 }

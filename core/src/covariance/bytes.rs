@@ -10,17 +10,15 @@
 //! | 24 | 24 | smallest and largest corner (m), as `f32` |
 //! | 48 | 8 | tag: what the grid was made for, a number of the host's choice |
 //! | 56 | 8 | number of photons |
-//! | 64 | 8 | [`Crc`] of bytes 0 to 64 and of all from 72 on |
+//! | 64 | 8 | [`Crc`](crate::bytes::Crc) of bytes 0 to 64 and of all from 72 on |
 //! | 72 | 28 n | voxels: `Σ I R S Rᵀ` (xx, xy, xz, yy, yz, zz), `Σ I`, as `f32` |
 
 use core::fmt;
 
-use glam::Vec3;
-
 use super::grid::{CovarianceGrid, GridView};
 use super::lattice::Lattice;
 use super::metrics::Voxel;
-use crate::bytes::{Crc, element, elements};
+use crate::bytes::{Damage, Format, Sink, element, elements, halves};
 use crate::math::Bounds;
 use crate::storage::{Full, List};
 
@@ -33,57 +31,35 @@ pub const VERSION: u32 = 1;
 /// Length of the header (bytes).
 pub const HEADER_BYTES: usize = 72;
 
-/// Why bytes are not the grid asked for, in the order of the checks.
+const FORMAT: Format = Format { magic: MAGIC, version: VERSION, header: HEADER_BYTES, what: "covariance grid" };
+
+/// Why bytes are not the grid asked for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum GridBytesError {
-    /// Fewer bytes than a header.
-    NoHeader {
-        /// How many there are.
-        found: usize,
-    },
-    /// Other first bytes: something else altogether.
-    Magic,
-    /// Of another version than [`VERSION`].
-    Version(u32),
+    /// No such bytes, or damaged ones, or made for something else.
+    Damage(Damage),
     /// Bounds or numbers of cells that no grid has.
     Lattice,
-    /// Not as many bytes as the header says.
-    Length {
-        /// How many there are.
-        found: usize,
-        /// How many the header says.
-        due: usize,
-    },
-    /// Damaged.
-    Checksum,
-    /// Made for something else.
-    Tag {
-        /// What it was made for.
-        found: u64,
-        /// What was asked for.
-        due: u64,
-    },
     /// A voxel that no photons leave: negative or not finite.
     Voxel(usize),
     /// The storage does not have one element per cell.
     Storage,
 }
 
+impl From<Damage> for GridBytesError {
+    fn from(damage: Damage) -> Self {
+        Self::Damage(damage)
+    }
+}
+
 impl fmt::Display for GridBytesError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::NoHeader { found } => {
-                write!(f, "{found} bytes are no covariance grid: its header has {HEADER_BYTES}")
-            }
-            Self::Magic => f.write_str("this is no covariance grid"),
-            Self::Version(version) => write!(f, "version {version} of the format is not known, only {VERSION}"),
-            Self::Lattice => f.write_str("the grid's bounds or numbers of cells are impossible"),
-            Self::Length { found, due } => write!(f, "there are {found} bytes, and the header speaks of {due}"),
-            Self::Checksum => f.write_str("the bytes are damaged"),
-            Self::Tag { found, due } => write!(f, "made for something else (tag {found:016x}, not {due:016x})"),
-            Self::Voxel(index) => write!(f, "voxel {index} is impossible"),
-            Self::Storage => f.write_str("there is no memory for one element per cell"),
+            Self::Damage(damage) => damage.fmt(f),
+            Self::Lattice => f.write_str("has bounds or numbers of cells that no grid has"),
+            Self::Voxel(index) => write!(f, "has a voxel that is not valid: number {index}"),
+            Self::Storage => f.write_str("has more cells than there is memory for"),
         }
     }
 }
@@ -162,34 +138,10 @@ impl CovarianceGrid<'_> {
 /// # Ok::<(), Box<dyn core::error::Error>>(())
 /// ```
 pub fn write<F>(grid: &GridView<'_>, tag: u64, mut sink: impl FnMut(&[u8]) -> Result<(), F>) -> Result<(), F> {
-    let mut header = [0; HEADER_BYTES];
-    let lattice = grid.lattice();
-    let corners = [lattice.bounds().min, lattice.bounds().max];
-    header[..8].copy_from_slice(&MAGIC);
-    header[8..12].copy_from_slice(&VERSION.to_le_bytes());
-    for (i, n) in lattice.size().iter().enumerate() {
-        header[12 + 4 * i..][..4].copy_from_slice(&n.to_le_bytes());
-    }
-    for (i, c) in corners.iter().flat_map(|corner| corner.to_array()).enumerate() {
-        header[24 + 4 * i..][..4].copy_from_slice(&c.to_le_bytes());
-    }
-    header[48..56].copy_from_slice(&tag.to_le_bytes());
-    header[56..64].copy_from_slice(&grid.paths().to_le_bytes());
-    let mut crc = Crc::new();
-    crc.add(&header[..64]);
-    let Ok(()) = elements(grid.voxels(), &mut |part: &[u8]| {
-        crc.add(part);
-        Ok::<_, core::convert::Infallible>(())
-    });
-    header[64..].copy_from_slice(&crc.value().to_le_bytes());
-    sink(&header)?;
-    elements(grid.voxels(), &mut sink)
-}
-
-fn word<const N: usize>(bytes: &[u8], at: usize) -> [u8; N] {
-    let mut out = [0; N];
-    out.copy_from_slice(&bytes[at..at + N]);
-    out
+    let (lattice, bounds) = (grid.lattice(), grid.lattice().bounds());
+    let corners = [bounds.min, bounds.max].into_iter().flat_map(|corner| corner.to_array().map(f32::to_bits));
+    let words = lattice.size().into_iter().chain(corners).chain(halves(tag)).chain(halves(grid.paths()));
+    FORMAT.write(words, &|sink: Sink<'_, F>| elements(grid.voxels(), sink), &mut sink)
 }
 
 /// The header of a grid that [`write()`] gave, after all checks but those of its voxels' values.
@@ -198,40 +150,19 @@ fn word<const N: usize>(bytes: &[u8], at: usize) -> [u8; N] {
 /// The first check that fails.
 ///
 /// ```
-/// # use fogbow::covariance::bytes::{self, GridBytesError};
-/// assert_eq!(bytes::header(b"P6", 7), Err(GridBytesError::NoHeader { found: 2 }));
-/// assert_eq!(bytes::header(&[0; 200], 7), Err(GridBytesError::Magic));   // long enough, but no grid
+/// # use fogbow::{bytes::Damage, covariance::bytes};
+/// assert_eq!(bytes::header(&[], 7), Err(Damage::NoHeader { found: 0, due: 72 }.into()));
+/// assert_eq!(bytes::header(b"P6", 7), Err(Damage::Magic { due: "covariance grid" }.into()));
 /// ```
 pub fn header(bytes: &[u8], tag: u64) -> Result<GridHeader, GridBytesError> {
-    if bytes.len() < HEADER_BYTES {
-        return Err(GridBytesError::NoHeader { found: bytes.len() });
-    }
-    if bytes[..8] != MAGIC {
-        return Err(GridBytesError::Magic);
-    }
-    let version = u32::from_le_bytes(word(bytes, 8));
-    if version != VERSION {
-        return Err(GridBytesError::Version(version));
-    }
-    let size = [12, 16, 20].map(|at| u32::from_le_bytes(word(bytes, at)));
-    let corner = |at: usize| Vec3::from([0, 4, 8].map(|i| f32::from_le_bytes(word(bytes, at + i))));
-    let bounds = Bounds { min: corner(24), max: corner(36) };
+    let header = FORMAT.header(bytes)?;
+    let size = [12, 16, 20].map(|at| header.word(at));
+    let bounds = Bounds { min: header.numbers(24).into(), max: header.numbers(36).into() };
     let lattice = Lattice::new(bounds, size).map_err(|_| GridBytesError::Lattice)?;
-    let due = byte_count(&lattice);
-    if bytes.len() != due {
-        return Err(GridBytesError::Length { found: bytes.len(), due });
-    }
-    let mut crc = Crc::new();
-    crc.add(&bytes[..64]);
-    crc.add(&bytes[HEADER_BYTES..]);
-    if crc.value() != u64::from_le_bytes(word(bytes, 64)) {
-        return Err(GridBytesError::Checksum);
-    }
-    let found = u64::from_le_bytes(word(bytes, 48));
-    if found != tag {
-        return Err(GridBytesError::Tag { found, due: tag });
-    }
-    Ok(GridHeader { lattice, paths: u64::from_le_bytes(word(bytes, 56)) })
+    Damage::unless_length(bytes.len(), byte_count(&lattice) as u64)?;
+    header.check(&bytes[HEADER_BYTES..])?;
+    Damage::unless_tag(header.long(48), tag)?;
+    Ok(GridHeader { lattice, paths: header.long(56) })
 }
 
 /// Reads a grid's voxels, one per cell of the lattice that [`header`] names. `voxels` is only changed if all is well.
@@ -240,7 +171,7 @@ pub fn header(bytes: &[u8], tag: u64) -> Result<GridHeader, GridBytesError> {
 /// The first check that fails.
 ///
 /// ```
-/// # use fogbow::covariance::{GridView, Lattice, Voxel, bytes::{self, GridBytesError}};
+/// # use fogbow::{bytes::Damage, covariance::{GridView, Lattice, Voxel, bytes}};
 /// # use fogbow::math::{Bounds, Vec3};
 /// let lattice = Lattice::new(Bounds { min: Vec3::ZERO, max: Vec3::ONE }, [1, 1, 1])?;
 /// let mut file = Vec::new();
@@ -249,9 +180,9 @@ pub fn header(bytes: &[u8], tag: u64) -> Result<GridHeader, GridBytesError> {
 ///     Ok::<_, core::convert::Infallible>(())
 /// });
 /// let mut voxels = [Voxel { weight: 1.0, ..Voxel::EMPTY }];
-/// assert_eq!(bytes::read_into(&file, 8, &mut voxels), Err(GridBytesError::Tag { found: 7, due: 8 }));
+/// assert_eq!(bytes::read_into(&file, 8, &mut voxels), Err(Damage::Tag { found: 7, due: 8 }.into()));
 /// *file.last_mut().unwrap() ^= 1;
-/// assert_eq!(bytes::read_into(&file, 7, &mut voxels), Err(GridBytesError::Checksum));
+/// assert_eq!(bytes::read_into(&file, 7, &mut voxels), Err(Damage::Checksum.into()));
 /// assert_eq!(voxels[0].weight, 1.0);   // as before
 /// # Ok::<(), fogbow::covariance::LatticeError>(())
 /// ```

@@ -18,7 +18,7 @@
 //! | 80 | 8 | tag: what the picture was made for, a number of the host's choice |
 //! | 88 | 16 | the part that is taken: 0 for all, 1 of tiles, 2 of samples; which, of how many; index of the first sample |
 //! | 104 | 8 | bytes behind the header |
-//! | 112 | 8 | [`Crc`] of bytes 0 to 112 and of all from 120 on |
+//! | 112 | 8 | [`Crc`](crate::bytes::Crc) of bytes 0 to 112 and of all from 120 on |
 //! | 120 | 3 n l to 51 n l | sums of `l` layers of `n` pixels, each as below |
 //! | | 4 n | samples of pixels |
 //! | | 20 t | of `t` tiles, with a goal: bit 0 enough, bits 1 and 2 which of two `f64` are known: noise squared when samples were last doubled, and one doubling earlier |
@@ -28,6 +28,7 @@
 //! them; 0 is zero, and 1 all 16. A part of tiles has sums and samples of its own pixels alone.
 
 use alloc::vec::Vec;
+use core::convert::Infallible;
 use core::fmt;
 
 use super::integrand::Counts;
@@ -35,7 +36,7 @@ use super::noise::{Goal, Noise};
 use super::share::Share;
 use super::sum::PixelSum;
 use super::tiles::{Settings, Tiles};
-use crate::bytes::Crc;
+use crate::bytes::{Damage, Format, Sink, halves};
 use crate::storage::{Full, List};
 
 /// The first bytes: not text, and damaged by whatever changes ends of lines.
@@ -47,53 +48,33 @@ pub const VERSION: u32 = 4;
 /// Length of the header (bytes).
 pub const HEADER_BYTES: usize = 120;
 
-/// Why bytes are not the picture asked for, in the order of the checks.
+const FORMAT: Format = Format { magic: MAGIC, version: VERSION, header: HEADER_BYTES, what: "picture that was left" };
+
+/// Where the words of the header begin, after the version (bytes).
+const WORDS_AT: usize = 12;
+
+/// Why bytes are not the picture asked for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum PictureBytesError {
-    /// Fewer bytes than a header.
-    NoHeader {
-        /// How many there are.
-        found: usize,
-    },
-    /// Other first bytes: something else altogether.
-    Magic,
-    /// Of another version than [`VERSION`].
-    Version(u32),
-    /// Not as many bytes as the header says.
-    Length {
-        /// How many there are.
-        found: usize,
-        /// How many the header says.
-        due: usize,
-    },
-    /// Damaged.
-    Checksum,
-    /// Made for something else.
-    Tag {
-        /// What it was made for.
-        found: u64,
-        /// What was asked for.
-        due: u64,
-    },
+    /// No such bytes, or damaged ones, or made for something else.
+    Damage(Damage),
     /// Of another size, number of layers, seed or goal; in what it differs.
     Settings(&'static str),
     /// Sums or numbers that no passes leave.
     Content,
 }
 
+impl From<Damage> for PictureBytesError {
+    fn from(damage: Damage) -> Self {
+        Self::Damage(damage)
+    }
+}
+
 impl fmt::Display for PictureBytesError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::NoHeader { found } => write!(f, "ends after {found} bytes, before its header of {HEADER_BYTES} does"),
-            Self::Magic => f.write_str("is no picture that was left: other first bytes"),
-            Self::Version(version) => write!(f, "has version {version} of the format; {VERSION} is known"),
-            Self::Length { found, due } if found < due => {
-                write!(f, "is cut off: {due} bytes are due, {found} are there")
-            }
-            Self::Length { found, due } => write!(f, "goes on after its end: {due} bytes are due, {found} are there"),
-            Self::Checksum => f.write_str("is damaged: the checksum is another"),
-            Self::Tag { found, due } => write!(f, "was made for something else (tag {found:016x}, not {due:016x})"),
+            Self::Damage(damage) => damage.fmt(f),
             Self::Settings(what) => write!(f, "is of a picture with another {what}"),
             Self::Content => f.write_str("holds sums or numbers of samples that no picture has"),
         }
@@ -204,47 +185,37 @@ impl<Q, C> Tiles<'_, Q, C> {
         // A finished one is the same bytes however it came about.
         let [taken, pixels_per_job] = if self.is_enough { [0, 1] } else { [self.taken, self.pixels_per_job] };
         let until = if self.is_enough { until.max(&settings.samples) } else { until };
-        let mut bytes = Vec::with_capacity(HEADER_BYTES + 4 * least_bytes(settings).unwrap_or(0));
-        bytes.extend(MAGIC);
         let goal = settings.goal.unwrap_or(Goal { noise: 0.0, least: 0 });
         let flags = u32::from(self.is_enough) | u32::from(settings.goal.is_some()) << 1;
         let [columns, rows] = settings.size;
-        let pass = [*until, taken, pixels_per_job];
-        let asked = [settings.tile, goal.noise.to_bits(), goal.least, settings.samples, flags];
-        let words = [VERSION, columns, rows, settings.layers].into_iter().chain(pass).chain(asked);
-        words.for_each(|word| bytes.extend(word.to_le_bytes()));
-        let longs = [settings.seed, taken_samples.samples, taken_samples.non_finite, tag];
-        longs.iter().for_each(|long| bytes.extend(long.to_le_bytes()));
         let share = match self.share {
             Share::Whole => [0; 3],
             Share::Tiles { part, of } => [1, part, of],
             Share::Samples { part, of } => [2, part, of],
         };
-        share.iter().chain([&self.first]).for_each(|word| bytes.extend(word.to_le_bytes()));
-        bytes.extend([0; 16]);
         let layers = settings.layers as usize;
         let own = || (0..settings.pixels()).filter(|&pixel| self.has(self.place(pixel))).map(|pixel| pixel as usize);
+        let mut body = Vec::with_capacity(4 * least_bytes(settings).unwrap_or(0));
         for pixel in own() {
             let sums = &self.sums.as_slice()[pixel * layers..][..layers];
-            sums.iter().flat_map(|sum| sum.0).for_each(|sum| put(sum, &mut bytes));
+            sums.iter().flat_map(|sum| sum.0).for_each(|sum| put(sum, &mut body));
         }
-        own().for_each(|pixel| bytes.extend(self.counts.as_slice()[pixel].to_le_bytes()));
+        own().for_each(|pixel| body.extend(self.counts.as_slice()[pixel].to_le_bytes()));
         if let Some(noise) = &self.noise {
-            noise.write(&mut bytes);
+            noise.write(&mut body);
         }
-        let body = (bytes.len() - HEADER_BYTES) as u64;
-        bytes[HEADER_BYTES - 16..HEADER_BYTES - 8].copy_from_slice(&body.to_le_bytes());
-        let crc = checksum(&bytes);
-        bytes[HEADER_BYTES - 8..HEADER_BYTES].copy_from_slice(&crc.to_le_bytes());
+        let asked = [settings.tile, goal.noise.to_bits(), goal.least, settings.samples, flags];
+        let words = [columns, rows, settings.layers, *until, taken, pixels_per_job].into_iter().chain(asked);
+        let longs = [settings.seed, taken_samples.samples, taken_samples.non_finite, tag].map(halves);
+        let last = share.into_iter().chain([self.first]).chain(halves(body.len() as u64));
+        let mut bytes = Vec::with_capacity(HEADER_BYTES + body.len());
+        let write = |sink: Sink<'_, Infallible>| sink(&body);
+        let Ok(()) = FORMAT.write(words.chain(longs.into_iter().flatten()).chain(last), &write, &mut |part| {
+            bytes.extend(part);
+            Ok(())
+        });
         bytes
     }
-}
-
-fn checksum(bytes: &[u8]) -> u64 {
-    let mut crc = Crc::new();
-    crc.add(&bytes[..HEADER_BYTES - 8]);
-    crc.add(&bytes[HEADER_BYTES..]);
-    crc.value()
 }
 
 /// What the bytes of a picture say of it.
@@ -284,31 +255,15 @@ pub struct Described {
 /// # Ok::<(), PictureBytesError>(())
 /// ```
 pub fn described(bytes: &[u8]) -> Result<Described, PictureBytesError> {
-    if bytes.len() < HEADER_BYTES {
-        return Err(PictureBytesError::NoHeader { found: bytes.len() });
-    }
-    let mut header = Reader(bytes);
-    if header.take() != MAGIC {
-        return Err(PictureBytesError::Magic);
-    }
-    let version = header.word();
-    if version != VERSION {
-        return Err(PictureBytesError::Version(version));
-    }
+    let sound = FORMAT.header(bytes)?;
+    let mut header = Reader(&bytes[WORDS_AT..]);
     let [columns, rows, layers] = [(); 3].map(|()| header.word());
     let pass = [(); 3].map(|()| header.word());
     let [tile, noise, least, samples, flags] = [(); 5].map(|()| header.word());
     let [seed, all, non_finite, tag] = [(); 4].map(|()| header.long());
     let [kind, part, of, first] = [(); 4].map(|()| header.word());
-    let [body, crc] = [(); 2].map(|()| header.long());
-    let due = usize::try_from(body).ok().and_then(|body| body.checked_add(HEADER_BYTES));
-    let due = due.ok_or(PictureBytesError::Content)?;
-    if bytes.len() != due {
-        return Err(PictureBytesError::Length { found: bytes.len(), due });
-    }
-    if checksum(bytes) != crc {
-        return Err(PictureBytesError::Checksum);
-    }
+    Damage::unless_length(bytes.len(), header.long().saturating_add(HEADER_BYTES as u64))?;
+    sound.check(&bytes[HEADER_BYTES..])?;
     let goal = (flags & 2 != 0).then(|| Goal { noise: f32::from_bits(noise), least });
     let settings = Settings { size: [columns, rows], layers, samples, goal, seed, tile };
     let share = match kind {
@@ -335,21 +290,19 @@ impl<Q, C: Default> Tiles<'static, Q, C> {
     /// Bytes that are damaged, or of another picture: another size, seed, goal or tag.
     ///
     /// ```
-    /// # use fogbow::picture::{PictureBytesError, Settings, Tiles};
+    /// # use fogbow::{bytes::Damage, picture::{PictureBytesError, Settings, Tiles}};
     /// # use fogbow::sampling::Independent;
     /// let settings = Settings { size: [4, 3], layers: 1, samples: 64, goal: None, seed: 0, tile: 8 };
     /// let bytes = Tiles::<'_, _, ()>::new(settings, Independent).to_bytes(7);
     /// let read = |settings, tag| Tiles::<'_, _, ()>::read(settings, Independent, tag, &bytes).err();
     /// assert_eq!(read(Settings { samples: 128, ..settings }, 7), None);
-    /// assert_eq!(read(settings, 8), Some(PictureBytesError::Tag { found: 7, due: 8 }));
+    /// assert_eq!(read(settings, 8), Some(Damage::Tag { found: 7, due: 8 }.into()));
     /// assert_eq!(read(Settings { seed: 1, ..settings }, 7), Some(PictureBytesError::Settings("seed")));
     /// ```
     pub fn read(settings: Settings, source: Q, tag: u64, bytes: &[u8]) -> Result<Self, PictureBytesError> {
         let Described { settings: of, tag: found, share, first, is_done, counts: taken_samples, pass } =
             described(bytes)?;
-        if found != tag {
-            return Err(PictureBytesError::Tag { found, due: tag });
-        }
+        Damage::unless_tag(found, tag)?;
         let has_tiles = settings.goal.is_some() || matches!(share, Share::Tiles { .. });
         let differs = [
             (of.size != settings.size, "size"),

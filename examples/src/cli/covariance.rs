@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::{Arg, Args, ValueEnum};
-use fogbow::bytes::Crc;
+use fogbow::bytes::{Crc, Damage};
 use fogbow::covariance::bytes::{self, GridBytesError};
 use fogbow::covariance::{
     AdaptiveSteps, CovarianceGrid, EVEN_STEP, Fill, GridView, LEAST_STEP, LONGEST_STEP, Rule, STEP_COUNT, Settings,
@@ -154,7 +154,7 @@ impl WithMedium for GridJob<'_> {
         } else if let Some(file) = &arguments.grid_in {
             statistics.time("read grid", || load(file, |all| bytes::read(all, tag, List::default()))).map_err(
                 |error| match error.problem {
-                    Problem::Content(GridBytesError::Tag { .. }) => {
+                    Problem::Content(GridBytesError::Damage(Damage::Tag { .. })) => {
                         format!("{}: was made for another scene, or with another --max-depth", file.display())
                     }
                     _ => error.to_string(),

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use clap::{Arg, Args, ValueEnum};
-use fogbow::bytes::Crc;
+use fogbow::bytes::{Crc, Damage};
 use fogbow::cache::{
     self, Asked, Audit, BiasMap, CachedRadiance, CachesError, Extrapolation, Filling, Findings, RadianceCaches,
     RaySettings,
@@ -124,7 +124,7 @@ impl CacheArguments {
         let Some(file) = &self.cache_in else { return Ok(RadianceCaches::new(settings)) };
         let mut caches = RadianceCaches::new(settings);
         files::load(file, |bytes| caches.read(bytes, tag)).map(|()| caches).map_err(|error| match error.problem {
-            Problem::Content(CachesError::Tag { .. }) => {
+            Problem::Content(CachesError::Damage(Damage::Tag { .. })) => {
                 format!("{}: was made for another scene, or with another --max-depth", file.display())
             }
             _ => error.to_string(),

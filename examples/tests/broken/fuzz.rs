@@ -175,6 +175,25 @@ fn fuzz_gltf() {
     assert!(built > 0);
 }
 
+/// What is read is built, too; strictly and leniently by turns.
+#[test]
+fn fuzz_pbrt() {
+    let (mut built, mut is_lenient) = (0, false);
+    fuzz(&[crate::pbrt::ROOM.as_bytes().to_vec()], |bytes| {
+        is_lenient = !is_lenient;
+        let options = ReadOptions { is_lenient, ..ReadOptions::default() };
+        let findings = SceneFile::from_pbrt(Path::new("none/room.pbrt"), &String::from_utf8_lossy(bytes), &options);
+        let Some(scene) = findings.scene else { return assert!(!findings.errors.is_empty()) };
+        let mut storage = Storage::new(&scene);
+        let Ok(world) = World::new(&scene, &mut storage) else { return };
+        built += 1;
+        let hit = world.closest_hit(&world.camera().ray(Vec2::splat(0.5)));
+        assert!(hit.is_none_or(|hit| hit.distance > 0.0 && (hit.normal.length() - 1.0).abs() < 1e-3), "{hit:?}");
+    });
+    println!("{built} scenes were sound");
+    assert!(built > 0);
+}
+
 #[test]
 fn fuzz_fog() {
     let folder = Folder::new("fuzz-fog");

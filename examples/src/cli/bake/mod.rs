@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use clap::{Arg, Args, ValueEnum};
 use fogbow::bake::bytes::{self, ProbeBytesError};
 use fogbow::bake::{BakeMemory, BakeSettings, Orders, ProbeBasis, ProbeGrid, ProbeLevels, Quantity};
-use fogbow::bytes::Crc;
+use fogbow::bytes::{Crc, Damage};
 use fogbow::math::{Bounds, Vec3};
 use fogbow::path;
 
@@ -556,7 +556,7 @@ fn begun(file: &Path, tag: u64) -> Result<Vec<ProbeGrid<'static>>, Failure> {
     }
     let read = bytes::read_levels(&read_file(file)?, tag, |_| BakeMemory::default());
     let levels = read.map_err(|error| match error {
-        ProbeBytesError::Tag { .. } => {
+        ProbeBytesError::Damage(Damage::Tag { .. }) => {
             format!("{}: was made for another scene, or with another --method, --seed or --error", file.display())
         }
         error => format!("{}: {error}", file.display()),
