@@ -1,10 +1,11 @@
 #!/usr/bin/env python3
-"""Baked light against what must hold of it: python3 tests/acceptance/bake.py [leaks | truth | pictures | speed | flicker | kill | schema] …
+"""Baked light against what must hold of it: python3 tests/acceptance/bake.py [leaks | truth | pictures | speed | refine | flicker | kill | schema] …
 
     leaks       behind the thin wall: what look-ups find, with planes of surfaces and as hardware mixes, of the light before it
     truth       probes against path tracing of the same probes with many more samples: four boxes and the atrium
     pictures    the atrium and a smoke box marched from 32³, 64³, 128³ probes against path tracing; a plot
     speed       32³ probes of degree 2 in the atrium: processor seconds, beside path tracing the same probes
+    refine      bricks of half the spacing against a grid that has all: the same probes, what is left between probes, processor seconds
     flicker     frames of a plume with one seed: how much probes jump from frame to frame beside what light does
     kill        killed with -9 at any time and gone on with: the same bytes
     schema      descriptions against examples/shaders/bake.schema.json (needs Python's jsonschema)
@@ -173,6 +174,35 @@ def speed(folder):
     return ratio >= 50
 
 
+def refine(folder):
+    """A smoke box by paths: 16³ with bricks of half the spacing, and 32³. Probes of bricks must be those of 32³ with the mean of 16³; times are of bakes that know no mean beforehand."""
+    scene = SCENES / "smoke-box-homogeneous-anisotropic.xml"
+    asked = [scene, "--basis", "sh0", "--error", 0.1, "--threads", 1]
+    _, coarse = run("bake", *asked, "--counts", "16x16x16", "-o", folder / "even.bake", "-o", folder / "even.json")
+    _, seconds = run("bake", *asked, "--counts", "16x16x16", "--refine", 0.2, "--levels", 1, "-o", folder / "bricks.json")
+    _, due = run("bake", *asked, "--counts", "32x32x32", "-o", folder / "all.json")
+    run("bake", *asked, "--counts", "32x32x32", "--level", folder / "even.bake", "-o", folder / "same.json")
+    about = json.loads((folder / "bricks.json").read_text())
+    data = (folder / about["data"]).read_bytes()
+    array = next(a for a in about["arrays"] if a["name"] == "level 1: sh0")
+    found = np.frombuffer(data, "<f4", array["bytes"] // 4, array["offset"]).reshape(-1, 4, 4, 4, 3)
+    level = about["levels"][0]
+    same = Probes(folder / "same.json").arrays["sh0"]
+    nx, ny, _ = (n // 4 for n in level["counts"])
+    equal = 0
+    for brick, place in zip(found, level["bricks"]):
+        x, y, z = (4 * n for n in (place % nx, place // nx % ny, place // (nx * ny)))
+        equal += (brick == same[z : z + 4, y : y + 4, x : x + 4]).all((-1)).sum()
+    # Probes in walls have the light of neighbours, of which bricks do not have all.
+    share = equal / (64 * len(level["bricks"]))
+    left = {name: 100 * json.loads((folder / f"{name}.json").read_text())["relative_coarseness"]["root_mean_square"] for name in ("even", "bricks", "all")}
+    print(
+        f"smoke box: {len(level['bricks'])} bricks, {6400 * len(level['bricks']) / 32**3:.0f} % of 32³; {100 * share:.1f} % of their probes have its bits; "
+        f"between probes {left['even']:.1f} % at 16³, {left['bricks']:.1f} % with bricks, {left['all']:.1f} % at 32³; {seconds:.1f} s ({coarse:.1f} s without bricks), {due:.1f} s for 32³"
+    )
+    return share > 0.9 and seconds < due and left["bricks"] < 1.2 * left["all"]
+
+
 def flicker(folder):
     """Frames of a plume, 1/12 s apart, baked with one seed and with a seed each: how much more probes jump from frame to frame than the light itself, as far better bakes have it."""
     run("plume", "--frames", 4, "--resolution", 32, "-o", folder / "plume", "-q")
@@ -291,7 +321,7 @@ def medium(file):
 
 
 def main():
-    tasks = {"leaks": leaks, "truth": truth, "pictures": pictures, "speed": speed, "flicker": flicker, "kill": kill, "schema": schema}
+    tasks = {"leaks": leaks, "truth": truth, "pictures": pictures, "speed": speed, "refine": refine, "flicker": flicker, "kill": kill, "schema": schema}
     asked = sys.argv[1:] or list(tasks)
     with tempfile.TemporaryDirectory() as folder:
         folder = pathlib.Path(os.environ.get("FOLDER", folder))
