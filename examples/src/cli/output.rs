@@ -45,19 +45,30 @@ pub(super) fn check_place(file: &Path) -> Result<(), String> {
 
 /// Where a picture goes: if it was `stopped`, not over one that is there, which may have had all its time, but beside it.
 pub(super) fn not_over_better(files: Vec<PathBuf>, stopped: bool) -> Vec<PathBuf> {
-    let beside = |file: PathBuf| {
-        if !stopped || !file.is_file() {
-            return file;
-        }
-        let mut name = file.file_stem().unwrap_or_default().to_owned();
-        name.push(".stopped");
-        if let Some(extension) = file.extension() {
-            name.push(".");
-            name.push(extension);
-        }
-        file.with_file_name(name)
-    };
-    files.into_iter().map(beside).collect()
+    if stopped { files.into_iter().map(beside).collect() } else { files }
+}
+
+/// Where something unfinished goes: into this file, or, if there is one already, into one beside it.
+pub(super) fn beside(file: PathBuf) -> PathBuf {
+    if !file.is_file() {
+        return file;
+    }
+    let mut name = file.file_stem().unwrap_or_default().to_owned();
+    name.push(".stopped");
+    if let Some(extension) = file.extension() {
+        name.push(".");
+        name.push(extension);
+    }
+    file.with_file_name(name)
+}
+
+/// Writes what had no place in `file` into the folder of temporary files, with this extension: hours of work are not lost for want of a place. Where it
+/// is, if it had one there.
+pub(super) fn rescue(file: &Path, extension: &str, write: impl FnOnce(&Path) -> Result<(), String>) -> Option<PathBuf> {
+    let mut name = file.file_stem().unwrap_or_default().to_owned();
+    name.push(format!("-{}.{extension}", std::process::id()));
+    let rescue = std::env::temp_dir().join(name);
+    write(&rescue).is_ok().then_some(rescue)
 }
 
 /// A number above 0.

@@ -2,7 +2,7 @@
 
 use core::sync::atomic::{AtomicBool, Ordering};
 use core::time::Duration;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use fogbow::cache::{Kind, RadianceCaches};
 use fogbow::covariance::image_sampling::Plan;
@@ -119,13 +119,14 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<Ending, Failure> {
         film = film.first(1)?;
     }
     let outputs = output::not_over_better(outputs, outcome.reason == Reason::Cancelled);
-    let (mut outputs, trouble) = statistics.time("write", || write_all(outputs, &film, arguments.exposure));
+    let write = |file: &Path| write_film(file, &film, arguments.exposure).map_err(|error| error.to_string());
+    let (mut outputs, mut trouble) = statistics.time("write", || write_all(outputs, ("the picture", "exr"), write));
     let is_whole = outcome.reason != Reason::Cancelled;
     if let (Some(film_file), true) = (film_file, is_whole) {
-        for file in films {
-            film_file.write(&file)?;
-            outputs.push(file);
-        }
+        let what = if arguments.is_fill { "what was filled" } else { "the film" };
+        let (written, more) = write_all(films, (what, "fogbow"), |file| film_file.write(file));
+        outputs.extend(written);
+        trouble.extend(more);
     }
 
     let size = (film.width(), film.height());
@@ -147,34 +148,36 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<Ending, Failure> {
     }
     let bar = Bar::new(arguments.voice());
     outputs.iter().for_each(|file| bar.wrote(file));
-    if let Some(trouble) = trouble {
-        return Err(trouble.into());
+    if !trouble.is_empty() {
+        return Err(trouble.join("; ").into());
     }
     bar.ended(outcome.reason);
     Ok(if outcome.reason == Reason::Cancelled { Ending::Stopped } else { Ending::Done })
 }
 
-/// Writes a picture to every file that can be written; of the others, what went wrong. If none can, it goes into the folder of temporary files:
-/// hours of rendering are not lost for want of a place.
-fn write_all(files: Vec<PathBuf>, film: &Film, exposure: f32) -> (Vec<PathBuf>, Option<String>) {
-    let (mut written, mut trouble) = (Vec::new(), Vec::new());
+/// Writes something to every file that can be written; of the others, what went wrong. If none can, it goes elsewhere.
+fn write_all(
+    files: Vec<PathBuf>,
+    (what, extension): (&str, &str),
+    write: impl Fn(&Path) -> Result<(), String>,
+) -> (Vec<PathBuf>, Vec<String>) {
+    let (mut written, mut failed, mut trouble) = (Vec::new(), Vec::new(), Vec::new());
     for file in files {
-        match write_film(&file, film, exposure) {
+        match write(&file) {
             Ok(()) => written.push(file),
-            Err(error) => trouble.push((file, error.to_string())),
+            Err(error) => {
+                trouble.push(error);
+                failed.push(file);
+            }
         }
     }
-    if let (true, Some((file, _))) = (written.is_empty(), trouble.last()) {
-        let mut name = file.file_stem().unwrap_or_default().to_owned();
-        name.push(format!("-{}.exr", std::process::id()));
-        let rescue = std::env::temp_dir().join(name);
-        if write_film(&rescue, film, exposure).is_ok() {
-            trouble.push((rescue.clone(), format!("the picture is in {}", rescue.display())));
-            written.push(rescue);
-        }
+    if let (true, Some(file)) = (written.is_empty(), failed.last())
+        && let Some(rescue) = output::rescue(file, extension, write)
+    {
+        trouble.push(format!("{what} is in {}", rescue.display()));
+        written.push(rescue);
     }
-    let trouble: Vec<_> = trouble.into_iter().map(|(_, error)| error).collect();
-    (written, (!trouble.is_empty()).then(|| trouble.join("; ")))
+    (written, trouble)
 }
 
 /// Renders; writes nothing.

@@ -1,5 +1,6 @@
 //! A bake with a medium of any type.
 
+use core::cell::Cell;
 use std::path::PathBuf;
 
 use fogbow::bake::{
@@ -69,6 +70,8 @@ pub(super) struct BakeJob<'a> {
     pub(super) part: Option<&'a PartOf>,
     /// Where the grid is kept, to be gone on with.
     pub(super) kept: Option<PathBuf>,
+    /// Set when it has been.
+    pub(super) has_kept: &'a Cell<bool>,
 }
 
 impl BakeJob<'_> {
@@ -170,6 +173,7 @@ impl BakeJob<'_> {
                 bar.share(bake.share(), elapsed);
                 if let Some(file) = self.kept.as_ref().filter(|_| elapsed - written > self.arguments.checkpoint_every) {
                     written = elapsed;
+                    self.has_kept.set(true);
                     let kept = match self.part {
                         Some(part) => part.write(file, bake.grid(), self.tag, false),
                         None => write::keep(file, done.iter().chain([bake.grid()]), self.tag),

@@ -4,6 +4,7 @@ mod job;
 pub(super) mod parts;
 mod write;
 
+use core::cell::Cell;
 use std::path::{Path, PathBuf};
 
 use clap::{Arg, Args, ValueEnum};
@@ -364,10 +365,13 @@ pub(super) fn run(arguments: &BakeArguments) -> Result<Ending, Failure> {
 
 /// Writes the files of a bake.
 fn finish(arguments: &BakeArguments, made: Made, ending: Ending, files: &[PathBuf]) -> Result<Ending, Failure> {
+    let (unfinished, has_kept) = (made.unfinished.clone(), made.has_kept);
     // Textures of a bake that is not done would look as if it were.
-    let is_due = |file: &&PathBuf| ending == Ending::Done || Target::of(file) == Ok(Target::Bake);
-    let files: Vec<_> = files.iter().filter(is_due).collect();
+    let files: Vec<_> = if ending == Ending::Done { files.iter().collect() } else { unfinished.iter().collect() };
     let written = write::all(arguments, made, &files)?;
+    if let Some(file) = unfinished.as_ref().filter(|file| ending == Ending::Done && has_kept && !files.contains(file)) {
+        drop(std::fs::remove_file(file));
+    }
     if !arguments.quiet {
         say!("{written}");
     }
@@ -406,11 +410,16 @@ struct Made {
     baked: Baked,
     tag: u64,
     part: Option<PartOf>,
+    /// Where the grid is kept until all is done: not over a file that was there and is not gone on with, which may have had all its passes.
+    unfinished: Option<PathBuf>,
+    /// Whether it was, on the way.
+    has_kept: bool,
 }
 
 fn from_file(file: &Path) -> Result<Made, Failure> {
     let (levels, tag) = read(&read_file(file)?).map_err(|error| format!("{}: {error}", file.display()))?;
-    Ok(Made { baked: Baked { levels, method: None, mean_cosine: None, deviation: None, scale: 1.0 }, tag, part: None })
+    let baked = Baked { levels, method: None, mean_cosine: None, deviation: None, scale: 1.0 };
+    Ok(Made { baked, tag, part: None, unfinished: None, has_kept: false })
 }
 
 /// All levels in a file, and what they were made for.
@@ -445,6 +454,9 @@ fn bake(arguments: &BakeArguments, file: &SceneArguments, light: Option<u32>) ->
     let tag = tag(arguments, file, &paths, light)?;
     let level = arguments.level(file, &paths)?;
     let part = arguments.part_of(file, &paths, (&bounds, counts), level)?;
+    let kept = arguments.kept()?.map(|file| light.map_or(file.to_owned(), |number| of_light(file, number)));
+    let unfinished = kept.map(|file| if arguments.resume { file } else { output::beside(file) });
+    let has_kept = Cell::new(false);
     let job = BakeJob {
         arguments,
         world: &world,
@@ -457,7 +469,8 @@ fn bake(arguments: &BakeArguments, file: &SceneArguments, light: Option<u32>) ->
         light,
         level,
         part: part.as_ref(),
-        kept: arguments.kept()?.map(|file| light.map_or(file.to_owned(), |number| of_light(file, number))),
+        kept: unfinished.clone(),
+        has_kept: &has_kept,
     };
     let (levels, mean_cosine, deviation, ending) = world.media().with(job)?;
     let name = match method {
@@ -473,7 +486,7 @@ fn bake(arguments: &BakeArguments, file: &SceneArguments, light: Option<u32>) ->
         )
         .into());
     }
-    Ok((Made { baked, tag, part }, ending))
+    Ok((Made { baked, tag, part, unfinished, has_kept: has_kept.get() }, ending))
 }
 
 /// The box that is baked, and the probes along its sides.

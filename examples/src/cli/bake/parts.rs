@@ -143,9 +143,15 @@ pub(in super::super) fn check_count(of: u32, counts: [u32; 3]) -> Result<(), Fai
 pub(super) fn run(arguments: &BakeArguments, scene: &SceneArguments) -> Result<Ending, Failure> {
     let (made, ending) = bake(arguments, scene, None)?;
     let (Some(part), [file]) = (&made.part, arguments.output.as_slice()) else { return Err("there is no part".into()) };
-    part.write(file, made.baked.grid(), made.tag, ending == Ending::Done)?;
+    let is_done = ending == Ending::Done;
+    let unfinished = made.unfinished.as_ref().unwrap_or(file);
+    let written = if is_done { file } else { unfinished };
+    part.write(written, made.baked.grid(), made.tag, is_done)?;
+    if written != unfinished && made.has_kept {
+        drop(std::fs::remove_file(unfinished));
+    }
     if !arguments.quiet {
-        say!("wrote {}: {}", file.display(), part.about.name());
+        say!("wrote {}: {}", written.display(), part.about.name());
     }
     Ok(ending)
 }

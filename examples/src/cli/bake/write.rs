@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use fogbow::bake::{Probe, ProbeGrid, ProbeState, bytes};
 use fogbow_std::image::{Layer, write as write_picture};
 
+use super::super::output;
 use super::{BakeArguments, Made};
 use crate::bake::texture::Texel;
 use crate::bake::{Baked, Layout, ktx2, raw, sheets, texture};
@@ -33,17 +34,36 @@ impl Target {
     }
 }
 
-/// Writes all files, and says what there is.
+/// Writes all files, and says what there is. What was baked from a scene and has no place in a .bake file goes elsewhere.
 ///
 /// # Errors
 /// A layout that has no place for what was baked, numbers that texels do not hold, or what the system says.
 pub(super) fn all(arguments: &BakeArguments, made: Made, files: &[&PathBuf]) -> Result<String, String> {
-    let Made { mut baked, tag, .. } = made;
-    let mut written = Vec::new();
+    let all = all_to_bytes(made.baked.levels.levels(), made.tag);
+    let (mut written, mut trouble) = (Vec::new(), None);
     for file in files.iter().filter(|file| Target::of(file) == Ok(Target::Bake)) {
-        keep(file, baked.levels.levels(), tag)?;
-        written.push((*file).clone());
+        match save(file, &all) {
+            Ok(()) => written.push((*file).clone()),
+            Err(error) => trouble = Some(error),
+        }
     }
+    let is_kept = !written.is_empty() || arguments.scene.is_none();
+    trouble.map_or_else(|| others(arguments, made.baked, files, written), Err).map_err(|error| {
+        let file = files.first().filter(|_| !is_kept);
+        match file.and_then(|file| output::rescue(file, "bake", |rescue| save(rescue, &all))) {
+            Some(rescue) => format!("{error}; what was baked is in {}", rescue.display()),
+            None => error,
+        }
+    })
+}
+
+/// The same, when .bake files are written.
+fn others(
+    arguments: &BakeArguments,
+    mut baked: Baked,
+    files: &[&PathBuf],
+    mut written: Vec<PathBuf>,
+) -> Result<String, String> {
     let [valid, in_wall, empty] = baked.counts();
     let error = baked.grid().relative_error();
     baked.levels.dilate();
@@ -179,7 +199,11 @@ pub(super) fn keep<'g>(
     levels: impl IntoIterator<Item = &'g ProbeGrid<'static>>,
     tag: u64,
 ) -> Result<(), String> {
-    save(file, &levels.into_iter().flat_map(|grid| to_bytes(grid, tag)).collect::<Vec<u8>>())
+    save(file, &all_to_bytes(levels, tag))
+}
+
+fn all_to_bytes<'g>(levels: impl IntoIterator<Item = &'g ProbeGrid<'static>>, tag: u64) -> Vec<u8> {
+    levels.into_iter().flat_map(|grid| to_bytes(grid, tag)).collect()
 }
 
 pub(super) fn to_bytes(grid: &ProbeGrid<'_>, tag: u64) -> Vec<u8> {
