@@ -344,6 +344,13 @@ fn finer_levels_are_found_by_shaders_and_gone_on_with() {
     let output = folder.run(&again);
     assert!(said(&output).contains("has 2 finer levels, which would be lost"), "{}", said(&output));
     assert!(file(&folder, "b.bake") == kept);
+    // Spacings that no grid has are told before anything is baked.
+    let output = folder.run(&["bake", SCENE, "-q", "--counts", "600x4x4", "--refine", "0.1", "-o", "e.bake"]);
+    assert!(
+        output.status.code() == Some(2) && said(&output).contains("more than 1024 along a side"),
+        "{}",
+        said(&output)
+    );
     // What has no place for them says so, and writes nothing.
     for (name, more) in [("d.exr", &[][..]), ("d.ktx2", &["--layout", "bevy"])] {
         let output = folder.run(&[&["bake", "--from-file", "a.bake", "-q", "-o", name], more].concat());

@@ -199,7 +199,13 @@ impl BakeJob<'_> {
             if levels.levels().len() > self.arguments.levels as usize {
                 break;
             }
-            let Some(mut finer) = levels.finest().finer(mean, error, BakeMemory::default())? else { break };
+            let finer = levels.finest().finer(mean, error, BakeMemory::default()).map_err(|error| {
+                // What is done is kept.
+                let kept = self.kept.as_ref().map(|file| write::keep(file, levels.levels(), self.tag));
+                let trouble = kept.and_then(Result::err).map_or_else(String::new, |trouble| format!("; {trouble}"));
+                format!("--refine: {error}; ask for less, or for fewer --levels{trouble}")
+            })?;
+            let Some(mut finer) = finer else { break };
             // What is known of it, whichever bricks were chosen before.
             if let Some(left) = begun.next() {
                 finer.merge(&left)?;

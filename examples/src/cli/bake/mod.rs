@@ -433,11 +433,16 @@ pub(super) fn read(bytes: &[u8]) -> Result<(ProbeLevels<'static>, u64), ProbeByt
 
 /// Bakes a scene, by all its lights or by one of them.
 fn bake(arguments: &BakeArguments, file: &SceneArguments, light: Option<u32>) -> Result<(Made, Ending), Failure> {
+    const MAX_EDGE: u32 = fogbow::covariance::MAX_EDGE;
     let scene = file.read(true)?;
     let mut storage = Storage::new(&scene);
     let world = World::new(&scene, &mut storage)?;
     let paths = super::render::path_settings(&scene, None);
     let (bounds, counts) = place(arguments, file, &world)?;
+    if arguments.refine.is_some() && counts.iter().any(|n| n << arguments.levels > MAX_EDGE) {
+        let [x, y, z] = counts;
+        return Err(format!("--levels: {x} x {y} x {z} probes with {} finer levels make more than {MAX_EDGE} along a side; take fewer of one or the other", arguments.levels).into());
+    }
     let lights = world.lights();
     if lights.is_empty() && !world.media().glow() {
         return Err(format!("{}: has no lights, so there is nothing to bake", file.file.display()).into());
