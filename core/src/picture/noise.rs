@@ -32,8 +32,6 @@ pub const MOST_SAMPLES: u32 = 65536;
 /// before, over all tiles that still got samples. No tile counts as less noisy than one of the most even sequence, given
 /// how far its halves differed at the doubling before: two halves may agree by chance.
 ///
-/// Where few pixels have most of the noise of a tile, as the one that shows a lamp in fog, it counts as up to 1.9 times as much in squares.
-///
 /// Tiles that a rare bright sample has not met yet stop early: where light has such samples the picture gets darker
 /// by what they would bring, so that methods without them profit most.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -106,24 +104,6 @@ const EVENNEST: f64 = 3.0;
 
 /// Black tiles get so many times [`Goal::least`]: nothing tells how rarely light comes there.
 const BLACK: u32 = 8;
-
-/// Pixels of which the noise of a tile is to be known at least, as their squares count (below). Fewer: a lamp in a pixel may be off by several times what is asked for; more: edges
-/// get more samples.
-const FEW: f64 = 8.0;
-
-/// Adds to a sum and to that of squares.
-fn add([sum, squares]: [f64; 2], x: f64) -> [f64; 2] {
-    [sum + x, squares + x * x]
-}
-
-/// By what squares of errors are multiplied, of which these are the sum and the sum of squares: what few pixels tell may be little by chance, by a standard deviation
-/// of `√(2/ν)` with `ν = (Σ e²)²/Σ e⁴`.
-fn doubt([sum, squares]: [f64; 2]) -> f64 {
-    let spread = |count: f64| libm::sqrt(2.0 / count);
-    let count = sum * sum / squares;
-    // Written so that without any errors nothing is doubted.
-    if count < FEW { 1.0 + spread(count) - spread(FEW) } else { 1.0 }
-}
 
 /// The noise of a picture's tiles.
 #[derive(Debug)]
@@ -222,18 +202,17 @@ impl<'s> Noise<'s> {
         let floor = FLOOR * total.abs() / pixels.len().max(1) as f64;
         let of = |tile: &TileNoise| &pixels[tile.pixels[0] as usize..tile.pixels[1] as usize];
         let noise_of = |tile: &TileNoise| {
-            let (mut shares, mut errors, mut light) = ([0.0; 2], [0.0; 2], 0.0);
+            let (mut shares, mut errors, mut light) = (0.0, 0.0, 0.0);
             for pixel in of(tile) {
                 let (error, here) = (pixel.error_squared(), pixel.after.mean() * pixel.after.mean() + floor * floor);
                 light += here;
                 if error > 0.0 {
-                    shares = add(shares, error / here);
-                    errors = add(errors, error);
+                    (shares, errors) = (shares + error / here, errors + error);
                 }
             }
             // Of what is bright, and of all pixels alike.
-            let by_light = if errors[0] > 0.0 { errors[0] * doubt(errors) / light } else { 0.0 };
-            f64::max(shares[0] * doubt(shares) / of(tile).len().max(1) as f64, by_light)
+            let by_light = if errors > 0.0 { errors / light } else { 0.0 };
+            f64::max(shares / of(tile).len().max(1) as f64, by_light)
         };
         let (mut last, mut now) = (0.0, 0.0);
         for tile in self.tiles.as_mut_slice().iter_mut().filter(|tile| !tile.is_enough) {
@@ -278,24 +257,6 @@ mod tests {
         noise.end(tile, pixels.iter().map(|p| Part::of(&[4.0 * (p.0 + p.1); 3], 8)));
     }
 
-    /// By what squares of errors are multiplied.
-    fn doubted(squares: &[f64]) -> f32 {
-        doubt(squares.iter().fold([0.0; 2], |sums, square| add(sums, *square))) as f32
-    }
-
-    #[test]
-    fn noise_of_few_pixels_is_believed_less() {
-        assert!((doubted(&[3.0]) - (1.0 + 2.0_f32.sqrt() - 0.5)).abs() < 1e-6);
-        assert!((doubted(&[1.0, 1.0, 0.0]) - 1.5).abs() < 1e-6);
-        assert_eq!([doubted(&[2.0; 8]), doubted(&[1.0; 64]), doubted(&[0.0; 4]), doubted(&[])], [1.0; 4]);
-        // A standard deviation of the mean square of that many normal numbers.
-        let mut rng = crate::sampling::Generator::new(3);
-        let mut normal = || (0..12).map(|_| f64::from(crate::sampling::uniform(&mut rng))).sum::<f64>() - 6.0;
-        let squares: [f64; 4000] = core::array::from_fn(|_| (normal().powi(2) + normal().powi(2)) / 2.0);
-        let variance = squares.iter().map(|square| (square - 1.0).powi(2)).sum::<f64>() / 4000.0;
-        assert!((libm::sqrt(variance) - (f64::from(doubted(&[1.0, 1.0])) - 0.5)).abs() < 0.1, "{variance}");
-    }
-
     #[test]
     fn a_tile_is_enough_from_the_noise_asked_for() {
         let of = |noise| {
@@ -304,7 +265,7 @@ mod tests {
             pass(&mut all, 0, &[(0.8, 1.2), (0.9, 1.1)]);
             (all.judge(4), all.judge(8))
         };
-        let noise = libm::sqrtf((0.04_f32 + 0.01) / 2.0 / 1.01 * doubted(&[0.04, 0.01]));
+        let noise = libm::sqrtf((0.04_f32 + 0.01) / 2.0 / 1.01);
         assert_eq!(of(noise * 1.0001), (false, true));
         assert_eq!(of(noise * 0.9999), (false, false));
     }
@@ -319,9 +280,7 @@ mod tests {
         };
         // The error is 1 of 10; the mean of all pixels 3.25.
         let floor = 0.01 * 3.25 * 3.25_f32;
-        let error = doubted(&[1.0]);
-        let (alike, by_light) =
-            (libm::sqrtf(error / (100.0 + floor) / 4.0), libm::sqrtf(error / (103.0 + 4.0 * floor)));
+        let (alike, by_light) = (libm::sqrtf(1.0 / (100.0 + floor) / 4.0), libm::sqrtf(1.0 / (103.0 + 4.0 * floor)));
         assert!(by_light > 1.9 * alike);
         assert!(is_enough(by_light * 1.0001) && !is_enough(by_light * 0.9999));
     }
@@ -344,7 +303,7 @@ mod tests {
         };
         // What 2, 3 and 4 say, and that less and more than these are not believed: of 9 only 4.
         for (ratio, divisor) in [(0.5, 1.0), (2.0, 1.0), (3.0, 2.0), (4.0, 3.0), (9.0, 3.0 * 4.0 / 9.0)] {
-            let noise = libm::sqrtf(0.01_f32 / 1.01 / divisor * doubted(&[1.0]));
+            let noise = libm::sqrtf(0.01_f32 / 1.01 / divisor);
             assert!(of(ratio, noise * 1.0001), "{ratio}");
             assert!(!of(ratio, noise * 0.9999), "{ratio}");
         }
