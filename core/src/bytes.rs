@@ -49,7 +49,7 @@ impl fmt::Display for Damage {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match *self {
             Self::Magic { due } => write!(f, "is no {due}: other first bytes"),
-            Self::NoHeader { found, due } => write!(f, "ends after {found} bytes, before its header of {due} does"),
+            Self::NoHeader { found, due } => write!(f, "is cut off after {found} bytes, in its header of {due}"),
             Self::Version { found, known } => write!(f, "has version {found} of the format; {known} is known"),
             Self::Length { found, due } if found < due => {
                 write!(f, "is cut off: {due} bytes are due, {found} are there")

@@ -119,7 +119,7 @@ fn caches_of_anything_else_are_refused() {
     let cases: &[(Vec<&str>, &[&str])] = &[
         (with("none", &[]), &["none: ", "No such file"]),
         (with(".", &[]), &[".: is not a file"]),
-        (with("empty", &[]), &["empty: ends after 0 bytes"]),
+        (with("empty", &[]), &["empty: is cut off after 0 bytes"]),
         (with("a.png", &[]), &["a.png: is no file of radiance caches"]),
         (with("cut", &[]), &["cut: is cut off"]),
         (with("flipped", &[]), &["flipped: ", "damaged"]),

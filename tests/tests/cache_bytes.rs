@@ -206,7 +206,7 @@ fn what_is_wrong_is_said() {
     let more = [&whole[..], b"x"].concat();
     let magic = BytesError::from(Damage::Magic { due: "radiance cache" });
     let cases: &[(&[u8], BytesError, &str)] = &[
-        (b"", Damage::NoHeader { found: 0, due: 40 }.into(), "ends after 0 bytes"),
+        (b"", Damage::NoHeader { found: 0, due: 40 }.into(), "cut off after 0 bytes"),
         (&[0; 40], magic, "no radiance cache"),
         (&with(&whole, 0, b"\x89PNG\r\n\x1a\n"), magic, "no radiance cache"),
         (&number(8, 2), Damage::Version { found: 2, known: 1 }.into(), "version 2 of the format; 1 is known"),
@@ -367,14 +367,11 @@ fn files_damaged_anywhere_are_refused() {
     assert!(refusal(&folder.with(&whole[..12]), settings(), TAG).contains("cut off"));
     assert!(refusal(&folder.with(&whole[..whole.len() - 1]), settings(), TAG).contains("cut off"));
     assert!(refusal(&folder.with(&[&whole[..], b"."].concat()), settings(), TAG).contains("goes on after its end"));
-    assert!(refusal(&folder.with(b""), settings(), TAG).contains("not a file of radiance caches"));
+    assert!(refusal(&folder.with(b""), settings(), TAG).contains("cut off after 0 bytes"));
     assert!(
-        refusal(&folder.with(b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR"), settings(), TAG)
-            .contains("not a file of radiance caches")
+        refusal(&folder.with(b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR"), settings(), TAG).contains("no file of radiance caches")
     );
-    assert!(
-        refusal(&folder.with(&to_bytes(&volume(2, 0, 1))), settings(), TAG).contains("not a file of radiance caches")
-    );
+    assert!(refusal(&folder.with(&to_bytes(&volume(2, 0, 1))), settings(), TAG).contains("no file of radiance caches"));
     assert!(refusal(&folder.with(&with(&whole, 8, &[9])), settings(), TAG).contains("version 9"));
     assert!(refusal(&folder.with(&with(&whole, 12, &[0xff; 8])), settings(), TAG).contains("cut off"));
     assert!(refusal(&folder.with(&with(&whole, 60, &[1])), settings(), TAG).contains("damaged"));

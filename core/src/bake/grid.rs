@@ -602,6 +602,18 @@ impl ProbeGrid<'_> {
     }
 
     /// Where the bricks of a grid are that has some alone ([`ProbeGrid::finer`]), in rising order: numbers among all bricks of 4 × 4 × 4 cells of the lattice, x first. Of others, none.
+    ///
+    /// ```
+    /// # use fogbow::{host::Empty, math::{Bounds, Vec3}, world::{Outline, World}};
+    /// # use fogbow::bake::{Bake, BakeSettings};
+    /// # #[cfg(feature = "alloc")] {
+    /// # let bounds = Bounds { min: Vec3::ZERO, max: Vec3::ONE };
+    /// # let outline = Outline::of(&World { medium: &Empty, scene: &Empty, lights: (&[]).into() }, bounds);
+    /// let grid = Bake::new(BakeSettings::for_outline(&outline, [5, 4, 4]))?.finish();
+    /// assert!(grid.places().is_empty());   // all of its bricks are there
+    /// # }
+    /// # Ok::<(), fogbow::bake::BakeError>(())
+    /// ```
     #[must_use]
     pub fn places(&self) -> &[u32] {
         self.memory.places.as_slice()
@@ -671,6 +683,18 @@ impl ProbeGrid<'_> {
     }
 
     /// The cell of a probe; `None` for those beyond the border of the box, of which nothing is ever known.
+    ///
+    /// ```
+    /// # use fogbow::{host::Empty, math::{Bounds, Vec3}, world::{Outline, World}};
+    /// # use fogbow::bake::{Bake, BakeSettings};
+    /// # #[cfg(feature = "alloc")] {
+    /// # let bounds = Bounds { min: Vec3::ZERO, max: Vec3::ONE };
+    /// # let outline = Outline::of(&World { medium: &Empty, scene: &Empty, lights: (&[]).into() }, bounds);
+    /// let grid = Bake::new(BakeSettings::for_outline(&outline, [5, 4, 4]))?.finish();
+    /// assert!((0..80).all(|cell| grid.cell_of(cell) == Some(cell)));   // the inverse of `number_of`
+    /// # }
+    /// # Ok::<(), fogbow::bake::BakeError>(())
+    /// ```
     #[must_use]
     pub fn cell_of(&self, number: usize) -> Option<usize> {
         if !self.is_sparse() {

@@ -105,7 +105,20 @@ impl<'s> ProbeLevels<'s> {
         self.levels.iter_mut()
     }
 
-    /// The levels by themselves.
+    /// The levels by themselves, the one that has all probes first.
+    ///
+    /// ```
+    /// # use fogbow::{host::Empty, math::{Bounds, Vec3}, world::{Outline, World}};
+    /// # use fogbow::bake::{Bake, BakeSettings, ProbeLevels};
+    /// # #[cfg(feature = "alloc")] {
+    /// # let bounds = Bounds { min: Vec3::ZERO, max: Vec3::ONE };
+    /// # let outline = Outline::of(&World { medium: &Empty, scene: &Empty, lights: (&[]).into() }, bounds);
+    /// let grid = Bake::new(BakeSettings::for_outline(&outline, [5, 4, 4]))?.finish();
+    /// let lattice = grid.lattice();
+    /// assert!(ProbeLevels::new(grid).into_levels().map(|level| level.lattice()).eq([lattice]));
+    /// # }
+    /// # Ok::<(), fogbow::bake::BakeError>(())
+    /// ```
     pub fn into_levels(self) -> impl Iterator<Item = ProbeGrid<'s>> {
         self.levels.into_iter()
     }
