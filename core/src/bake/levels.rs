@@ -114,8 +114,8 @@ impl<'s> ProbeLevels<'s> {
     /// # let bounds = Bounds { min: Vec3::ZERO, max: Vec3::ONE };
     /// # let outline = Outline::of(&World { medium: &Empty, scene: &Empty, lights: (&[]).into() }, bounds);
     /// let grid = Bake::new(BakeSettings::for_outline(&outline, [5, 4, 4]))?.finish();
-    /// let lattice = grid.lattice();
-    /// assert!(ProbeLevels::new(grid).into_levels().map(|level| level.lattice()).eq([lattice]));
+    /// let lattice = *grid.lattice();
+    /// assert!(ProbeLevels::new(grid).into_levels().map(|level| *level.lattice()).eq([lattice]));
     /// # }
     /// # Ok::<(), fogbow::bake::BakeError>(())
     /// ```

@@ -102,7 +102,7 @@ impl Plastic {
 }
 
 /// Terms that the transmittance of a rough coat is kept in.
-const TERMS: usize = 16;
+const TERMS: usize = 10;
 
 /// Where its terms look closer: at cosines below this.
 const STEEP: f32 = 0.3;
