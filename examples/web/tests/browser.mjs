@@ -68,3 +68,13 @@ export async function watched(browser, url) {
   });
   return { page, wrong };
 }
+
+/** An empty page of the same origin, that may import /asked.mjs. */
+export async function asking(browser, url) {
+  const { page, wrong } = await watched(browser, url);
+  const asked = await readFile(new URL("asked.mjs", import.meta.url), "utf8");
+  await page.route("**/asked.mjs", (route) => route.fulfill({ contentType: "text/javascript", body: asked }));
+  await page.route("**/empty.html", (route) => route.fulfill({ contentType: "text/html", body: "" }));
+  await page.goto(`${url}empty.html`);
+  return { page, wrong };
+}

@@ -6,7 +6,7 @@
 // finer_levels_are_found_by_shaders_and_gone_on_with, a test of the program.
 
 import { readFile } from "node:fs/promises";
-import { browse, serve, watched } from "./browser.mjs";
+import { asking, browse, serve } from "./browser.mjs";
 
 const [folder, name] = process.argv.slice(2);
 const shader = (file) => readFile(new URL(`../../shaders/${file}`, import.meta.url), "utf8");
@@ -15,10 +15,7 @@ const site = await serve(folder);
 let failed = false;
 
 await browse(async (browser) => {
-  const { page, wrong } = await watched(browser, site.url);
-  // Of the same origin, and nothing in it.
-  await page.route("**/empty.html", (route) => route.fulfill({ contentType: "text/html", body: "" }));
-  await page.goto(`${site.url}empty.html`);
+  const { page, wrong } = await asking(browser, site.url);
   const found = await page.evaluate(async ({ name, glsl, wgsl }) => {
     const about = await (await fetch(`${name}.ktx2.json`)).json();
     const names = ["sh0", "sh1", "sh2", "sh3", "sh4", "sh5", "sh6", "sh7", "sh8", "medium", "wall0", "wall1", "index"];
@@ -31,25 +28,14 @@ await browse(async (browser) => {
       const size = [20, 24, 28].map((at) => bytes.getUint32(at, true));
       const at = Number(bytes.getBigUint64(80, true));
       const data = Float32Array.from({ length: 4 * size[0] * size[1] * size[2] }, (_, i) => half(bytes.getUint16(at + 2 * i, true)));
-      return { size, data };
+      return { name: texture, size, data };
     }));
     const [low, high] = [about.box.min, about.box.max];
     const size = high.map((h, i) => h - low[i]);
     const [counts, levels] = [about.counts, about.levels.length];
 
-    const [W, H] = [200, 100];
-    let state = 1;
-    const random = () => {
-      state = (Math.imul(state, 1664525) + 1013904223) >>> 0;
-      return state / 2 ** 32;
-    };
-    const [points, directions] = [new Float32Array(4 * W * H), new Float32Array(4 * W * H)];
-    for (let i = 0; i < points.length; i += 4) {
-      points.set([0, 1, 2].map((k) => low[k] + size[k] * (1.1 * random() - 0.05)), i);
-      const [z, a] = [2 * random() - 1, 2 * Math.PI * random()];
-      const r = Math.sqrt(1 - z * z);
-      directions.set([r * Math.cos(a), r * Math.sin(a), z, 0], i);
-    }
+    const { questions, byWebGL, byWebGPU } = await import("/asked.mjs");
+    const { points, directions } = questions(20000, low, size, 0);
 
     // The look-up, written here.
     const texel = (which, at) => {
@@ -112,122 +98,19 @@ await browse(async (browser) => {
     const due = [];
     for (let i = 0; i < points.length; i += 4) due.push(look(points.subarray(i, i + 3), directions.subarray(i, i + 3)));
 
-    const gl = new OffscreenCanvas(W, H).getContext("webgl2");
-    gl.getExtension("EXT_color_buffer_float");
-    const draw = (body) => {
-      const program = gl.createProgram();
-      const sources = [
-        [gl.VERTEX_SHADER, "#version 300 es\nvoid main() { gl_Position = vec4(vec2(gl_VertexID & 1, gl_VertexID >> 1) * 4.0 - 1.0, 0.0, 1.0); }"],
-        [gl.FRAGMENT_SHADER, `#version 300 es
-precision highp float; precision highp int; precision highp sampler3D;
-#define FOG_LEVELS
-${glsl}
-uniform highp sampler2D points, directions;
-out vec4 colour;
-void main() {
-    vec4 point = texelFetch(points, ivec2(gl_FragCoord.xy), 0);
-    vec3 direction = texelFetch(directions, ivec2(gl_FragCoord.xy), 0).xyz;
-    colour = ${body};
-}`],
-      ];
-      for (const [kind, source] of sources) {
-        const made = gl.createShader(kind);
-        gl.shaderSource(made, source);
-        gl.compileShader(made);
-        if (!gl.getShaderParameter(made, gl.COMPILE_STATUS)) throw new Error(gl.getShaderInfoLog(made));
-        gl.attachShader(program, made);
-      }
-      gl.linkProgram(program);
-      gl.useProgram(program);
-      let unit = 0;
-      const place = (uniform) => gl.getUniformLocation(program, uniform);
-      const bind = (kind, uniform, upload) => {
-        if (!place(uniform)) return;
-        gl.activeTexture(gl.TEXTURE0 + unit);
-        gl.bindTexture(kind, gl.createTexture());
-        upload();
-        for (const filter of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER]) gl.texParameteri(kind, filter, gl.NEAREST);
-        gl.uniform1i(place(uniform), unit++);
-      };
-      const flat = (data) => () => gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA32F, W, H, 0, gl.RGBA, gl.FLOAT, data);
-      bind(gl.TEXTURE_2D, "points", flat(points));
-      bind(gl.TEXTURE_2D, "directions", flat(directions));
-      volumes.forEach(({ size, data }, i) => bind(gl.TEXTURE_3D, names[i], () => gl.texImage3D(gl.TEXTURE_3D, 0, gl.RGBA32F, ...size, 0, gl.RGBA, gl.FLOAT, data)));
-      gl.uniform3f(place("probes_corner"), ...low);
-      gl.uniform3f(place("probes_size"), ...size);
-      gl.uniform1f(place("probes_scale"), about.scale);
-      gl.uniform1i(place("probes_numbers"), 9);
-      gl.uniform3i(place("probes_counts"), ...counts);
-      gl.uniform1i(place("probes_levels"), levels);
-      gl.activeTexture(gl.TEXTURE15);
-      const target = gl.createTexture();
-      gl.bindTexture(gl.TEXTURE_2D, target);
-      flat(null)();
-      gl.bindFramebuffer(gl.FRAMEBUFFER, gl.createFramebuffer());
-      gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, target, 0);
-      gl.viewport(0, 0, W, H);
-      gl.drawArrays(gl.TRIANGLES, 0, 3);
-      const all = new Float32Array(4 * W * H);
-      gl.readPixels(0, 0, W, H, gl.RGBA, gl.FLOAT, all);
-      return all;
-    };
-
-    const adapter = await navigator.gpu.requestAdapter();
-    const device = await adapter.requestDevice();
-    device.pushErrorScope("validation");
-    const pipeline = device.createComputePipeline({
-      layout: "auto",
-      compute: {
-        module: device.createShaderModule({
-          code: `${wgsl}
-@group(1) @binding(0) var<storage, read> points: array<vec4<f32>>;
-@group(1) @binding(1) var<storage, read> directions: array<vec4<f32>>;
-@group(1) @binding(2) var<storage, read_write> answers: array<vec4<f32>>;
-@compute @workgroup_size(64) fn ask(@builtin(global_invocation_id) id: vec3<u32>) {
-    if id.x < arrayLength(&points) {
-        answers[2u * id.x] = vec4<f32>(in_scattered(points[id.x].xyz, directions[id.x].xyz), 1.0);
-        answers[2u * id.x + 1u] = matter(points[id.x].xyz);
-    }
-}`,
-        }),
-        entryPoint: "ask",
+    const gl = byWebGL({
+      glsl: `#define FOG_LEVELS\n${glsl}`, width: 200, points, directions, volumes,
+      uniforms: {
+        probes_corner: ["3f", low], probes_size: ["3f", size], probes_scale: ["1f", [about.scale]], probes_numbers: ["1i", [9]],
+        probes_counts: ["3i", counts], probes_levels: ["1i", [levels]],
       },
     });
-    const buffer = (data, usage) => {
-      const made = device.createBuffer({ size: data.byteLength, usage: usage | GPUBufferUsage.COPY_DST });
-      device.queue.writeBuffer(made, 0, data);
-      return { buffer: made };
-    };
     const probes = new ArrayBuffer(48);
     new Float32Array(probes).set([...low, about.scale, ...size]);
     new Uint32Array(probes).set([9, ...counts, levels], 7);
-    const volume = ({ size, data }) => {
-      const texture = device.createTexture({ size, dimension: "3d", format: "rgba32float", usage: GPUTextureUsage.TEXTURE_BINDING | GPUTextureUsage.COPY_DST });
-      device.queue.writeTexture({ texture }, data, { bytesPerRow: 16 * size[0], rowsPerImage: size[1] }, size);
-      return texture.createView();
-    };
-    const bytes = 32 * W * H;
-    const told = device.createBuffer({ size: bytes, usage: GPUBufferUsage.STORAGE | GPUBufferUsage.COPY_SRC });
-    const readable = device.createBuffer({ size: bytes, usage: GPUBufferUsage.MAP_READ | GPUBufferUsage.COPY_DST });
-    const groups = [
-      [buffer(probes, GPUBufferUsage.UNIFORM), ...volumes.map(volume)],
-      [buffer(points, GPUBufferUsage.STORAGE), buffer(directions, GPUBufferUsage.STORAGE), { buffer: told }],
-    ];
-    const encoder = device.createCommandEncoder();
-    const pass = encoder.beginComputePass();
-    pass.setPipeline(pipeline);
-    groups.forEach((resources, number) => {
-      const entries = resources.map((resource, binding) => ({ binding, resource }));
-      pass.setBindGroup(number, device.createBindGroup({ layout: pipeline.getBindGroupLayout(number), entries }));
+    const gpu = await byWebGPU({
+      wgsl, points, directions, probes, volumes, bodies: ["vec4<f32>(in_scattered(point.xyz, direction), 1.0)", "matter(point.xyz)"],
     });
-    pass.dispatchWorkgroups(Math.ceil((W * H) / 64));
-    pass.end();
-    encoder.copyBufferToBuffer(told, 0, readable, 0, bytes);
-    device.queue.submit([encoder.finish()]);
-    await readable.mapAsync(GPUMapMode.READ);
-    const answers = new Float32Array(readable.getMappedRange());
-    const refused = (await device.popErrorScope())?.message ?? "";
-    const answer = (which) => Float32Array.from({ length: 4 * W * H }, (_, i) => answers[8 * (i >> 2) + 4 * which + (i & 3)]);
 
     const mean = due.reduce((sum, { light }) => sum + light[0] + light[1] + light[2], 0) / (3 * due.length);
     const apart = (all, of, channels, level) => {
@@ -241,9 +124,9 @@ void main() {
       });
       return { worst, off };
     };
-    const lights = [draw("vec4(in_scattered(point.xyz, direction), 1.0)"), answer(0)].map((all) => apart(all, (d) => d.light, 3, mean));
-    const matters = [draw("matter(point.xyz)"), answer(1)].map((all) => apart(all, (d) => d.matter, 4, 1));
-    return { levels, onLevels, mean, lights, matters, refused, error: gl.getError() };
+    const lights = [gl.ask("vec4(in_scattered(point.xyz, direction), 1.0)"), gpu.answers[0]].map((all) => apart(all, (d) => d.light, 3, mean));
+    const matters = [gl.ask("matter(point.xyz)"), gpu.answers[1]].map((all) => apart(all, (d) => d.matter, 4, 1));
+    return { levels, onLevels, mean, lights, matters, refused: gpu.refused, error: gl.error() };
   }, { name, glsl, wgsl });
   console.log(JSON.stringify(found), wrong.join("; "));
   const checks = [
