@@ -6,7 +6,7 @@
     pictures    the atrium and a smoke box marched from 32³, 64³, 128³ probes against path tracing; a plot
     speed       32³ probes of degree 2 in the atrium: processor seconds, beside path tracing the same probes
     refine      bricks of half the spacing against a grid that has all: the same probes, what is left between probes, processor seconds
-    flicker     frames of a plume with one seed: how much probes jump from frame to frame beside what light does
+    flicker     frames of a plume: how much probes flicker beside what light does, with a seed each, with one, and each after the one before; processor seconds
     kill        killed with -9 at any time and gone on with: the same bytes
     schema      descriptions against examples/shaders/bake.schema.json (needs Python's jsonschema)
 
@@ -204,26 +204,46 @@ def refine(folder):
 
 
 def flicker(folder):
-    """Frames of a plume, 1/12 s apart, baked with one seed and with a seed each: how much more probes jump from frame to frame than the light itself, as far better bakes have it."""
-    run("plume", "--frames", 4, "--resolution", 32, "-o", folder / "plume", "-q")
-    frames = [folder / f"plume/plume-{i:02}.xml" for i in range(4)]
+    """Frames of a plume, 1/12 s apart: how much probes flicker beside what light does, as far better bakes have it; a seed each, one seed, and each frame after the one before.
 
-    def light(frame, error, seed, passes=1024):
-        asked = ["--counts", "16x16x16", "--method", "photons", "--error", error, "--passes", passes, "--seed", seed, "-q"]
-        run("bake", frame, *asked, "-o", folder / "frame.json")
-        probes = Probes(folder / "frame.json")
-        return probes.numbers()[probes.valid][:, 0].mean(-1)
+    Flicker is the standard deviation over time of what a probe is off by: what it is off by in all frames alike is not seen. Still is where light itself changes by less than half of the error asked for."""
+    count, error, held = 6, 0.03, True
+    run("plume", "--frames", count, "--resolution", 32, "-o", folder / "plume", "-q")
+    frames = [folder / f"plume/plume-{i:02}.xml" for i in range(count)]
+    asked = ["--counts", "16x16x16", "--threads", 1, "-q"]
 
-    due = [light(frame, 0.004, 1000 + i) for i, frame in enumerate(frames)]
-    level = np.mean(due)
-    jumps = {}
-    for name, seeds in (("one seed", [0] * 4), ("a seed each", range(4))):
-        found = [light(frame, 0.02, seed) for frame, seed in zip(frames, seeds)]
-        extra = [(b - a) - (d - c) for a, b, c, d in zip(found, found[1:], due, due[1:])]
-        jumps[name] = 100 * np.sqrt(np.mean(np.square(extra))) / level
-    moved = 100 * np.sqrt(np.mean([np.square(b - a).mean() for a, b in zip(due, due[1:])])) / level
-    print(f"plume: light changes by {moved:.2f} % of the mean from frame to frame; beside that probes jump by {jumps['one seed']:.2f} % with one seed, {jumps['a seed each']:.2f} % with a seed each")
-    return jumps["one seed"] < jumps["a seed each"]
+    def light(file):
+        probes = Probes(file)
+        return probes.numbers()[..., 0, :].mean(-1)[probes.valid]
+
+    due = []
+    for i, frame in enumerate(frames):
+        run("bake", frame, *asked, "--method", "photons", "--error", 0.005, "--seed", 1000 + i, "-o", folder / "due.json")
+        due.append(light(folder / "due.json"))
+    due = np.array(due)
+    level, moved = due.mean(), due.std(0)
+    still = moved < 0.5 * error * level
+    share = lambda squares: 100 * np.sqrt(squares.mean()) / level
+    print(f"plume: {100 * still.mean():.0f} % of the probes are still; light of the others has a deviation of {share(moved[~still]**2):.1f} % of the mean over {count} frames")
+    for method in ("path", "photons"):
+        found = {}
+        for name, seeds in (("a seed each", range(count)), ("one seed", [0] * count)):
+            all, seconds = [], 0
+            for frame, seed in zip(frames, seeds):
+                seconds += run("bake", frame, *asked, "--method", method, "--error", error, "--seed", seed, "-o", folder / "frame.json")[1]
+                all.append(light(folder / "frame.json"))
+            found[name] = np.array(all), seconds, ""
+        told, seconds = run("bake", *frames, *asked[:-1], "--method", method, "--error", error, "-o", folder / "kept.json")
+        kept = [int(n) for n in re.findall(r"(\d+) of \d+ bricks of 64 probes are those", told)]
+        all = np.array([light(folder / f"kept-{frame.stem}.json") for frame in frames])
+        found["after the frame before"] = all, seconds, f", kept {kept} of 64 bricks"
+        flickers = {}
+        for name, (all, seconds, more) in found.items():
+            extra = (all - due).std(0)
+            of_still, of_moving = flickers[name] = share(extra[still] ** 2), share(extra[~still] ** 2)
+            print(f"{method}, {name}: still probes flicker by {of_still:.2f} %, moving ones by {of_moving:.2f} %; off by {share((all - due) ** 2):.2f} %; {seconds:.1f} s{more}", flush=True)
+        held &= flickers["after the frame before"][0] < flickers["a seed each"][0]
+    return held
 
 
 def kill(folder):
@@ -266,10 +286,8 @@ def schema(folder):
 
 def pictures(folder):
     """The medium's light marched from probes against path tracing, blocks of 8 × 8 pixels; a plot of error over resolution."""
-    public = pathlib.Path(os.environ.get("FOGBOW_REFERENCE", "/nowhere")) / "public"
-    sys.path.insert(0, str(public.parent))
     held, curves = True, {}
-    for scene in (SCENES / "atrium.xml", public / "cornell-hetero-iso.xml"):
+    for scene in (SCENES / "atrium.xml", SCENES / "smoke-box-heterogeneous-isotropic.xml"):
         size = ["--size", "64x64", "--aov"]
         for seed in (1, 2):
             run("render", scene, *size, "--method", "path", "--spp", 1024, "--seed", seed, "-o", folder / f"due{seed}.exr")

@@ -70,20 +70,19 @@ impl Sampler<'_, '_> {
             due.medium = due.medium && !self.read(Kind::Multiple, point, held);
         }
         let mut add = |to_light: Vec3, irradiance: Spectrum| projection.add(to_light, irradiance, held);
-        let connections = if is_even(&world.lights) { 1 } else { CONNECTIONS };
-        let share = 1.0 / connections as f32;
-        for _ in 0..connections {
-            let mut connected = |lights: Lights<'_>, rng: &mut Generator| {
-                let world = World { lights, ..*world };
+        let mut connect = |lights: Lights<'_>, rng: &mut Generator| {
+            let connections = if is_even(&lights) { 1 } else { CONNECTIONS };
+            let (share, world) = (1.0 / connections as f32, World { lights, ..*world });
+            for _ in 0..connections {
                 path::arriving(&world, point, rng, |to_light, light| add(to_light, light * share));
-            };
-            if due.lights {
-                world.lights.but_sky().for_each(|lights| connected(lights, rng));
             }
-            if due.surfaces {
-                let skies = world.lights.iter().filter(|light| light.is_sky());
-                skies.for_each(|sky| connected(core::slice::from_ref(sky).into(), rng));
-            }
+        };
+        if due.lights {
+            world.lights.but_sky().for_each(|lights| connect(lights, rng));
+        }
+        if due.surfaces {
+            let skies = world.lights.iter().filter(|light| light.is_sky());
+            skies.for_each(|sky| connect(core::slice::from_ref(sky).into(), rng));
         }
         if paths.max_scatterings == 1 || !(due.surfaces || due.medium) {
             return;

@@ -16,7 +16,7 @@
 //! | 72 | 8 | [`Crc`](crate::bytes::Crc) of bytes 0 to 72 and of all from 80 on |
 //! | 80 | 12 n k | numbers in colour, `k` of each of `n` probes, as `f32` |
 //! | | 4 n k | their sums of squared deviations over passes, a mean over channels, as `f32` |
-//! | | 80 n | extinction and albedo in colour, planes of four surfaces, share of its cell, as `f32`; as `u32` state in bits 0 to 2, [`Probe::is_inner`] in bit 3, surfaces before the next probes in bits 4 to 6 |
+//! | | 80 n | extinction and albedo in colour, planes of four surfaces, share of its cell, as `f32`; as `u32` state in bits 0 to 2, [`Probe::is_inner`] in bit 3, surfaces before the next probes in bits 4 to 6, [`Probe::is_by_paths`] in bit 7 |
 //! | | 8 b | passes, and passes that are due |
 //! | | 4 b | where some bricks alone are there: which, as [`ProbeGrid::places`] |
 //!
@@ -25,7 +25,7 @@
 use core::fmt;
 
 use super::basis::{Orders, ProbeBasis, Quantity};
-use super::grid::{BakeMemory, Brick, INNER, PROBES, Probe, ProbeGrid, ProbeState, STATE, WALLS};
+use super::grid::{BY_PATHS, BakeMemory, Brick, INNER, PROBES, Probe, ProbeGrid, ProbeState, STATE, WALLS};
 use super::levels::ProbeLevels;
 use super::settings::MOST_PROBES;
 use crate::bytes::{Damage, Format, Header, Sink, element, elements, halves};
@@ -214,7 +214,8 @@ pub fn read<'s>(bytes: &[u8], tag: u64, memory: BakeMemory<'s>) -> Result<ProbeG
             && probe.albedo.is_valid()
             && [probe.near, probe.other, probe.third, probe.fourth].iter().all(|plane| plane.is_finite())
             && (0.0..=1.0).contains(&probe.open);
-        let is_known = probe.state & STATE <= ProbeState::Empty as u32 && probe.state & !(STATE | INNER | WALLS) == 0;
+        let bits = STATE | INNER | WALLS | BY_PATHS;
+        let is_known = probe.state & STATE <= ProbeState::Empty as u32 && probe.state & !bits == 0;
         if !is_number || !is_known {
             return Err(ProbeBytesError::Probe(index));
         }

@@ -9,8 +9,9 @@ use glam::Vec3;
 
 use super::arriving::{Sampler, phase_at};
 use super::basis::MOST_COEFFICIENTS;
-use super::flights::{FlightMemory, PhotonFlight, Photons, open_share};
-use super::grid::{BakeMemory, Brick, INNER, PROBES, Probe, ProbeGrid, WALLS_AT};
+use super::earlier::Earlier;
+use super::flights::{FlightMemory, PhotonFlight, Photons, is_unlike_part, open_share};
+use super::grid::{BY_PATHS, BakeMemory, Brick, INNER, PROBES, Probe, ProbeGrid, WALLS_AT};
 use super::places;
 use super::settings::{BakeError, BakeSettings};
 use crate::cache::RadianceCaches;
@@ -113,9 +114,12 @@ pub struct Bake<'s, 'c> {
     grid: ProbeGrid<'s>,
     caches: Option<&'c RadianceCaches<'c>>,
     photons: Option<Photons<'s>>,
+    earlier: Option<Earlier<'c>>,
     /// The brick whose result is due.
     next: u32,
     bricks: u32,
+    /// Whether this begins where a round has ended: which bricks have one more pass goes by all that is said of the bake, then.
+    is_between_rounds: bool,
     /// The share of the work that is done, after the last round.
     share: f32,
     is_cut: bool,
@@ -167,7 +171,9 @@ impl<'s, 'c> Bake<'s, 'c> {
 
     fn over(grid: ProbeGrid<'s>, settings: BakeSettings) -> Self {
         let bricks = grid.memory.bricks.len() as u32;
-        Self { settings, grid, caches: None, photons: None, next: 0, bricks, share: 0.0, is_cut: false }
+        let (caches, photons, earlier) = (None, None, None);
+        let (next, share, is_cut, is_between_rounds) = (0, 0.0, false, false);
+        Self { settings, grid, caches, photons, earlier, next, bricks, is_between_rounds, share, is_cut }
     }
 
     /// Goes on where an earlier bake was left, whose `grid` was baked by the same settings: the bits of one that was not. A smaller error, or
@@ -205,7 +211,10 @@ impl<'s, 'c> Bake<'s, 'c> {
         let mut bake = Self::over(grid, settings);
         match bake.grid.memory.bricks.as_slice().iter().position(|brick| brick.passes < brick.due) {
             Some(brick) => bake.next = brick as u32,
-            None => bake.plan(),
+            None => {
+                bake.is_between_rounds = true;
+                bake.plan();
+            }
         }
         Ok(bake)
     }
@@ -251,7 +260,8 @@ impl<'s, 'c> Bake<'s, 'c> {
         Self { caches: Some(caches), ..self }
     }
 
-    /// The same bake without its caches, for hosts that keep a bake from call to call and lend caches for each. All jobs of a bake want the same caches.
+    /// The same bake without its caches, and without an [earlier](Bake::after) grid, for hosts that keep a bake from call to call and lend caches for each. All jobs of a bake want
+    /// the same of both.
     ///
     /// ```
     /// # use fogbow::{host::Empty, light::Light, math::{Bounds, Vec3}, medium::Homogeneous, phase::Phase, spectrum::Spectrum};
@@ -273,8 +283,10 @@ impl<'s, 'c> Bake<'s, 'c> {
     /// ```
     #[must_use]
     pub fn without_caches<'d>(self) -> Bake<'s, 'd> {
-        let Self { settings, grid, caches: _, photons, next, bricks, share, is_cut } = self;
-        Bake { settings, grid, caches: None, photons, next, bricks, share, is_cut }
+        let Self { settings, grid, caches: _, photons, earlier: _, next, bricks, is_between_rounds, share, is_cut } =
+            self;
+        let (caches, earlier) = (None, None);
+        Bake { settings, grid, caches, photons, earlier, next, bricks, is_between_rounds, share, is_cut }
     }
 
     /// Lets photons from the lights find light that was scattered before it comes to a probe. All probes share them: in the atrium of the examples
@@ -306,8 +318,27 @@ impl<'s, 'c> Bake<'s, 'c> {
     #[must_use]
     pub fn with_photons(mut self, memory: FlightMemory<'s>, world: Bounds) -> Self {
         self.photons = Some(Photons::new(memory, world, self.grid.lattice.cell_count()));
-        self.begin_photons();
+        self.begin();
         self
+    }
+
+    pub(super) fn earlier(&self) -> Option<&Earlier<'c>> {
+        self.earlier.as_ref()
+    }
+
+    pub(super) fn set_earlier(&mut self, earlier: Earlier<'c>) {
+        self.earlier = Some(earlier);
+        self.begin();
+    }
+
+    /// Begins, or goes on, with all that is said of the bake.
+    fn begin(&mut self) {
+        if self.is_between_rounds {
+            self.grid.memory.bricks.as_mut_slice().iter_mut().for_each(|brick| brick.due = brick.passes);
+            self.plan();
+        } else {
+            self.begin_photons();
+        }
     }
 
     /// Begins the photons of the next pass. Bricks that have more passes than others wait for them, so that every pass of a brick is of its own photons.
@@ -414,16 +445,27 @@ impl<'s, 'c> Bake<'s, 'c> {
         self.next < self.bricks
     }
 
+    /// The mean that errors are in proportion to, as a grid's probes hold it.
+    pub(super) fn level_of_numbers(&self, grid: &ProbeGrid<'_>) -> f64 {
+        let of_mean = |mean: f32| f64::from(mean) * grid.basis.number_of_mean(grid.quantity);
+        self.settings.level.map_or_else(|| grid.level_of_numbers(), of_mean)
+    }
+
     /// Which bricks have one more pass.
     fn plan(&mut self) {
-        let of_mean = |mean: f32| f64::from(mean) * self.grid.basis.number_of_mean(self.grid.quantity);
-        let level = self.settings.level.map_or_else(|| self.grid.level_of_numbers(), of_mean);
+        if let Some(earlier) = self.earlier {
+            earlier.keep_unchanged(&mut self.grid, self.settings.error, self.photons.is_some());
+        }
+        let level = self.level_of_numbers(&self.grid);
         let times = self.photons.is_some().then(|| self.grid.error_over(level) / self.settings.error);
-        let bricks = self.grid.memory.bricks.as_slice();
-        let most = bricks.iter().map(|brick| brick.passes).max().unwrap_or(0);
+        let is_kept = |brick: usize| self.earlier.is_some_and(|earlier| earlier.is_kept(&self.grid, brick));
+        let bricks = (0..).zip(self.grid.memory.bricks.as_slice());
+        let most = bricks.filter(|(brick, _)| !is_kept(*brick)).map(|(_, brick)| brick.passes).max().unwrap_or(0);
         let (mut due, mut done) = (0_u32, 0.0_f32);
         for brick in 0..self.bricks as usize {
+            let is_kept = self.earlier.is_some_and(|earlier| earlier.is_kept(&self.grid, brick));
             let share = match times {
+                _ if is_kept => None,
                 None => self.share_of_brick(brick, level),
                 Some(times) => self.share_by_photons(brick, most, times),
             };
@@ -499,7 +541,9 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Rounds<World<'_, M, S>> for Bake<'_,
         *is_cut = false;
         let (grid, settings) = (&self.grid, &self.settings);
         if let Some((photons, _)) = self.photon_jobs() {
-            *is_cut = photons.shoot(job, world, settings, flights).is_err();
+            let seed = |earlier: Earlier<'_>| earlier.seed_of_photons(settings.seed, photons.pass);
+            let settings = BakeSettings { seed: self.earlier.map_or(settings.seed, seed), ..*settings };
+            *is_cut = photons.shoot(job, world, &settings, flights).is_err();
             return;
         }
         let Some(&Brick { passes, due }) = grid.memory.bricks.as_slice().get(job as usize) else { return };
@@ -514,7 +558,11 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Rounds<World<'_, M, S>> for Bake<'_,
                 return held;
             }
             let probe = looked_at(point, cell, world, settings);
-            Probe { state: probe.state | held.state & INNER, ..probe }
+            let has_part = self.photons.is_none()
+                || !probe.is_valid()
+                || !is_unlike_part(point, cell, probe.all_planes(), world.scene);
+            let by_paths = if has_part { 0 } else { BY_PATHS };
+            Probe { state: probe.state | held.state & INNER | by_paths, ..probe }
         };
         let seen: heapless::Vec<Probe, PROBES> = grid.in_brick(job as usize).map(known).collect();
         let mut all = [[Spectrum::ZERO; MOST_COEFFICIENTS]; PROBES];
@@ -523,13 +571,19 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Rounds<World<'_, M, S>> for Bake<'_,
             let phases: heapless::Vec<Phase, PROBES> = grid.in_brick(job as usize).map(phase).collect();
             photons.add(grid, job as usize, &seen, &phases, &mut all);
         }
-        let sampler = Sampler { settings, caches: self.caches, has_photons: self.photons.is_some() };
+        let sampler = |probe: &Probe| {
+            let has_photons = self.photons.is_some() && !probe.is_by_paths();
+            Sampler { settings, caches: self.caches, has_photons }
+        };
+        let place = grid.place(job as usize);
+        let seed = |earlier: Earlier<'_>| earlier.seed(settings.seed, place, passes, self.photons.is_some());
+        let seed = self.earlier.map_or(settings.seed, seed);
         for (((_, at), probe), held) in grid.in_brick(job as usize).zip(&seen).zip(&mut all) {
             let held = &mut held[..each];
             if probe.is_valid() {
                 // By the cell, whichever others are baked: bricks of a grid that has some alone are those of one that has all.
-                let mut rng = independent(settings.seed, BAKE_KEY | at as u64, passes);
-                sampler.sample(grid.lattice.centre(at), world, &mut rng, held);
+                let mut rng = independent(seed, BAKE_KEY | at as u64, passes);
+                sampler(probe).sample(grid.lattice.centre(at), world, &mut rng, held);
                 // No light is better than no number, which would be in all that is mixed with it.
                 held.iter_mut().filter(|number| !number.is_finite()).for_each(|number| *number = Spectrum::ZERO);
             }

@@ -19,11 +19,11 @@ use crate::host::{Medium, Scene};
 use crate::math::{Bounds, Ray};
 use crate::phase::Phase;
 use crate::photon::{self, Event};
-use crate::sampling::{even3, independent};
+use crate::sampling::{even2, even3, independent, warp};
 use crate::sh;
 use crate::spectrum::Spectrum;
 use crate::storage::{Full, List};
-use crate::world::World;
+use crate::world::{World, nearest_surface};
 
 /// Photons of a job. More: longer jobs; fewer: more results to be taken in order.
 const JOB: u32 = 1024;
@@ -47,6 +47,15 @@ const LEAST_ROOM: f32 = 0.25;
 
 /// Points that tell how large a part of a cell is: to a few parts in a thousand.
 const VOLUME_POINTS: u32 = 1024;
+
+/// Points of a part, and directions, in which it is compared with what its probe sees. More: rays to no end; fewer: ledges are missed.
+const SEEN_FROM: usize = 8;
+
+/// See [`SEEN_FROM`].
+const SEEN_ALONG: u32 = 24;
+
+/// Share of what is seen that may differ. Smaller: more probes are given paths of their own than photons have wrong.
+const MOST_UNLIKE: f32 = 0.1;
 
 /// A photon's flight within the box.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Pod, Zeroable)]
@@ -288,10 +297,31 @@ pub(super) fn open_share(planes: [Vec3; PLANES]) -> f32 {
     inside as f32 / VOLUME_POINTS as f32
 }
 
+/// Whether surfaces near a probe hide other directions from it than from the part of the cell that photons count in: as a narrow ledge right below it, which is
+/// half of what it sees, and little of what the part sees. Such a probe has a light of its own.
+pub(super) fn is_unlike_part(point: Vec3, cell: Vec3, planes: [Vec3; PLANES], scene: &(impl Scene + ?Sized)) -> bool {
+    let bounds = half_spaces(planes);
+    if bounds.is_empty() {
+        return false;
+    }
+    let holds = |offset: &Vec3| bounds.iter().all(|(normal, most)| normal.dot(*offset) <= *most);
+    let offsets = (0..VOLUME_POINTS).map(|i| Vec3::from(even3(i)) - 0.5).filter(holds);
+    let points: heapless::Vec<Vec3, SEEN_FROM> = offsets.take(SEEN_FROM).map(|offset| point + offset * cell).collect();
+    let reach = cell.length();
+    let hides =
+        |from: Vec3, direction: Vec3| nearest_surface(&Ray::new(from, direction).with_length(reach), scene).is_some();
+    let unlike = (0..SEEN_ALONG).map(|i| {
+        let direction = warp::uniform_sphere(even2(i + 1).into());
+        let others = points.iter().filter(|from| hides(**from, direction)).count();
+        if hides(point, direction) { points.len() - others } else { others }
+    });
+    unlike.sum::<usize>() as f32 > MOST_UNLIKE * (SEEN_ALONG as usize * points.len()) as f32
+}
+
 impl Part {
     fn of(probe: &Probe, weight: f32) -> Self {
-        let is_open = probe.is_valid() && probe.open > 0.0;
-        let bounds = half_spaces([probe.near, probe.other, probe.third, probe.fourth]);
+        let is_open = probe.is_valid() && probe.open > 0.0 && !probe.is_by_paths();
+        let bounds = half_spaces(probe.all_planes());
         Self { bounds, weight: if is_open { weight / probe.open } else { 0.0 } }
     }
 

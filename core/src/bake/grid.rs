@@ -56,7 +56,7 @@ pub struct Probe {
     pub(super) fourth: Vec3,
     /// What share of its cell photons count in.
     pub(super) open: f32,
-    /// A [`ProbeState`] by its number, in [`STATE`]; [`INNER`]; in [`WALLS`], bits for x, y and z where a surface stands before the next probe. Above that, marks of a dilation
+    /// A [`ProbeState`] by its number, in [`STATE`]; [`INNER`]; in [`WALLS`], bits for x, y and z where a surface stands before the next probe; [`BY_PATHS`]. Above that, marks of a dilation
     /// under way.
     pub(super) state: u32,
 }
@@ -71,6 +71,9 @@ pub(super) const INNER: u32 = 8;
 pub(super) const WALLS: u32 = 7 << WALLS_AT;
 
 pub(super) const WALLS_AT: u32 = 4;
+
+/// The bit of a probe whose light is found by paths, in a bake by photons.
+pub(super) const BY_PATHS: u32 = 1 << 7;
 
 impl Probe {
     /// What has become of it.
@@ -134,6 +137,17 @@ impl Probe {
         ((1.0 - s) * SOFT).clamp(0.0, 1.0) + HIDDEN / (fourth * fourth)
     }
 
+    /// Whether a bake by photons has found its light by paths, since surfaces beside it hide other light from it than from most of its cell.
+    ///
+    /// ```
+    /// # use fogbow::bake::Probe;
+    /// assert!(!Probe::default().is_by_paths());
+    /// ```
+    #[must_use]
+    pub fn is_by_paths(&self) -> bool {
+        self.state & BY_PATHS != 0
+    }
+
     /// Whether a probe of a level that has some bricks alone has neighbours of that level on all sides: within a cell of probes that have not, look-ups go over into the coarser level.
     ///
     /// ```
@@ -143,6 +157,10 @@ impl Probe {
     #[must_use]
     pub fn is_inner(&self) -> bool {
         self.state & INNER != 0
+    }
+
+    pub(super) fn all_planes(&self) -> [Vec3; 4] {
+        [self.near, self.other, self.third, self.fourth]
     }
 
     pub(super) fn is_valid(&self) -> bool {
@@ -595,6 +613,24 @@ impl ProbeGrid<'_> {
     fn numbers(&self, index: usize) -> core::ops::Range<usize> {
         let each = self.basis.count();
         index * each..(index + 1) * each
+    }
+
+    /// How many bricks of 4 × 4 × 4 probes, or of what is left of them at the border, there are.
+    ///
+    /// ```
+    /// # use fogbow::{host::Empty, math::{Bounds, Vec3}, world::{Outline, World}};
+    /// # use fogbow::bake::{Bake, BakeSettings};
+    /// # #[cfg(feature = "alloc")] {
+    /// # let bounds = Bounds { min: Vec3::ZERO, max: Vec3::ONE };
+    /// # let outline = Outline::of(&World { medium: &Empty, scene: &Empty, lights: (&[]).into() }, bounds);
+    /// let grid = Bake::new(BakeSettings::for_outline(&outline, [5, 4, 4]))?.finish();
+    /// assert_eq!(grid.brick_count(), 2);
+    /// # }
+    /// # Ok::<(), fogbow::bake::BakeError>(())
+    /// ```
+    #[must_use]
+    pub fn brick_count(&self) -> usize {
+        self.memory.bricks.len()
     }
 
     pub(super) fn brick_counts(&self) -> [u32; 3] {

@@ -22,6 +22,7 @@
 //! | `arriving` | the light that arrives at a probe, from caches, by connections and by paths |
 //! | `places` | which probes are in walls or far from any medium |
 //! | `fill` | [`Bake`]: passes over bricks |
+//! | `earlier` | what is kept of the grid of an earlier frame |
 //! | `flights` | [`PhotonFlight`]s that all probes share: what they leave in cells |
 //! | `grid` | [`ProbeGrid`]: what was baked; look-ups, dilation |
 //! | `levels` | [`ProbeLevels`]: bricks of half the spacing where light varies |
@@ -34,6 +35,7 @@
 mod arriving;
 mod basis;
 pub mod bytes;
+mod earlier;
 mod fill;
 mod flights;
 mod froxels;

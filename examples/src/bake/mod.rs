@@ -26,6 +26,8 @@ pub struct Baked {
     pub mean_cosine: Option<f32>,
     /// How far it is from path tracing; `None` where it was path traced, or where that is not known any more.
     pub deviation: Option<ProbeDeviation>,
+    /// How many bricks are those of the frame before, and how many there are; `None` where there was none, or where that is not known any more.
+    pub kept: Option<[usize; 2]>,
     /// What all numbers of light were multiplied by.
     pub scale: f32,
 }

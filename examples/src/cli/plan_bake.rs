@@ -46,7 +46,11 @@ pub(super) fn run(arguments: &PlanBakeArguments) -> Result<Ending, Failure> {
 
 fn graph(arguments: &PlanBakeArguments) -> Result<Graph, Failure> {
     let PlanBakeArguments { bake, parts, folder, words } = arguments;
-    let Some(scene) = &bake.scene else { return Err("--from-file: there is nothing to bake".into()) };
+    let scene = match bake.scene.as_slice() {
+        [scene] => scene,
+        [] => return Err("--from-file: there is nothing to bake".into()),
+        _ => return Err("parts are of one scene".into()),
+    };
     if bake.many.part.is_some() || bake.many.level.is_some() || bake.resume {
         return Err("--part, --level and --resume: the plan says them for every step; leave them out".into());
     }

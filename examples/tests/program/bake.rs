@@ -422,9 +422,74 @@ fn photons_are_gone_on_with_and_say_what_they_are() {
     assert!(about["relative_error"].as_f64().unwrap() <= 0.03);
     bake(&folder, &[&options[..], &["--threads", "3", "-o", "b.bake"]].concat());
     assert!(file(&folder, "a.bake") == file(&folder, "b.bake"));
+    // What is done is not done again.
+    bake(&folder, &[&options[..], &["--resume", "-o", "b.bake"]].concat());
+    assert!(file(&folder, "a.bake") == file(&folder, "b.bake"));
     // What another method has begun is not gone on with.
     let output = folder.run(&["bake", SCENE, "-q", "--counts", "6x5x3", "--resume", "-o", "a.bake"]);
     assert!(output.status.code() == Some(2) && said(&output).contains("another --method"), "{}", said(&output));
+}
+
+/// An animation of three frames, the first two alike.
+#[test]
+fn frames_keep_what_has_not_changed_since_the_one_before() {
+    let folder = Folder::new("bake-frames");
+    let plume = folder.run(&["plume", "--frames", "2", "--resolution", "8", "-o", ".", "-q"]);
+    assert_eq!(plume.status.code(), Some(0), "{}", said(&plume));
+    std::fs::copy(folder.0.join("plume-00.xml"), folder.0.join("still.xml")).unwrap();
+    let asked = ["--counts", "8x8x8", "--error", "0.1", "--basis", "sh1"];
+    for method in ["path", "photons"] {
+        let run = |more: &[&str]| folder.run(&[&["bake", "--method", method], &asked[..], more].concat());
+        let all = run(&["plume-00.xml", "still.xml", "plume-01.xml", "-o", "fog.bake", "-o", "fog.json"]);
+        assert_eq!(all.status.code(), Some(0), "{}", said(&all));
+        let kept = |number: usize| {
+            let lines = said(&all);
+            let line = lines.lines().filter(|line| line.ends_with("are those of the frame before")).nth(number);
+            line.and_then(|line| line.split_whitespace().next()?.parse::<u32>().ok()).unwrap()
+        };
+        // One still brick of eight is baked anew by chance: fewer than five of eight stay once in two hundred times.
+        assert!(kept(0) >= 5 && kept(1) <= 8, "of 8 bricks {} and {}", kept(0), kept(1));
+        let [first, still, moved] =
+            ["plume-00", "still", "plume-01"].map(|name| grid(&folder, &format!("fog-{name}.bake")));
+        let same = |other: &ProbeGrid<'_>| (0..512).filter(|probe| first.held(*probe) == other.held(*probe)).count();
+        assert!(same(&still) >= 64 * kept(0) as usize && same(&moved) <= 64 * kept(1) as usize);
+        let medium = |grid: &ProbeGrid<'_>| grid.probes().iter().map(|probe| probe.extinction[0]).collect::<Vec<_>>();
+        assert!(medium(&first) == medium(&still) && medium(&first) != medium(&moved), "what a shader marches through");
+        json(&folder, "fog-plume-01.json");
+
+        // Frame by frame it is the same, and what is done is not done again.
+        let one = run(&["plume-01.xml", "--after", "fog-still.bake", "-o", "one.bake"]);
+        assert_eq!(one.status.code(), Some(0), "{}", said(&one));
+        let due = file(&folder, "fog-plume-01.bake");
+        assert!(file(&folder, "one.bake") == due);
+        for more in [
+            &["plume-01.xml", "--after", "fog-still.bake", "-o", "one.bake", "--resume"][..],
+            &["plume-00.xml", "still.xml", "plume-01.xml", "-o", "fog.bake", "--resume"],
+        ] {
+            let again = run(more);
+            assert_eq!(again.status.code(), Some(0), "{}", said(&again));
+        }
+        assert!(file(&folder, "one.bake") == due && file(&folder, "fog-plume-01.bake") == due);
+        let other = run(&["plume-01.xml", "--after", "fog-plume-00.bake", "-o", "one.bake", "--resume"]);
+        assert!(said(&other).contains("--error or --after"), "{}", said(&other));
+    }
+    for (arguments, reason) in [
+        (
+            &["plume-01.xml", "--after", "fog-still.bake", "--counts", "8x8x4"][..],
+            "--after: the frame before has other probes",
+        ),
+        (&["plume-01.xml", "--after", "still.xml"], "--after still.xml: is no grid of probes"),
+        (&["plume-01.xml", "--after", "nowhere.bake"], "nowhere.bake: cannot be read"),
+        (&["plume-01.xml", "--after", "fog-still.bake", "--per-light"], "cannot be used with"),
+        (&["plume-01.xml", "./plume-01.xml"], "two scenes are called plume-01"),
+        (&["plume-01.xml", "still.xml", "--per-light"], "--per-light is for one scene"),
+        (&["plume-01.xml", "gone.xml"], "gone.xml"),
+    ] {
+        let output =
+            folder.run(&[&["bake", "-o", "no.bake", "--passes", "2", "--basis", "fluence"], arguments].concat());
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {}", said(&output));
+        assert!(said(&output).contains(reason), "{arguments:?}: {}", said(&output));
+    }
 }
 
 /// Killed without a word, at any time: what is there is a whole file, and is gone on with to the same bytes.

@@ -4,7 +4,8 @@ use core::cell::Cell;
 use std::path::PathBuf;
 
 use fogbow::bake::{
-    Bake, BakeMemory, BakeSettings, FlightMemory, OneLight, ProbeBasis, ProbeDeviation, ProbeGrid, ProbeLevels,
+    Bake, BakeError, BakeMemory, BakeSettings, FlightMemory, OneLight, ProbeBasis, ProbeDeviation, ProbeGrid,
+    ProbeLevels,
 };
 use fogbow::cache::{Asked, ERROR_BOUNDS, Kind, RadianceCaches, Settings, USUAL_ERROR};
 use fogbow::host::{Medium, Scene};
@@ -22,6 +23,7 @@ use super::super::render::stop_flag;
 use super::super::report::{Bar, Voice};
 use super::super::{Ending, Failure};
 use super::parts::PartOf;
+use super::sequence::Earlier;
 use super::{BakeArguments, Source, begun, write};
 use crate::world::{WithMedium, World};
 
@@ -64,6 +66,8 @@ pub(super) struct BakeJob<'a> {
     pub(super) tag: u64,
     /// The one light that shines; `None` for all.
     pub(super) light: Option<u32>,
+    /// The frame before.
+    pub(super) earlier: Option<&'a Earlier>,
     /// The mean that errors are in proportion to, if it is given.
     pub(super) level: Option<f32>,
     /// What a part is of.
@@ -124,8 +128,17 @@ impl WithMedium for BakeJob<'_> {
     }
 }
 
-/// All levels, the mean cosine of the phase function, how far caches are off, and whether all is done.
-type Done = (ProbeLevels<'static>, f32, Option<ProbeDeviation>, Ending);
+/// What a bake leaves.
+pub(super) struct Done {
+    pub(super) levels: ProbeLevels<'static>,
+    /// Of the phase function.
+    pub(super) mean_cosine: f32,
+    /// How far caches are off.
+    pub(super) deviation: Option<ProbeDeviation>,
+    /// How many bricks are those of the frame before, and how many there are.
+    pub(super) kept: Option<[usize; 2]>,
+    pub(super) ending: Ending,
+}
 
 impl BakeJob<'_> {
     fn bake<M: Medium + Sync, S: Scene + Sync>(
@@ -165,9 +178,14 @@ impl BakeJob<'_> {
             None => bake,
         };
         let (clock, mut written, mut trouble) = (Stopwatch::start(), 0.0, None);
+        let earlier = self.earlier.map_or(&[][..], |earlier| earlier.levels.levels());
+        let mut kept = self.earlier.map(|_| [0, 0]);
         // A level, after those that are done.
-        let mut bake_level = |bake, done: &[ProbeGrid<'static>]| {
+        let mut bake_level = |bake: Bake<'static, 'static>, done: &[ProbeGrid<'static>]| {
             let mut bake = with_light(bake);
+            if let Some(earlier) = earlier.get(done.len()) {
+                bake = bake.after(earlier)?;
+            }
             let ran = threads::run(&mut bake, world, &pool, &control, None, |bake| {
                 let elapsed = clock.elapsed().wall;
                 bar.share(bake.share(), elapsed);
@@ -181,9 +199,14 @@ impl BakeJob<'_> {
                     trouble = trouble.take().or(kept.err());
                 }
             });
-            (bake.finish(), ran.ending == threads::Ending::Done)
+            if let Some([of_earlier, all]) = &mut kept {
+                (*of_earlier, *all) = (*of_earlier + bake.kept(), *all + bake.grid().brick_count());
+            }
+            Ok::<_, BakeError>((bake.finish(), ran.ending == threads::Ending::Done))
         };
-        let (grid, mut is_done) = bake_level(bake, &[]);
+        let (grid, mut is_done) = bake_level(bake, &[]).map_err(|_| {
+            "--after: the frame before has other probes: of another --box, --counts, --basis, --quantity or --orders"
+        })?;
         let mut deviation = None;
         if caches.is_some() && is_done {
             bar.tell("compare", 0.0);
@@ -212,7 +235,7 @@ impl BakeJob<'_> {
             }
             settings.counts = settings.counts.map(|n| 2 * n);
             let finer = Bake::resume(finer, settings)?;
-            let (finer, done) = bake_level(finer, levels.levels());
+            let (finer, done) = bake_level(finer, levels.levels())?;
             is_done = done;
             levels.push(finer)?;
         }
@@ -221,7 +244,7 @@ impl BakeJob<'_> {
             say!("fogbow: {trouble}");
         }
         let ending = if is_done { Ending::Done } else { Ending::Stopped };
-        Ok((levels, outline.phase.mean_cosine().mean(), deviation, ending))
+        Ok(Done { levels, mean_cosine: outline.phase.mean_cosine().mean(), deviation, kept, ending })
     }
 
     /// The levels that are to be gone on with, if there are any.

@@ -2,6 +2,7 @@
 
 mod job;
 pub(super) mod parts;
+mod sequence;
 mod write;
 
 use core::cell::Cell;
@@ -21,10 +22,11 @@ use crate::bake::texture::Texel;
 use crate::bake::{Baked, Layout};
 use crate::error::read_file;
 use crate::world::{Storage, World, light_tree, view};
-use job::BakeJob;
+use job::{BakeJob, Done};
 pub use parts::BakePartArguments;
 use parts::PartOf;
 pub(super) use parts::check_count;
+use sequence::Earlier;
 use write::Target;
 
 /// Bakes light in fog into 3D textures for engines.
@@ -35,14 +37,14 @@ use write::Target;
 #[derive(Debug, Args)]
 #[command(mut_args(told))]
 pub struct BakeArguments {
-    /// The scene file.
-    #[arg(required_unless_present = "from_file")]
-    pub scene: Option<PathBuf>,
+    /// The scene file; or several, the frames of an animation in their order: each goes into files with its scene's name in theirs, and keeps what has not changed since the frame before (see --after).
+    #[arg(required_unless_present = "from_file", value_name = "SCENE")]
+    pub scene: Vec<PathBuf>,
     /// How it is read.
     #[command(flatten)]
     pub reading: ReadArguments,
     /// Bakes nothing but writes what is in a .bake file in other formats.
-    #[arg(long, value_name = "FILE.bake", conflicts_with_all = ["scene", "region", "spacing", "counts", "basis", "quantity", "orders", "error", "passes", "refine", "per_light", "resume", "part", "level"])]
+    #[arg(long, value_name = "FILE.bake", conflicts_with_all = ["scene", "region", "spacing", "counts", "basis", "quantity", "orders", "error", "passes", "refine", "per_light", "resume", "after", "part", "level"])]
     pub from_file: Option<PathBuf>,
     /// The box to bake: two corners, the smaller one first [default: around all media].
     #[arg(long = "box", value_name = "MIN MAX", value_parser = corners, allow_hyphen_values = true)]
@@ -85,6 +87,10 @@ pub struct BakeArguments {
     /// Goes on where the .bake file that is to be written was left. Without such a file, begins.
     #[arg(long)]
     pub resume: bool,
+    /// Keeps what has not changed since the frame before was baked, with the same --box, --counts, --basis, --quantity and --orders: each brick of 64 probes whose light a few first passes cannot tell from what it was, to the error asked for. Its
+    /// numbers stay bit for bit, so that they do not flicker, and take a fraction of the time.
+    #[arg(long, value_name = "FRAME.bake", conflicts_with_all = ["per_light", "part"])]
+    pub after: Option<PathBuf>,
     /// Seconds between two writings of the .bake file while it is baked.
     #[arg(long, value_name = "SECONDS", value_parser = output::positive, default_value_t = 30.0)]
     pub checkpoint_every: f64,
@@ -332,35 +338,53 @@ pub(super) fn run(arguments: &BakeArguments) -> Result<Ending, Failure> {
         output::check_place(file)?;
     }
     arguments.kept()?;
-    let Some(file) = &arguments.scene else {
-        let file = arguments.from_file.as_deref().ok_or("there is no scene to bake")?;
-        return finish(arguments, from_file(file)?, Ending::Done, &arguments.output);
+    let file = match arguments.scene.as_slice() {
+        [] => {
+            let file = arguments.from_file.as_deref().ok_or("there is no scene to bake")?;
+            return finish(arguments, from_file(file)?, Ending::Done, &arguments.output);
+        }
+        [file] => file,
+        frames => return sequence::run(arguments, frames),
     };
     let scene = &SceneArguments { file: file.clone(), reading: arguments.reading.clone() };
     if arguments.many.part.is_some() {
         return parts::run(arguments, scene);
     }
     if !arguments.per_light {
-        let (made, ending) = match bake(arguments, scene, None) {
-            Err(error) if error.is::<super::covariance::Stopped>() => {
-                say!("fogbow: {error}");
-                return Ok(Ending::Stopped);
-            }
-            made => made?,
+        let earlier = sequence::earlier(arguments)?;
+        let Some((made, ending)) =
+            unless_stopped(bake(arguments, scene, &Frame { earlier: earlier.as_ref(), ..Frame::default() }))?
+        else {
+            return Ok(Ending::Stopped);
         };
         return finish(arguments, made, ending, &arguments.output);
     }
     for number in 0..light_count(scene)? {
-        let files: Vec<_> = arguments.output.iter().map(|file| of_light(file, number)).collect();
+        let frame = Frame { light: Some(number), ..Frame::default() };
+        let files: Vec<_> = arguments.output.iter().map(|file| frame.file(file)).collect();
         for file in &files {
             output::check_place(file)?;
         }
-        let (made, ending) = bake(arguments, scene, Some(number))?;
+        let (made, ending) = bake(arguments, scene, &frame)?;
         if finish(arguments, made, ending, &files)? == Ending::Stopped {
             return Ok(Ending::Stopped);
         }
     }
     Ok(Ending::Done)
+}
+
+/// What a bake has made; none if it was stopped before there was anything.
+///
+/// # Errors
+/// All else.
+fn unless_stopped(made: Result<(Made, Ending), Failure>) -> Result<Option<(Made, Ending)>, Failure> {
+    match made {
+        Err(error) if error.is::<super::covariance::Stopped>() => {
+            say!("fogbow: {error}");
+            Ok(None)
+        }
+        made => made.map(Some),
+    }
 }
 
 /// Writes the files of a bake.
@@ -397,12 +421,30 @@ fn light_count(file: &SceneArguments) -> Result<u32, Failure> {
     }
 }
 
-/// `fog.json` of light 3 is `fog-light3.json`.
-fn of_light(file: &Path, number: u32) -> PathBuf {
-    let mut name = file.file_stem().unwrap_or_default().to_owned();
-    name.push(format!("-light{number}."));
-    name.push(file.extension().unwrap_or_default());
-    file.with_file_name(name)
+/// Which of several bakes of the same arguments.
+#[derive(Default)]
+struct Frame<'a> {
+    /// The one light that shines; `None` for all.
+    light: Option<u32>,
+    /// What its files are called instead of the arguments' own.
+    name: Option<&'a str>,
+    /// The frame before.
+    earlier: Option<&'a Earlier>,
+}
+
+impl Frame<'_> {
+    /// `fog.json` of light 3 is `fog-light3.json`, of the scene `plume-07.xml` among others `fog-plume-07.json`.
+    fn file(&self, file: &Path) -> PathBuf {
+        let more = match (self.light, self.name) {
+            (Some(number), _) => format!("light{number}"),
+            (None, Some(name)) => name.to_owned(),
+            (None, None) => return file.to_owned(),
+        };
+        let mut name = file.file_stem().unwrap_or_default().to_owned();
+        name.push(format!("-{more}."));
+        name.push(file.extension().unwrap_or_default());
+        file.with_file_name(name)
+    }
 }
 
 /// A bake and what it was made for.
@@ -418,7 +460,7 @@ struct Made {
 
 fn from_file(file: &Path) -> Result<Made, Failure> {
     let (levels, tag) = read(&read_file(file)?).map_err(|error| format!("{}: {error}", file.display()))?;
-    let baked = Baked { levels, method: None, mean_cosine: None, deviation: None, scale: 1.0 };
+    let baked = Baked { levels, method: None, mean_cosine: None, deviation: None, kept: None, scale: 1.0 };
     Ok(Made { baked, tag, part: None, unfinished: None, has_kept: false })
 }
 
@@ -432,7 +474,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<(ProbeLevels<'static>, u64), ProbeByt
 }
 
 /// Bakes a scene, by all its lights or by one of them.
-fn bake(arguments: &BakeArguments, file: &SceneArguments, light: Option<u32>) -> Result<(Made, Ending), Failure> {
+fn bake(arguments: &BakeArguments, file: &SceneArguments, frame: &Frame<'_>) -> Result<(Made, Ending), Failure> {
     const MAX_EDGE: u32 = fogbow::covariance::MAX_EDGE;
     let scene = file.read(true)?;
     let mut storage = Storage::new(&scene);
@@ -456,10 +498,10 @@ fn bake(arguments: &BakeArguments, file: &SceneArguments, light: Option<u32>) ->
         return Err("--method radiance-cache: caches in a medium know nothing of irradiance; take --method path".into());
     }
     job::check(method, &paths, &world)?;
-    let tag = tag(arguments, file, &paths, light)?;
+    let tag = tag(arguments, file, &paths, frame)?;
     let level = arguments.level(file, &paths)?;
     let part = arguments.part_of(file, &paths, (&bounds, counts), level)?;
-    let kept = arguments.kept()?.map(|file| light.map_or(file.to_owned(), |number| of_light(file, number)));
+    let kept = arguments.kept()?.map(|file| frame.file(file));
     let unfinished = kept.map(|file| if arguments.resume { file } else { output::beside(file) });
     let has_kept = Cell::new(false);
     let job = BakeJob {
@@ -471,19 +513,20 @@ fn bake(arguments: &BakeArguments, file: &SceneArguments, light: Option<u32>) ->
         counts,
         method,
         tag,
-        light,
+        light: frame.light,
+        earlier: frame.earlier,
         level,
         part: part.as_ref(),
         kept: unfinished.clone(),
         has_kept: &has_kept,
     };
-    let (levels, mean_cosine, deviation, ending) = world.media().with(job)?;
+    let Done { levels, mean_cosine, deviation, kept, ending } = world.media().with(job)?;
     let name = match method {
         Source::RadianceCache => "radiance-cache",
         Source::Path => "path",
         Source::Photons => "photons",
     };
-    let baked = Baked { levels, method: Some(name), mean_cosine: Some(mean_cosine), deviation, scale: 1.0 };
+    let baked = Baked { levels, method: Some(name), mean_cosine: Some(mean_cosine), deviation, kept, scale: 1.0 };
     if baked.counts()[0] == 0 && ending == Ending::Done && part.is_none() {
         let [_, in_wall, empty] = baked.counts();
         return Err(format!(
@@ -540,9 +583,13 @@ fn tag(
     arguments: &BakeArguments,
     scene: &SceneArguments,
     paths: &path::Settings,
-    light: Option<u32>,
+    frame: &Frame<'_>,
 ) -> Result<u64, Failure> {
+    let Frame { light, earlier, .. } = *frame;
     let mut crc = Crc::new();
+    if let Some(earlier) = earlier {
+        crc.add(&earlier.crc.to_le_bytes());
+    }
     let method = arguments.method;
     let of_caches = if method == Source::RadianceCache { arguments.error.unwrap_or(0.0).to_bits() } else { 0 };
     for number in [paths.roulette_after, method as u32, of_caches, light.map_or(0, |number| number + 1)] {
@@ -575,7 +622,10 @@ fn begun(file: &Path, tag: u64) -> Result<Vec<ProbeGrid<'static>>, Failure> {
     let read = bytes::read_levels(&read_file(file)?, tag, |_| BakeMemory::default());
     let levels = read.map_err(|error| match error {
         ProbeBytesError::Damage(Damage::Tag { .. }) => {
-            format!("{}: was made for another scene, or with another --method, --seed or --error", file.display())
+            format!(
+                "{}: was made for another scene, or with another --method, --seed, --error or --after",
+                file.display()
+            )
         }
         error => format!("{}: {error}", file.display()),
     })?;

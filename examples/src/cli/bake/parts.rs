@@ -13,7 +13,7 @@ use super::super::film_file::{About, FilmFile, Measured, Parts, Split, is_film};
 use super::super::parts::part;
 use super::super::scene::SceneArguments;
 use super::super::{Ending, Failure};
-use super::{BakeArguments, Source, bake, is_made_for, write};
+use super::{BakeArguments, Frame, Source, bake, is_made_for, write};
 use crate::error::read_file;
 
 /// Of bakes that several machines share out.
@@ -141,7 +141,7 @@ pub(in super::super) fn check_count(of: u32, counts: [u32; 3]) -> Result<(), Fai
 
 /// Bakes a part.
 pub(super) fn run(arguments: &BakeArguments, scene: &SceneArguments) -> Result<Ending, Failure> {
-    let (made, ending) = bake(arguments, scene, None)?;
+    let (made, ending) = bake(arguments, scene, &Frame::default())?;
     let (Some(part), [file]) = (&made.part, arguments.output.as_slice()) else { return Err("there is no part".into()) };
     let is_done = ending == Ending::Done;
     let unfinished = made.unfinished.as_ref().unwrap_or(file);

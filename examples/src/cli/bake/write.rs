@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use fogbow::bake::{Probe, ProbeGrid, ProbeState, bytes};
+use fogbow::bake::{ProbeGrid, bytes};
 use fogbow_std::image::{Layer, write as write_picture};
 
 use super::super::output;
@@ -47,7 +47,7 @@ pub(super) fn all(arguments: &BakeArguments, made: Made, files: &[&PathBuf]) -> 
             Err(error) => trouble = Some(error),
         }
     }
-    let is_kept = !written.is_empty() || arguments.scene.is_none();
+    let is_kept = !written.is_empty() || arguments.scene.is_empty();
     trouble.map_or_else(|| others(arguments, made.baked, files, written), Err).map_err(|error| {
         let file = files.first().filter(|_| !is_kept);
         match file.and_then(|file| output::rescue(file, "bake", |rescue| save(rescue, &all))) {
@@ -97,12 +97,15 @@ fn others(
             "{pairs} pairs of neighbours have a surface between them: light leaks through it where engines mix all probes, and not where they read planes of surfaces\n"
         ),
     };
-    let near = match near_surfaces(&baked) {
+    let by_paths = match baked.grid().probes().iter().filter(|probe| probe.is_by_paths()).count() {
         0 => String::new(),
         probes => format!(
-            "{probes} probes are nearer than a twentieth of a cell to a surface, and photons blur what it sends to them; --method path does not\n"
+            "{probes} probes see other surfaces near them than most of their cell does, and had paths in place of photons\n"
         ),
     };
+    let kept = baked.kept.map_or_else(String::new, |[kept, all]| {
+        format!("{kept} of {all} bricks of 64 probes are those of the frame before\n")
+    });
     let [usual, worst] = baked.levels.relative_coarseness().map(|share| 100.0 * share);
     let apart = baked.deviation.map_or(String::new(), |d| {
         let [bias, error, spread] = [d.bias, d.bias_error, d.spread].map(|share| 100.0 * share);
@@ -110,7 +113,7 @@ fn others(
     });
     let bricks: String = baked.finer().iter().zip(1..).map(|(grid, level)| finer_level(grid, level)).collect();
     Ok(format!(
-        "{x} x {y} x {z} probes: {valid} valid, {in_wall} in walls, {empty} far from any medium; standard error of what was sampled {:.2} % of the mean\n{bricks}between probes off by about {usual:.1} % of the mean, {worst:.0} % where light varies most\n{leaks}{near}{apart}wrote {}",
+        "{x} x {y} x {z} probes: {valid} valid, {in_wall} in walls, {empty} far from any medium; standard error of what was sampled {:.2} % of the mean\n{bricks}between probes off by about {usual:.1} % of the mean, {worst:.0} % where light varies most\n{leaks}{by_paths}{kept}{apart}wrote {}",
         100.0 * error,
         names.join(", ")
     ))
@@ -125,15 +128,6 @@ fn finer_level(grid: &ProbeGrid<'_>, level: u32) -> String {
     format!(
         "at 1/{spacing} of the spacing {bricks} bricks of 64 probes, {share:.1} % of the box; standard error {error:.2} % of their mean\n"
     )
-}
-
-/// Valid probes of a bake by photons that a surface is next to: what it sends to them changes within less than the part of the cell that photons count in.
-fn near_surfaces(baked: &Baked) -> usize {
-    /// One over the distance in cells.
-    const NEAR: f32 = 20.0;
-    let is_near = |probe: &&Probe| probe.planes().iter().any(|plane| plane.length() > NEAR);
-    let valid = baked.grid().probes().iter().filter(|probe| probe.state() == ProbeState::Valid);
-    if baked.method == Some("photons") { valid.filter(is_near).count() } else { 0 }
 }
 
 /// Writes the textures of a file, and a description beside it; their names.
@@ -202,7 +196,7 @@ pub(super) fn keep<'g>(
     save(file, &all_to_bytes(levels, tag))
 }
 
-fn all_to_bytes<'g>(levels: impl IntoIterator<Item = &'g ProbeGrid<'static>>, tag: u64) -> Vec<u8> {
+pub(super) fn all_to_bytes<'g>(levels: impl IntoIterator<Item = &'g ProbeGrid<'static>>, tag: u64) -> Vec<u8> {
     levels.into_iter().flat_map(|grid| to_bytes(grid, tag)).collect()
 }
 
