@@ -467,3 +467,19 @@ fn fingerprints_know_the_fog() {
     folder.write("room.fog.toml", FOG);
     assert_ne!(fingerprint(&scene).unwrap(), without);
 }
+
+/// A fog file that has gone, or was never there, is told of; where it is, or was not meant to be, nothing is.
+#[test]
+fn a_scene_without_fog_says_so() {
+    let folder = Folder::new("fogless");
+    let scene = folder.write("room.gltf", triangle("", ",\"nodes\":[{\"mesh\":0}]"));
+    let told = || {
+        let notes = SceneFile::read_with(&scene, &ReadOptions::default()).notes;
+        notes.iter().filter(|note| note.to_string().contains("no room.fog.toml beside it")).count()
+    };
+    assert_eq!(told(), 1);
+    let fog = folder.write("room.fog.toml", FOG);
+    assert_eq!(told(), 0);
+    std::fs::remove_file(fog).unwrap();
+    assert_eq!(told(), 1);
+}

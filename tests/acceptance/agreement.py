@@ -10,6 +10,7 @@ difference of the whole picture. Python package: mitsuba 3.9.1.
 """
 
 import argparse
+import math
 import pathlib
 import re
 import subprocess
@@ -50,7 +51,8 @@ def blocks(image, parts=8):
 
 
 def film(scene, side):
-    """A film of the same proportions, its longer side of some pixels: the field of view goes with the proportions."""
+    """A film of the same proportions, its longer side of at most some pixels, to the pixel where that is possible: Mitsuba keeps the horizontal field of view
+    that a scene's own film has, so of another shape all is moved."""
     import mitsuba as mi
 
     sensor = scene.sensors()[0]
@@ -58,8 +60,9 @@ def film(scene, side):
     whole, crop = parameters["film.size"], parameters["film.crop_size"]
     if list(whole) != list(crop):
         raise RuntimeError("a cropped film is not compared")
-    factor = side / max(whole)
-    size = [max(round(n * factor), 8) for n in whole]
+    least = [n // math.gcd(*whole) for n in whole]
+    factor = side // max(least) if max(least) <= side else side / max(least)
+    size = [max(round(n * factor), 8) for n in least]
     parameters["film.size"] = size
     parameters.update()
     return sensor, size

@@ -206,8 +206,17 @@ fn read_scene(source: &Source<'_>, bytes: &[u8], options: &ReadOptions) -> Resul
         shapes,
         emitters: emitters.collect::<Result<Vec<_>, _>>()?,
     };
-    if let Some(file) = fog_file(source.file, options) {
-        fog::read(&file, &mut scene_file)?;
+    match fog_file(source.file, options) {
+        Some(file) => fog::read(&file, &mut scene_file)?,
+        // A fog file that was there, or is called otherwise, is missed here.
+        None if scene_file.media.is_empty() => {
+            let name = beside(source.file);
+            let name = name.file_name().unwrap_or_default().display();
+            let reason =
+                format!("holds no fog, and there is no {name} beside it: rendered without (--fog FILE names one)");
+            source.note(NoteKind::Suspicious, "", reason);
+        }
+        None => {}
     }
     for reason in scene_file.media.iter().filter_map(of_medium) {
         source.note(NoteKind::Suspicious, "", reason);
@@ -222,9 +231,15 @@ fn read_scene(source: &Source<'_>, bytes: &[u8], options: &ReadOptions) -> Resul
     Ok(scene_file)
 }
 
-/// The file of fog that was named, or the one that lies beside the scene.
+/// The file of fog that was named, or the one that lies beside the scene. One that cannot be asked for counts as there, and is an error
+/// when it is read.
 fn fog_file(file: &Path, options: &ReadOptions) -> Option<PathBuf> {
-    options.fog.clone().or_else(|| Some(file.with_extension("fog.toml")).filter(|file| file.exists()))
+    options.fog.clone().or_else(|| Some(beside(file)).filter(|file| file.try_exists().unwrap_or(true)))
+}
+
+/// Where the fog of a scene is looked for.
+fn beside(scene: &Path) -> PathBuf {
+    scene.with_extension("fog.toml")
 }
 
 /// What nodes of the scene hold, and where.
