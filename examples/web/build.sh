@@ -11,10 +11,10 @@ TARGET=${CARGO_TARGET_DIR:-$own/../../target}/web
 
 linker=$(rustc --print sysroot)/lib/rustlib/$(rustc --print host-tuple)/bin/rust-lld
 # Functions are inlined where they are very short, those that ask for it where they are short: smaller by a quarter, and what must be inlined says so.
-# Loops are unrolled where that leaves no loop, and not otherwise. Panics have no words, nobody prints with `{:?}`, and the library's own sorting is the
+# Loops are unrolled where that leaves no loop and little code, and not otherwise. Panics have no words, nobody prints with `{:?}`, and the library's own sorting is the
 # small one, whose results are the same.
-flags="-Cllvm-args=-inline-threshold=10 -Cllvm-args=-inlinehint-threshold=60 -Cllvm-args=-unroll-runtime=0 -Cllvm-args=-unroll-allow-partial=0
-    -Zunstable-options -Cpanic=immediate-abort -Zfmt-debug=none -Zlocation-detail=none"
+flags="-Cllvm-args=-inline-threshold=5 -Cllvm-args=-inlinehint-threshold=50 -Cllvm-args=-unroll-threshold=60 -Cllvm-args=-unroll-runtime=0
+    -Cllvm-args=-unroll-allow-partial=0 -Zunstable-options -Cpanic=immediate-abort -Zfmt-debug=none -Zlocation-detail=none"
 module() {
     env RUSTC=/usr/bin/rustc RUSTDOC=/usr/bin/rustdoc RUSTC_BOOTSTRAP=1 CARGO_TARGET_WASM32_UNKNOWN_UNKNOWN_LINKER="$linker" RUSTFLAGS="$2" \
         cargo rustc --quiet --locked --lib --crate-type cdylib --profile module -Zbuild-std=core,alloc,panic_abort -Zbuild-std-features=optimize_for_size \

@@ -26,12 +26,16 @@ export async function serve(folder) {
   return { url: `http://127.0.0.1:${server.address().port}/`, close: () => server.close() };
 }
 
+/** What anything may take (ms), on a machine that does other things, too. */
+export const PATIENCE = 180_000;
+
 /** Chromium by itself: SwiftShader draws, nothing is fetched that nobody asked for. */
 export async function browse(work, options = {}) {
   const profile = await mkdtemp(join(tmpdir(), "fogbow-browser-"));
   const browser = await chromium.launchPersistentContext(profile, {
     executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium",
     headless: true,
+    timeout: PATIENCE,
     args: [
       "--no-sandbox", "--disable-quic", "--no-first-run", "--disable-background-networking", "--disable-component-update", "--disable-sync",
       "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist",
@@ -40,6 +44,7 @@ export async function browse(work, options = {}) {
     viewport: { width: 1280, height: 800 },
     ...options,
   });
+  browser.setDefaultTimeout(PATIENCE);
   try {
     return await work(browser);
   } finally {

@@ -74,7 +74,7 @@ try {
       await browse(async (browser) => {
         const { page, wrong } = await watched(browser, site.url);
         await page.goto(site.url);
-        const holds = await page.waitForFunction((title) => document.title.startsWith(title), title, { timeout: 120_000 }).then(() => true, () => false);
+        const holds = await page.waitForFunction((title) => document.title.startsWith(title), title).then(() => true, () => false);
         check(`the README's example for ${name}`, holds && wrong.length === 0, [await page.title(), ...wrong].join("; "));
       });
       site.close();

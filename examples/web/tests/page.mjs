@@ -6,7 +6,7 @@
 import { readFile } from "node:fs/promises";
 import { createRequire } from "node:module";
 import { join } from "node:path";
-import { browse, serve, watched } from "./browser.mjs";
+import { PATIENCE, browse, serve, watched } from "./browser.mjs";
 
 const [folder, ...options] = process.argv.slice(2);
 const isFull = options.includes("--full");
@@ -19,7 +19,7 @@ const check = (name, holds, told = "") => {
   if (!holds) failures.push(name);
 };
 
-const picture = (page, name) => pictures && page.screenshot({ path: join(pictures, `${name}.png`), timeout: 120_000 });
+const picture = (page, name) => pictures && page.screenshot({ path: join(pictures, `${name}.png`) });
 
 async function accessible(page, name) {
   await page.evaluate(axe);
@@ -32,7 +32,7 @@ async function until(page, name, condition, argument) {
   const began = Date.now();
   for (;;) {
     if (await page.evaluate(condition, argument)) return check(name, true, `${((Date.now() - began) / 1000).toFixed(1)} s`);
-    if (Date.now() - began > 120_000) return check(name, false, "after 120 s");
+    if (Date.now() - began > PATIENCE) return check(name, false, `after ${PATIENCE / 1000} s`);
     await page.waitForTimeout(100);
   }
 }
