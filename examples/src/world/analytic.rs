@@ -47,12 +47,12 @@ pub(super) enum Primitive {
 }
 
 impl Primitive {
-    /// The outward normal (unit) at a point of the surface.
+    /// The outward normal (unit) at a point of the surface; any, where rounding of the point leaves none, as far away.
     #[inline]
     pub(super) fn normal(&self, point: Vec3) -> Vec3 {
-        match self {
-            Self::Flat { normal, .. } => *normal,
-            Self::Sphere { centre, radius } => ((point - centre) / *radius).normalize(),
+        let outward = match self {
+            Self::Flat { normal, .. } => return *normal,
+            Self::Sphere { centre, radius } => (point - centre) / *radius,
             Self::Box { rows } => {
                 // Of the three coordinates, the one nearest to ±1 tells the face.
                 let (mut largest, mut outward) = (0.0_f32, Vec3::Z);
@@ -62,12 +62,11 @@ impl Primitive {
                         (largest, outward) = (coordinate.abs(), *gradient * coordinate.signum());
                     }
                 }
-                outward.normalize()
+                outward
             }
-            Self::Cylinder { rows: [x, y, _] } => {
-                ((x.0 * (x.0.dot(point) + x.1)) + (y.0 * (y.0.dot(point) + y.1))).normalize()
-            }
-        }
+            Self::Cylinder { rows: [x, y, _] } => (x.0 * (x.0.dot(point) + x.1)) + (y.0 * (y.0.dot(point) + y.1)),
+        };
+        outward.normalize_or(Vec3::Z)
     }
 
     /// The shape operator (m⁻¹) of a sphere, if `point` lies on it and `normal` is its normal there on either side.

@@ -7,6 +7,7 @@ use fogbow::math::{Ray, Vec2, Vec3};
 use fogbow::sampling::warp::uniform_sphere;
 use fogbow::sampling::{Generator, uniform, uniform2};
 
+use super::analytic::Primitive;
 use super::{Storage, World};
 use crate::scene_file::{Geometry, SceneFile};
 use crate::transform::{Transform, cross, dot, to_array};
@@ -296,4 +297,12 @@ fn null_shapes_are_not_there() {
         assert!(world.closest_hit(&Ray::new(Vec3::splat(0.2), Vec3::X)).is_none());
         assert!(!world.is_blocked(&Ray::new(Vec3::splat(0.2), Vec3::X)));
     });
+}
+
+/// At four million kilometres points are 512 m apart: the one where a sphere of a metre is hit may be its centre.
+#[test]
+fn what_is_far_away_has_a_normal() {
+    let centre = 4_294_967_300.0 * Vec3::Z;
+    let normal = Primitive::Sphere { centre, radius: 1.0 }.normal(centre);
+    assert!((normal.length() - 1.0).abs() < 1e-6, "{normal}");
 }
