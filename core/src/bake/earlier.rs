@@ -162,6 +162,18 @@ impl<'c> Bake<'_, 'c> {
     }
 
     /// How many bricks have the light of the [earlier](Bake::after) grid, so far.
+    ///
+    /// ```
+    /// # use fogbow::{host::Empty, math::{Bounds, Vec3}, world::{Outline, World}};
+    /// # use fogbow::bake::{Bake, BakeSettings};
+    /// # #[cfg(feature = "alloc")] {
+    /// # let bounds = Bounds { min: Vec3::ZERO, max: Vec3::ONE };
+    /// # let outline = Outline::of(&World { medium: &Empty, scene: &Empty, lights: (&[]).into() }, bounds);
+    /// # let settings = BakeSettings::for_outline(&outline, [5, 4, 4]);
+    /// assert_eq!(Bake::new(settings)?.kept(), 0);   // there is no earlier one
+    /// # }
+    /// # Ok::<(), fogbow::bake::BakeError>(())
+    /// ```
     #[must_use]
     pub fn kept(&self) -> usize {
         let Some(earlier) = self.earlier() else { return 0 };
