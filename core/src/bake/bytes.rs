@@ -25,8 +25,9 @@
 use core::fmt;
 
 use super::basis::{Orders, ProbeBasis, Quantity};
-use super::grid::{BY_PATHS, BakeMemory, Brick, INNER, PROBES, Probe, ProbeGrid, ProbeState, STATE, WALLS};
+use super::grid::{BakeMemory, Brick, PROBES, ProbeGrid};
 use super::levels::ProbeLevels;
+use super::probe::{BY_PATHS, INNER, Probe, ProbeState, STATE, WALLS};
 use super::settings::MOST_PROBES;
 use crate::bytes::{Damage, Format, Header, Sink, element, elements, halves};
 use crate::covariance::Lattice;

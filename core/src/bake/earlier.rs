@@ -176,7 +176,6 @@ impl<'c> Bake<'_, 'c> {
     /// ```
     #[must_use]
     pub fn kept(&self) -> usize {
-        let Some(earlier) = self.earlier() else { return 0 };
-        (0..self.grid().memory.bricks.len()).filter(|brick| earlier.is_kept(self.grid(), *brick)).count()
+        (0..self.grid().brick_count()).filter(|brick| self.is_kept(*brick)).count()
     }
 }

@@ -11,8 +11,9 @@ use super::arriving::{Sampler, phase_at};
 use super::basis::MOST_COEFFICIENTS;
 use super::earlier::Earlier;
 use super::flights::{FlightMemory, PhotonFlight, Photons, is_unlike_part, open_share};
-use super::grid::{BY_PATHS, BakeMemory, Brick, INNER, PROBES, Probe, ProbeGrid, WALLS_AT};
+use super::grid::{BakeMemory, Brick, PROBES, ProbeGrid};
 use super::places;
+use super::probe::{BY_PATHS, INNER, Probe, WALLS_AT};
 use super::settings::{BakeError, BakeSettings};
 use crate::cache::RadianceCaches;
 use crate::host::{Medium, Scene};
@@ -322,8 +323,9 @@ impl<'s, 'c> Bake<'s, 'c> {
         self
     }
 
-    pub(super) fn earlier(&self) -> Option<&Earlier<'c>> {
-        self.earlier.as_ref()
+    /// Whether a brick has the light of the earlier grid.
+    pub(super) fn is_kept(&self, brick: usize) -> bool {
+        self.earlier.is_some_and(|earlier| earlier.is_kept(&self.grid, brick))
     }
 
     pub(super) fn set_earlier(&mut self, earlier: Earlier<'c>) {
@@ -457,17 +459,17 @@ impl<'s, 'c> Bake<'s, 'c> {
             earlier.keep_unchanged(&mut self.grid, self.settings.error, self.photons.is_some());
         }
         let level = self.level_of_numbers(&self.grid);
-        let times = self.photons.is_some().then(|| self.grid.error_over(level) / self.settings.error);
-        let is_kept = |brick: usize| self.earlier.is_some_and(|earlier| earlier.is_kept(&self.grid, brick));
-        let bricks = (0..).zip(self.grid.memory.bricks.as_slice());
-        let most = bricks.filter(|(brick, _)| !is_kept(*brick)).map(|(_, brick)| brick.passes).max().unwrap_or(0);
+        let by_photons = self.photons.is_some().then(|| {
+            let not_kept = (0..self.bricks as usize).filter(|brick| !self.is_kept(*brick));
+            let most = not_kept.map(|brick| self.grid.memory.bricks.as_slice()[brick].passes).max();
+            (most.unwrap_or(0), self.grid.error_over(level) / self.settings.error)
+        });
         let (mut due, mut done) = (0_u32, 0.0_f32);
         for brick in 0..self.bricks as usize {
-            let is_kept = self.earlier.is_some_and(|earlier| earlier.is_kept(&self.grid, brick));
-            let share = match times {
-                _ if is_kept => None,
+            let share = match by_photons {
+                _ if self.is_kept(brick) => None,
                 None => self.share_of_brick(brick, level),
-                Some(times) => self.share_by_photons(brick, most, times),
+                Some((most, times)) => self.share_by_photons(brick, most, times),
             };
             done += share.unwrap_or(1.0);
             if share.is_some() {

@@ -11,8 +11,9 @@ use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
 use super::basis::{Parts, ProbeBasis, Projection, Quantity};
-use super::grid::{BRICK, PROBES, Probe, ProbeGrid};
+use super::grid::{BRICK, PROBES, ProbeGrid};
 use super::places::PLANES;
+use super::probe::Probe;
 use super::settings::BakeSettings;
 use crate::covariance::Lattice;
 use crate::host::{Medium, Scene};

@@ -11,7 +11,8 @@
 use glam::Vec3;
 
 use super::basis::MOST_COEFFICIENTS;
-use super::grid::{BRICK, BakeMemory, Brick, INNER, PROBES, Probe, ProbeGrid};
+use super::grid::{BRICK, BakeMemory, Brick, PROBES, ProbeGrid};
+use super::probe::{INNER, Probe};
 use super::settings::{BakeError, MOST_PROBES};
 use crate::covariance::Lattice;
 use crate::spectrum::Spectrum;

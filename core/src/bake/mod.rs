@@ -24,6 +24,7 @@
 //! | `fill` | [`Bake`]: passes over bricks |
 //! | `earlier` | what is kept of the grid of an earlier frame |
 //! | `flights` | [`PhotonFlight`]s that all probes share: what they leave in cells |
+//! | `probe` | [`Probe`]: what lies beside its light, and which surfaces it sees |
 //! | `grid` | [`ProbeGrid`]: what was baked; look-ups, dilation |
 //! | `levels` | [`ProbeLevels`]: bricks of half the spacing where light varies |
 //! | `parts` | parts of a grid, for several machines, and their merging |
@@ -45,6 +46,7 @@ mod one_light;
 mod output_bytes;
 mod parts;
 mod places;
+mod probe;
 mod settings;
 #[cfg(all(test, feature = "alloc"))]
 mod tests;
@@ -53,7 +55,8 @@ pub use basis::{AXES, MOST_COEFFICIENTS, Orders, ProbeBasis, Quantity};
 pub use fill::{Bake, BakedProbes};
 pub use flights::{FlightMemory, PhotonFlight};
 pub use froxels::{Froxel, Froxels};
-pub use grid::{BakeMemory, Brick, Probe, ProbeDeviation, ProbeGrid, ProbeState};
+pub use grid::{BakeMemory, Brick, ProbeDeviation, ProbeGrid};
 pub use levels::{MOST_LEVELS, ProbeLevels};
 pub use one_light::OneLight;
+pub use probe::{Probe, ProbeState};
 pub use settings::{BakeError, BakeSettings, MOST_PROBES};

@@ -4,7 +4,7 @@ use glam::Vec3;
 
 use super::fill::BakedProbes;
 use super::flights::PhotonFlight;
-use super::grid::Probe;
+use super::probe::Probe;
 use crate::sent::{JobBytesError, Packed, Received, Sending, byte_count, packed};
 use crate::spectrum::Spectrum;
 

@@ -1,7 +1,8 @@
 //! Parts of a grid, for several machines: bricks shared out, and grids put together.
 
 use super::fill::Bake;
-use super::grid::{BakeMemory, INNER, Probe, ProbeGrid};
+use super::grid::{BakeMemory, ProbeGrid};
+use super::probe::{INNER, Probe};
 use super::settings::BakeError;
 
 impl Bake<'_, '_> {

@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 use super::basis::{ProbeBasis, Quantity};
-use super::grid::ProbeState;
+use super::probe::ProbeState;
 use super::settings::BakeSettings;
 use crate::host::{Medium, Scene};
 use crate::math::Ray;

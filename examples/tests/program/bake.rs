@@ -447,8 +447,8 @@ fn frames_keep_what_has_not_changed_since_the_one_before() {
             let line = lines.lines().filter(|line| line.ends_with("are those of the frame before")).nth(number);
             line.and_then(|line| line.split_whitespace().next()?.parse::<u32>().ok()).unwrap()
         };
-        // One still brick of eight is baked anew by chance: fewer than five of eight stay once in two hundred times.
-        assert!(kept(0) >= 5 && kept(1) <= 8, "of 8 bricks {} and {}", kept(0), kept(1));
+        // Of still bricks 7 in a hundred are baked anew by chance, by photons 3: for none of 20 seeds more than two of eight.
+        assert!(kept(0) >= 6 && kept(1) <= 8, "of 8 bricks {} and {}", kept(0), kept(1));
         let [first, still, moved] =
             ["plume-00", "still", "plume-01"].map(|name| grid(&folder, &format!("fog-{name}.bake")));
         let same = |other: &ProbeGrid<'_>| (0..512).filter(|probe| first.held(*probe) == other.held(*probe)).count();

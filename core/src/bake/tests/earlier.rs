@@ -144,7 +144,7 @@ fn probes_beside_a_narrow_ledge_have_paths_among_photons() {
     let lights = [lamp(Vec3::new(0.25, 1.4, 0.1), Spectrum::ONE)];
     let ball = Placed::new(haze(0.8, 0.3, 0.0), Region::sphere(Vec3::ZERO, 2.0).unwrap());
     let world = World { medium: &ball, scene: &Ledge, lights: (&lights).into() };
-    // Probes at x = 0.25, y = -0.25 + 0.5: a row right above the ledge, in cells of half a metre.
+    // In cells of half a metre, a row of probes at x = 0.25 and y = −0.23, a centimetre above the ledge.
     let settings = BakeSettings { orders: Orders::Indirect, error: 0.01, ..settings(&world, [4, 4, 4]) };
     let bounds =
         BakeSettings { bounds: Bounds { min: BOX.min + 0.02 * Vec3::Y, max: BOX.max + 0.02 * Vec3::Y }, ..settings };

@@ -57,7 +57,7 @@ fn bricks_of_half_the_spacing_are_those_of_a_grid_that_has_all() {
                     continue;
                 };
                 assert_eq!(finer.number_of(cell), Some(number));
-                let probe = Probe { state: finer.probes()[number].state & !grid::INNER, ..finer.probes()[number] };
+                let probe = Probe { state: finer.probes()[number].state & !probe::INNER, ..finer.probes()[number] };
                 assert_eq!(probe, dense.probes()[cell]);
                 // Photons serve all probes, until the error of all is small: here all have the most passes.
                 assert_eq!(finer.held(number), dense.held(cell), "{number}");
@@ -77,7 +77,7 @@ fn levels_go_over_into_each_other_and_hold_what_is_linear() {
         // Any light, without regard to walls: of walls alone light may jump.
         for grid in levels.grids_mut() {
             grid.memory.probes.as_mut_slice().iter_mut().for_each(|probe| {
-                (probe.near, probe.other, probe.state) = (Vec3::ZERO, Vec3::ZERO, probe.state & grid::INNER | 1)
+                (probe.near, probe.other, probe.state) = (Vec3::ZERO, Vec3::ZERO, probe.state & probe::INNER | 1)
             });
             grid.memory.values.as_mut_slice().iter_mut().for_each(|value| *value = Spectrum::splat(uniform(&mut rng)));
         }
