@@ -14,7 +14,6 @@ use fogbow::host::Medium;
 use fogbow::light::{Light, Lights};
 use fogbow::math::{Ray, Vec2};
 use fogbow::path;
-use fogbow::picture::LEAST_SAMPLES;
 use fogbow::sampling::{Generator, uniform2};
 use fogbow::sh;
 use fogbow::work::Rounds;
@@ -281,6 +280,10 @@ pub(super) struct Cached {
     /// How far the picture is off, and where; `None` if nobody asked, or if the render was stopped.
     pub(super) audited: Option<Audited>,
 }
+
+/// Samples of every pixel. Fewer: noise is told too badly; more: large pictures cost more than their noise asks for, as most light comes from
+/// caches, without any.
+const LEAST_SAMPLES: u32 = 4;
 
 /// Caches as far as they were filled.
 struct Filled {
