@@ -17,22 +17,24 @@ type Point = ([f64; 3], f64);
 
 pub(super) fn read(file: &Path, bytes: &[u8], is_smooth: bool, to_world: &Transform) -> Result<Mesh, DataError> {
     let (mut mesh, mut curve, mut count) = (Mesh::default(), Vec::new(), 0);
+    // Of all curves of the file: the second texture coordinate runs along all of them.
+    let mut segments = 0;
     let bead = Mesh::bead();
     let lines = bytes.split(|b| *b == b'\n').chain([b"".as_slice()]);
     for (number, line) in lines.enumerate() {
         let fail = |reason: String| DataError::new(file, format!("line {}", number + 1), reason);
         let line = String::from_utf8_lossy(line);
         if line.trim().is_empty() {
+            let own = curve.len().saturating_sub(if is_smooth { 3 } else { 1 });
             let points = if is_smooth { spline(&curve).map_err(fail)? } else { core::mem::take(&mut curve) };
             count += points.len();
             if count > MOST_POINTS {
                 return Err(fail(format!("curves have more than {MOST_POINTS} points")));
             }
-            if is_smooth {
-                mesh.append(&Mesh::tube(&points));
-            } else {
-                append_straight(&mut mesh, &points, &bead);
-            }
+            let mut along = if is_smooth { Mesh::tube(&points) } else { straight(&points, &bead) };
+            along.texcoords.iter_mut().for_each(|uv| uv.y = segments as f32 + uv.y * own as f32);
+            mesh.append(&along);
+            segments += own;
             curve.clear();
             continue;
         }
@@ -44,13 +46,15 @@ pub(super) fn read(file: &Path, bytes: &[u8], is_smooth: bool, to_world: &Transf
             _ => return Err(fail("four numbers are due: a point and a positive radius".to_owned())),
         }
     }
+    mesh.texcoords.iter_mut().for_each(|uv| uv.y /= segments.max(1) as f32);
     Ok(mesh)
 }
 
 /// Straight pieces, round where they meet and end.
-fn append_straight(mesh: &mut Mesh, points: &[Point], bead: &Mesh) {
+fn straight(points: &[Point], bead: &Mesh) -> Mesh {
+    let mut mesh = Mesh::default();
     if points.len() < 2 {
-        return;
+        return mesh;
     }
     let last = (points.len() - 1) as f32;
     for (k, pair) in points.windows(2).enumerate() {
@@ -64,6 +68,7 @@ fn append_straight(mesh: &mut Mesh, points: &[Point], bead: &Mesh) {
         ball.texcoords.iter_mut().for_each(|uv| uv.y = k as f32 / last);
         mesh.append(&ball);
     }
+    mesh
 }
 
 /// Points along a uniform cubic B-spline.
@@ -91,4 +96,34 @@ fn spline(points: &[Point]) -> Result<Vec<Point>, String> {
         }
     }
     Ok(along)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Around an axis along x Mitsuba counts from y by way of z; along, over all curves of a file.
+    #[test]
+    fn textures_run_as_the_independent_renderer_has_them() {
+        let read =
+            |text: &str, is_smooth| read(Path::new("x.txt"), text.as_bytes(), is_smooth, &Transform::IDENTITY).unwrap();
+        let line = "0 0 0 0.1\n1 0 0 0.1\n\n5 0 0 0.1\n6 0 0 0.1\n7 0 0 0.1\n";
+        let spline =
+            "0 0 0 0.1\n1 0 0 0.1\n2 0 0 0.1\n3 0 0 0.1\n\n6 0 0 0.1\n7 0 0 0.1\n8 0 0 0.1\n9 0 0 0.1\n10 0 0 0.1\n";
+        for (mesh, starts) in [(read(line, false), [0.0, 5.0]), (read(spline, true), [1.0, 7.0])] {
+            let mut seen = 0;
+            for (at, uv) in mesh.vertices.iter().zip(&mesh.texcoords) {
+                let x = if at.x < 4.5 { at.x - starts[0] } else { 1.0 + at.x - starts[1] };
+                // Not the balls where straight pieces meet: these are no rings.
+                if (uv.y - x / 3.0).abs() > 1e-5 || (at.y.hypot(at.z) - 0.1).abs() > 0.01 {
+                    continue;
+                }
+                let turns = f64::from(at.z).atan2(f64::from(at.y)) / (2.0 * core::f64::consts::PI);
+                let off = f64::from(uv.x) - turns;
+                seen += usize::from((off - off.round()).abs() < 1e-5);
+            }
+            let rings = if starts[0] == 0.0 { 6 } else { 9 + 17 };
+            assert!(seen >= rings * 13, "{seen}");
+        }
+    }
 }

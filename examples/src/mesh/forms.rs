@@ -80,14 +80,14 @@ impl Mesh {
         mesh
     }
 
-    /// A tube along points with radii; its cross-sections are as long around as circles, so it is as wide in the mean.
+    /// A tube along points with radii, with texture coordinates around and along; its cross-sections are as long around as circles, so it is as wide in the mean.
     #[must_use]
     pub fn tube(points: &[([f64; 3], f64)]) -> Self {
         let mut mesh = Self::default();
         if points.len() < 2 {
             return mesh;
         }
-        let mut side = [1.0, 0.0, 0.0];
+        let (mut side, mut turn) = ([1.0, 0.0, 0.0], 0.0);
         let half = PI / f64::from(AROUND_CURVE);
         let wide = half / half.sin();
         for (k, (point, radius)) in points.iter().enumerate() {
@@ -100,13 +100,16 @@ impl Mesh {
             let other = if along[0].abs() < 0.9 { [1.0, 0.0, 0.0] } else { [0.0, 1.0, 0.0] };
             side = normalized(across).or_else(|| normalized(cross(along, other))).unwrap_or(side);
             let up = cross(along, side);
+            // Where the cross-section begins, in turns from where Mitsuba's does; on from ring to ring, so that texture coordinates do not jump.
+            let found = from_guide(along, side);
+            turn = found + if k == 0 { 0.0 } else { f64::round(turn - found) };
             for i in 0..=AROUND_CURVE {
                 let (sin, cos) = (2.0 * PI * f64::from(i) / f64::from(AROUND_CURVE)).sin_cos();
                 let out = [0, 1, 2].map(|axis| side[axis] * cos + up[axis] * sin);
                 mesh.vertices.push(to_vec3([0, 1, 2].map(|axis| point[axis] + out[axis] * radius * wide)));
                 mesh.normals.push(to_vec3(out));
                 let v = k as f32 / (points.len() - 1) as f32;
-                mesh.texcoords.push(Vec2::new(i as f32 / AROUND_CURVE as f32, v));
+                mesh.texcoords.push(Vec2::new(turn as f32 + i as f32 / AROUND_CURVE as f32, v));
             }
         }
         for k in 0..points.len() as u32 - 1 {
@@ -164,4 +167,12 @@ impl Mesh {
 
 fn twice_area([a, b, c]: [Vec3; 3]) -> f64 {
     f64::from((b - a).cross(c - a).length())
+}
+
+/// Turns around an axis to a direction across it, from where Mitsuba's curves begin to count: `z` across the axis is a quarter of a turn.
+fn from_guide(axis: [f64; 3], direction: [f64; 3]) -> f64 {
+    let guide = [0.0, 0.0, 1.0];
+    let across = [0, 1, 2].map(|i| guide[i] - axis[i] * dot(axis, guide));
+    let quarter = normalized(across).unwrap_or([0.0, 1.0, 0.0]);
+    f64::atan2(dot(quarter, direction), dot(cross(quarter, axis), direction)) / (2.0 * PI)
 }

@@ -40,7 +40,16 @@ pub enum Mix {
 
 /// What bends the normals of a surface.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Relief {
+pub struct Relief {
+    /// How.
+    pub form: ReliefForm,
+    /// Whether normals that face away from the eye are turned about that of the surface; else it is black there.
+    pub is_turned: bool,
+}
+
+/// How normals are bent.
+#[derive(Debug, Clone, PartialEq)]
+pub enum ReliefForm {
     /// A height (m) above the surface.
     Height {
         /// Luminance of the texture, times the factor.

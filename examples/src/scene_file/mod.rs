@@ -65,7 +65,7 @@ pub use description::{
 };
 pub use film::MAX_PIXELS;
 pub use fingerprint::{fingerprint, fingerprint_with};
-pub use material::{Chosen, Material, Mix, Relief, Slot};
+pub use material::{Chosen, Material, Mix, Relief, ReliefForm, Slot};
 pub use notes::{Note, NoteKind};
 
 use crate::error::SceneError;

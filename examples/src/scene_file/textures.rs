@@ -5,7 +5,7 @@ use std::sync::Arc;
 use fogbow::spectrum::Spectrum;
 
 use super::element::Element;
-use super::material::Relief;
+use super::material::{Relief, ReliefForm};
 use super::plugin::{Plugin, is_share};
 use crate::error::SceneError;
 use crate::mesh::Mesh;
@@ -44,22 +44,24 @@ pub(super) fn share<'a>(
 /// What a `bumpmap` or `normalmap` does to normals; `None` for other types.
 pub(super) fn relief(plugin: &Plugin<'_>) -> Result<Option<Relief>, SceneError> {
     let missing = || plugin.element.error("a <texture> is missing inside");
-    let relief = match plugin.kind.as_str() {
+    let form = match plugin.kind.as_str() {
         "bumpmap" => {
             let scale = plugin.number_in("scale", 1.0, -1e6..=1e6)? as f32;
             let texture = read(&plugin.nested("texture").ok_or_else(missing)?, 0)?;
-            Relief::Height { texture: Arc::new(texture), scale }
+            ReliefForm::Height { texture: Arc::new(texture), scale }
         }
         "normalmap" => {
             let (texture, _) = property(plugin, "normalmap")?.ok_or_else(missing)?;
-            Relief::Normals(Arc::new(texture))
+            ReliefForm::Normals(Arc::new(texture))
         }
         _ => return Ok(None),
     };
-    for name in ["flip_invalid_normals", "use_shadowing_function"] {
-        plugin.boolean(name, true)?;
+    let is_turned = plugin.boolean("flip_invalid_normals", true)?;
+    if plugin.boolean("use_shadowing_function", true)? {
+        let reason = "use_shadowing_function has no effect: where light grazes slopes they are up to a tenth brighter than with it";
+        plugin.element.ignored(reason);
     }
-    Ok(Some(relief))
+    Ok(Some(Relief { form, is_turned }))
 }
 
 fn nested<'a>(plugin: &Plugin<'a>, name: &str, depth: u32) -> Result<Option<(Texture, Element<'a>)>, SceneError> {

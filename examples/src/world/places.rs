@@ -5,7 +5,7 @@ use fogbow::surface::{RoughConductor, RoughDielectric, Surface};
 
 use super::analytic::Primitive;
 use crate::mesh::Mesh;
-use crate::scene_file::{Geometry, Relief};
+use crate::scene_file::{Geometry, Relief, ReliefForm};
 use crate::texture::Place;
 use crate::transform::{Transform, dot, to_array, to_vec3};
 
@@ -88,19 +88,19 @@ impl<'a> Spot<'a> {
         surface
     }
 
-    /// The normal as a relief has it: on the side of `own`, and turned so that a ray from the side of `side · own` sees it.
+    /// The normal as a relief has it: on the side of `own`, and if it is turned so that a ray from the side of `side · own` sees it.
     pub(super) fn bent(&self, relief: &Relief, own: Vec3, side: f32, direction: Vec3) -> Vec3 {
         // Mitsuba's frames follow the flipped normal.
         let n = self.normal * side;
         let [du, dv] = self.tangents;
-        let bent = match relief {
-            Relief::Height { texture, scale } => {
+        let bent = match &relief.form {
+            ReliefForm::Height { texture, scale } => {
                 let slope = texture.slope(&self.place) * *scale;
                 let rise = |tangent: Vec3, by: f32| tangent + n * (by - n.dot(tangent));
                 let bent = rise(du, slope.x).cross(rise(dv, slope.y));
                 if bent.dot(own * side) < 0.0 { -bent } else { bent }
             }
-            Relief::Normals(texture) => {
+            ReliefForm::Normals(texture) => {
                 let local = Vec3::from_array(texture.at(&self.place).0) * 2.0 - Vec3::ONE;
                 let s = (du - n * n.dot(du)).normalize_or(n.any_orthonormal_vector());
                 s * local.x + n.cross(s) * local.y + n * local.z
@@ -108,7 +108,7 @@ impl<'a> Spot<'a> {
         };
         let Some(mut bent) = bent.try_normalize() else { return self.normal };
         // What faces away from the eye is turned about the normal.
-        if n.dot(direction) * bent.dot(direction) <= 0.0 {
+        if relief.is_turned && n.dot(direction) * bent.dot(direction) <= 0.0 {
             bent = n * (2.0 * n.dot(bent)) - bent;
         }
         let bent = bent * side;

@@ -306,3 +306,21 @@ fn what_is_far_away_has_a_normal() {
     let normal = Primitive::Sphere { centre, radius: 1.0 }.normal(centre);
     assert!((normal.length() - 1.0).abs() < 1e-6, "{normal}");
 }
+
+#[test]
+fn normals_that_face_away_are_turned_or_black_as_the_scene_says() {
+    let steep = |flips: bool| {
+        format!(
+            "<shape type=\"rectangle\"><bsdf type=\"normalmap\"><boolean name=\"flip_invalid_normals\" value=\"{flips}\"/>\
+             <boolean name=\"use_shadowing_function\" value=\"false\"/><rgb name=\"normalmap\" value=\"1, 0.5, 0.6\"/>\
+             <bsdf type=\"diffuse\"/></bsdf></shape>"
+        )
+    };
+    let to_eye = Vec3::new(-1.0, 0.0, 0.1).normalize();
+    let hit = |flips| with_world(&steep(flips), |world, _| seen(world, 2.0 * to_eye, -to_eye));
+    let bent = Vec3::new(1.0, 0.0, 0.2).normalize();
+    assert!((hit(false).shading - bent).length() < 1e-5, "{:?}", hit(false));
+    assert!((hit(true).shading - bent * Vec3::new(-1.0, 1.0, 1.0)).length() < 1e-5, "{:?}", hit(true));
+    let value = |hit: Hit| hit.value(to_eye, Vec3::Z).mean();
+    assert!(value(hit(false)) == 0.0 && value(hit(true)) > 0.1);
+}

@@ -107,6 +107,23 @@ fn circles_of_files_and_references_are_errors() {
 }
 
 #[test]
+fn shadows_of_bumps_that_are_not_cast_are_told_of() {
+    let folder = Folder::new("bumps");
+    let notes = |inside: &str| {
+        let text = format!(
+            r#"{HEAD}<shape type="rectangle"><bsdf type="bumpmap">{inside}<texture type="checkerboard"/><bsdf type="diffuse"/></bsdf></shape></scene>"#
+        );
+        let found = read(&folder, &text, &ReadOptions::default());
+        assert_eq!(reasons(&found), "");
+        let about =
+            |n: &&fogbow_examples::scene_file::Note| n.text.reason.contains("use_shadowing_function has no effect");
+        found.notes.iter().filter(about).count()
+    };
+    assert_eq!(notes(""), 1);
+    assert_eq!(notes(r#"<boolean name="use_shadowing_function" value="false"/>"#), 0);
+}
+
+#[test]
 fn what_is_missing_is_replaced_by_leave_alone() {
     let folder = Folder::new("lenient");
     let text = format!(
