@@ -100,7 +100,8 @@ impl Mesh {
             let other = if along[0].abs() < 0.9 { [1.0, 0.0, 0.0] } else { [0.0, 1.0, 0.0] };
             side = normalized(across).or_else(|| normalized(cross(along, other))).unwrap_or(side);
             let up = cross(along, side);
-            // Where the cross-section begins, in turns from where Mitsuba's does; on from ring to ring, so that texture coordinates do not jump.
+            // Where the cross-section begins, in turns from where Mitsuba's does. Whole turns are added so that neighbouring
+            // rings are near each other, or the texture would run backwards between them.
             let found = from_guide(along, side);
             turn = found + if k == 0 { 0.0 } else { f64::round(turn - found) };
             for i in 0..=AROUND_CURVE {

@@ -224,7 +224,8 @@ impl<'a> Media<'a> {
         }
     }
 
-    /// Does `work` with the medium: compiled for each of the simple forms, and once for all others, whose own work is much against a call.
+    /// Does `work` with the medium. It is compiled for each of the simple forms, and once for all others, which take so long themselves that a call by
+    /// pointer hardly shows.
     pub fn with<W: WithMedium>(&self, work: W) -> W::Output {
         match self {
             Self::Homogeneous(fog) => with_simple(work, fog),
@@ -239,7 +240,7 @@ impl<'a> Media<'a> {
     }
 }
 
-/// Does `work` with a medium of a type that it is compiled for, but in this crate's unit tests, which none of it is worth compiling thrice for.
+/// Does `work` with a medium of a type that it is compiled for; in this crate's unit tests, which need no speed, as with any other.
 fn with_simple<W: WithMedium, M: Medium + Sync>(work: W, medium: &M) -> W::Output {
     if cfg!(test) { with_any(work, medium) } else { work.with(medium) }
 }
