@@ -210,6 +210,7 @@ new ResizeObserver(() => moved()).observe(canvas);
 const COUNTS = [[6, 3, 9], [12, 6, 18]];
 let workers = null;
 let world = null;
+/** Set while a bake goes on. */
 let baking = null;
 let bakes = 0;
 
@@ -244,6 +245,7 @@ async function bake() {
   } catch (error) {
     if (!signal.aborted) problem(error);
   } finally {
+    if (baking === own) baking = null;
     for (const object of made) await object.free();
   }
 }
@@ -317,6 +319,8 @@ for (const radio of document.querySelectorAll("input[name=mode]")) {
 // ---------------------------------------------------------------------------------------------
 // The truth: samples of a small picture, one after the other.
 
+const pause = (milliseconds) => new Promise((resolve) => setTimeout(resolve, milliseconds));
+
 const truth = {
   samples: 0,
   level: 1,
@@ -341,11 +345,14 @@ const truth = {
     this.isRunning = true;
     try {
       while (mode() !== 0 && this.samples < 1024) {
-        const [generation, size, traced] = [this.generation, this.size(), world];
+        const [generation, size, traced, began] = [this.generation, this.size(), world, performance.now()];
         const light = await traced.pathTrace(view(...size), { first: this.samples, samples: 1 });
         if (generation !== this.generation) continue;
         this.add(light, size);
         redraw();
+        // In turns with the bake, whose steps are far shorter: there may be but one worker for both.
+        const turn = performance.now() - began;
+        while (baking && generation === this.generation && performance.now() - began < 2 * turn) await pause(20);
       }
     } catch (error) {
       // A world that was freed under way: there is another by now.
@@ -382,7 +389,7 @@ const truth = {
     if (n < 4) return this.say(`The truth has ${n} sample${n > 1 ? "s" : ""} per pixel: too few to compare with.`);
     const error = Math.sqrt(this.means.reduce((sum, mean) => sum + (mean - this.level) ** 2, 0) / (n * (n - 1))) / this.level;
     const more = off >= 0 ? "brighter" : "darker";
-    this.say(`Baked light is ${Math.abs(100 * off).toFixed(1)} % ± ${(100 * error).toFixed(1)} % ${more} on the whole (${n} samples). Orange: too bright; blue: too dark, means over some pixels; full colour at half of the mean light.`);
+    this.say(`Baked light${baking ? ", not yet done," : ""} is ${Math.abs(100 * off).toFixed(1)} % ± ${(100 * error).toFixed(1)} % ${more} on the whole (${n} samples). Orange: too bright; blue: too dark, means over some pixels; full colour at half of the mean light.`);
   },
 
   say(text) {
