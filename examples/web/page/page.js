@@ -384,7 +384,7 @@ const truth = {
     let sum = 0;
     for (let i = 0; i < baked.length; i += 4) sum += baked[i] + baked[i + 1] + baked[i + 2];
     const off = sum / ((baked.length / 4) * 3) / this.level - 1;
-    this.off = off;
+    [this.off, this.baked] = [off, baked];
     const n = this.samples;
     if (n < 4) return this.say(`The truth has ${n} sample${n > 1 ? "s" : ""} per pixel: too few to compare with.`);
     const error = Math.sqrt(this.means.reduce((sum, mean) => sum + (mean - this.level) ** 2, 0) / (n * (n - 1))) / this.level;

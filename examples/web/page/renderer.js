@@ -122,7 +122,9 @@ vec3 from_lamp(vec3 point, out vec3 to_lamp) {
     float distance = length(way);
     to_lamp = way / distance;
     if (is_hidden(point, to_lamp, distance - LAMP_RADIUS)) return vec3(0.0);
-    return intensity * exp(-thickness(point, to_lamp, distance)) / max(distance * distance, LAMP_RADIUS * LAMP_RADIUS);
+    // It comes from the near side of the ball: where that is on the mean of what is seen of it.
+    float way_out = max(distance - 0.6667 * LAMP_RADIUS, 0.0);
+    return intensity * exp(-thickness(point, to_lamp, way_out)) / max(distance * distance, LAMP_RADIUS * LAMP_RADIUS);
 }
 
 // Henyey and Greenstein.
@@ -151,7 +153,7 @@ void main() {
         vec3 point = eye + (float(i) + shift) * each * direction;
         float here = extinction(point);
         float passed = exp(-here * each);
-        vec3 lit = from_lamp(point, to_lamp) * phase(dot(direction, -to_lamp));
+        vec3 lit = from_lamp(point, to_lamp) * phase(dot(direction, to_lamp));
         if (has_light) lit += in_scattered(point, -direction);
         light += through * (1.0 - passed) * albedo * lit;
         through *= passed;

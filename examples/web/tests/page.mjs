@@ -6,7 +6,7 @@
 import { readFile } from "node:fs/promises";
 import { createRequire } from "node:module";
 import { join } from "node:path";
-import { PATIENCE, browse, serve, watched } from "./browser.mjs";
+import { PATIENCE, asking, browse, serve, watched } from "./browser.mjs";
 
 const [folder, ...options] = process.argv.slice(2);
 const isFull = options.includes("--full");
@@ -148,6 +148,51 @@ await browse(async (browser) => {
     check("the heap is flat over 40 bakes after the first ten", heaps[1] < 1.1 * heaps[0] + 1, heaps.map((mb) => `${mb.toFixed(1)} MB`).join(" → "));
   }
   check("no errors, no requests to elsewhere", wrong.length === 0, wrong.join("; "));
+});
+
+// What the page's own shader does with the lamp, which it takes as a point: light scattered once, as the library has it. Pictures with and without albedo
+// differ by that alone.
+await browse(async (browser) => {
+  const { page, wrong } = await asking(browser, site.url);
+  for (const g of [-0.4, 0, 0.8]) {
+    const off = await page.evaluate(async (g) => {
+      const [{ Renderer }, { World, init }, { describe, intensity }] = await Promise.all(["/renderer.js", "/fogbow/fogbow.js", "/room.js"].map((file) => import(file)));
+      await init();
+      const settings = { density: 0.3, albedo: 0.95, g, smoke: 0, smokeExtinction: 0, colour: [1, 0.7, 0.4], lamp: [4.2, 2.4, 4.3] };
+      settings.intensity = intensity(settings);
+      const world = new World(describe(settings));
+      const renderer = new Renderer(document.createElement("canvas"), await (await fetch("/fog.glsl")).text());
+      // Across the room, between its columns, below the lamp: towards it, then away from it.
+      const [width, height, half] = [15, 10, 0.15];
+      const eye = [0.3, 1.6, 4.3];
+      const view = { eye, forward: [1, 0, 0], right: [0, 0, half * (width / height)], up: [0, half, 0] };
+      const marched = (albedo) => {
+        renderer.marched(width, height, view, { ...settings, albedo }, { steps: 512, jitter: 0 });
+        return renderer.read();
+      };
+      const [lit, dark] = [marched(settings.albedo), marched(0)];
+      const [steps, far] = [1000, 6];
+      const each = far / steps;
+      let [ours, theirs, worst] = [0, 0, 0];
+      for (let i = 0; i < width * height; i++) {
+        const [x, y] = [2 * (((i % width) + 0.5) / width) - 1, 2 * ((Math.floor(i / width) + 0.5) / height) - 1];
+        const way = [1, y * half, x * view.right[2]];
+        const length = Math.hypot(...way);
+        const to = way.map((c) => -c / length);
+        const points = Float32Array.from({ length: 3 * steps }, (_, k) => eye[k % 3] - to[k % 3] * (Math.floor(k / 3) + 0.5) * each);
+        // Behind walls there is no light.
+        const once = world.scatteredOnce(points, Float32Array.from({ length: 3 * steps }, (_, k) => to[k % 3]));
+        let sum = 0;
+        for (let s = 0; s < steps; s++) sum += Math.exp(-settings.density * (s + 0.5) * each) * settings.density * settings.albedo * each * once[3 * s + 1];
+        const here = lit[4 * i + 1] - dark[4 * i + 1];
+        [ours, theirs, worst] = [ours + here, theirs + sum, Math.max(worst, Math.abs(here / sum - 1))];
+      }
+      return { whole: ours / theirs - 1, worst };
+    }, g);
+    check(`the shader scatters light of the lamp as the library does, g = ${g}`, Math.abs(off.whole) < 0.02 && off.worst < 0.08,
+      `${(100 * off.whole).toFixed(2)} %, ${(100 * off.worst).toFixed(1)} % in a pixel`);
+  }
+  check("no errors in it", wrong.length === 0, wrong.join("; "));
 });
 
 for (const [name, options] of isFull ? [["phone", { viewport: { width: 375, height: 760 }, hasTouch: true, isMobile: true }], ["dark", { colorScheme: "dark" }]] : []) {
