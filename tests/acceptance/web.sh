@@ -10,6 +10,7 @@ cd "$(dirname "${BASH_SOURCE[0]}")/../.."
 TARGET=${CARGO_TARGET_DIR:-$PWD/target}
 out=$TARGET/web-out
 pictures=${1:-$(mktemp -d)}
+mkdir -p "$pictures"
 npm ci --prefix examples/web/tests --no-audit --no-fund --silent
 bash examples/web/build.sh "$out"
 cargo build --quiet --locked --release --example digests --manifest-path examples/web/Cargo.toml --target-dir "$TARGET/web/native"

@@ -76,8 +76,10 @@ pub(super) fn cell_count(size: [u32; 3]) -> Option<usize> {
 /// grid, so that densities are constant in the outer half cells.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Cell {
-    /// Indices of the eight corners, x fastest.
-    corners: [usize; 8],
+    /// Index of the first of eight corners.
+    first: usize,
+    /// To the next one along each axis; 0 where there is none.
+    steps: [usize; 3],
     fraction: Vec3,
 }
 
@@ -94,10 +96,9 @@ impl Cell {
         let (y0, y1, fy) = axis(shifted.y, size[1]);
         let (z0, z1, fz) = axis(shifted.z, size[2]);
         let (nx, ny) = (size[0] as usize, size[1] as usize);
-        let row = |y: usize, z: usize| (z * ny + y) * nx;
-        let (r00, r10, r01, r11) = (row(y0, z0), row(y1, z0), row(y0, z1), row(y1, z1));
         Self {
-            corners: [r00 + x0, r00 + x1, r10 + x0, r10 + x1, r01 + x0, r01 + x1, r11 + x0, r11 + x1],
+            first: (z0 * ny + y0) * nx + x0,
+            steps: [x1 - x0, (y1 - y0) * nx, (z1 - z0) * nx * ny],
             fraction: Vec3::new(fx, fy, fz),
         }
     }
@@ -106,7 +107,10 @@ impl Cell {
     #[inline(always)]
     fn corners(&self, density: &Density<'_>) -> (Corners, f32) {
         // Written out: an array's own `map` may stay a call.
-        let [a, b, c, d, e, f, g, h] = self.corners;
+        let [dx, dy, dz] = self.steps;
+        let (a, c) = (self.first, self.first + dy);
+        let (e, g) = (a + dz, c + dz);
+        let (b, d, f, h) = (a + dx, c + dx, e + dx, g + dx);
         let (values, unit) = match density {
             Density::F32(values) => {
                 let at = |i: usize| values.get(i).copied().unwrap_or(0.0);

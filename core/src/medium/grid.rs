@@ -251,7 +251,9 @@ impl<'a> DensityGrid<'a> {
     /// The cell around a point of the box; `None` outside.
     #[inline]
     fn cell(&self, point: Vec3) -> Option<Cell> {
-        let shifted = self.shifted_from_world.transform_point3(point);
+        // Written out, for compilers that would leave it a call.
+        let Affine3 { matrix3: m, translation } = &self.shifted_from_world;
+        let shifted = m.x_axis * point.x + m.y_axis * point.y + m.z_axis * point.z + *translation;
         let end = Vec3::new(self.size[0] as f32, self.size[1] as f32, self.size[2] as f32) + Vec3::splat(0.5);
         let is_inside = shifted.cmpge(Vec3::splat(0.5)).all() && shifted.cmple(end).all();
         is_inside.then(|| Cell::at(shifted, self.size))

@@ -2,7 +2,7 @@
 //
 //     node digests.mjs NATIVE-PROGRAM FOLDER-OF-PACKAGE [--full]
 //
-// NATIVE-PROGRAM is `native/digests.rs`. With --full at the effort that pictures have, and with figures of speed.
+// NATIVE-PROGRAM is `native/digests.rs`. With --full at the effort that pictures have, and with figures of speed: medians of five.
 
 import { execFile } from "node:child_process";
 import { mkdtemp, readFile, rm, writeFile } from "node:fs/promises";
@@ -50,6 +50,7 @@ for (const [name, room] of [["smoke box", smokeBox], ["atrium", atrium]]) {
   const { world, view, probes } = room(fogbow);
   const caches = full ? { view, error: 0.05 } : { view, error: 0.2, rays: 256, walks: 16 };
   const part = { samples: full ? 16 : 2, width: 64, height: 64 };
+  const work = { world, caches, view, part, probes };
   const files = await Promise.all(
     [describe.worldWords(world), describe.cachesWords(caches), describe.pictureWords(view, part), describe.probesWords(probes)].map(
       async (words, i) => {
@@ -59,23 +60,32 @@ for (const [name, room] of [["smoke box", smokeBox], ["atrium", atrium]]) {
       },
     ),
   );
-  const { stdout, stderr } = await promisify(execFile)(native, files);
+  const natively = () => promisify(execFile)(native, files);
+  const { stdout } = await natively();
   const due = Object.fromEntries(stdout.trim().split("\n").map((line) => line.split(" ")));
   console.log(`${name}, native: ${JSON.stringify(due)}`);
-  const seconds = {};
   for (const [file, counts] of [["fogbow.wasm", full ? [1, 2, 4] : [1]], ["fogbow-simd.wasm", full ? [1, 2, 4] : [1, 4]]]) {
     for (const count of counts) {
-      const found = await inWorkers(file, count, { world, caches, view, part, probes });
+      const found = await inWorkers(file, count, work);
       compare(`${name}, ${file}, ${count} worker${count > 1 ? "s" : ""}`, found.digests, due);
-      if (count === 1) seconds[file] = found.seconds;
     }
   }
-  if (full) {
-    const own = Number.parseFloat(stderr);
-    for (const [file, taken] of Object.entries(seconds)) {
-      console.log(`${name}: native ${own.toFixed(2)} CPU s, ${file} ${taken.toFixed(2)} s: ${(own / taken).toFixed(2)} x native`);
-    }
+  if (!full) continue;
+  // In turns, for machines are now faster and now slower.
+  const rounds = [];
+  for (let round = 0; round < 5; round++) {
+    const { stderr } = await natively();
+    const [plain, simd] = [await inWorkers("fogbow.wasm", 1, work), await inWorkers("fogbow-simd.wasm", 1, work)];
+    rounds.push([Number.parseFloat(stderr), plain.seconds, simd.seconds]);
   }
+  const median = (values) => values.sort((a, b) => a - b)[values.length >> 1];
+  console.log(`${name}: native ${median(rounds.map(([own]) => own)).toFixed(2)} CPU s`);
+  ["fogbow.wasm", "fogbow-simd.wasm"].forEach((file, i) => {
+    const seconds = median(rounds.map((round) => round[1 + i]));
+    const ratios = rounds.map((round) => round[0] / round[1 + i]);
+    const [least, most] = [Math.min(...ratios), Math.max(...ratios)].map((ratio) => ratio.toFixed(2));
+    console.log(`${name}: ${file} ${seconds.toFixed(2)} CPU s, its compilation included: ${median(ratios).toFixed(2)} x native (${least} to ${most})`);
+  });
 }
 await rm(scratch, { recursive: true });
 process.exit(failed ? 1 : 0);
