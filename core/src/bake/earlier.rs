@@ -1,7 +1,7 @@
 //! What of an earlier grid is kept, of a world that has changed since.
 //!
 //! ```text
-//! D² = mean over probes and numbers of |new − old|² − error²(new) − error²(old)      kept where D² ≤ max(error asked for, error of the brick)²
+//! D² = mean over probes and numbers of |new − old|² − error²(new) − error²(old)      kept where D² ≤ max(half of the error asked for, error of the brick)²
 //! ```
 //!
 //! Whether the light of a brick has changed is asked of its first passes. They have random numbers of their own, which no pass of the earlier grid has had, so that what
@@ -17,6 +17,10 @@ const PILOT: u32 = 4;
 
 /// Fewest of them. Fewer: errors of a brick's 64 probes together are not known well enough.
 const LEAST_PILOT: u32 = 4;
+
+/// Most that what is kept may be off by, in errors asked for, where its own noise is less. Larger: what moves stays until it is off by as much, and then jumps; smaller: first
+/// passes cannot tell.
+const LAG: f64 = 0.5;
 
 /// An earlier grid.
 #[derive(Debug, Clone, Copy)]
@@ -85,7 +89,7 @@ impl<'c> Earlier<'c> {
                 numbers += 1;
             }
         }
-        let asked = f64::from(error) * self.level;
+        let asked = LAG * f64::from(error) * self.level;
         squares - explained <= own.max(asked * asked * f64::from(numbers))
     }
 
@@ -114,7 +118,7 @@ impl<'c> Earlier<'c> {
 
 impl<'c> Bake<'_, 'c> {
     /// Keeps what has not changed since an `earlier` grid of the same cells was baked, as of the frame before in an animation: the light of every brick of 4 × 4 × 4 probes
-    /// that a fourth of its earlier passes cannot tell from what it was, to the error asked for or that of the brick itself, whichever is larger. It stays bit for bit; all others are baked anew.
+    /// that a fourth of its earlier passes cannot tell from what it was, to half of the error asked for or that of the brick itself, whichever is larger. It stays bit for bit; all others are baked anew.
     /// Extinction and albedo are those of the world as it is in any case.
     ///
     /// Light is compared with the grid it was baked for, however many frames ago, so that small changes do not add up. For bakes that have not begun, and those that were begun so; before
