@@ -59,7 +59,7 @@ fn what_has_not_changed_stays_bit_for_bit_and_the_rest_is_that_of_the_new_world(
         let is_kept = |x: usize| (0..16).all(|row| found.held(x + 32 * row) == earlier.held(x + 32 * row));
         assert!(is_kept(0) && is_kept(4) && !is_kept(28) && !is_kept(31), "{kept}");
         assert!((2..=6).contains(&kept), "{kept}");
-        // As near to the new light as a bake that begins anew: what was kept is off by an error more.
+        // As near to the new light as a bake that begins anew: what was kept is off by half an error more.
         let apart = found.deviation(&due);
         assert!(apart.bias.abs() < 4.0 * apart.bias_error + 0.02 && apart.spread < 0.06, "{apart:?}");
         let stale = earlier.deviation(&due);
