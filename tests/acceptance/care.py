@@ -270,8 +270,12 @@ def vanishing():
             command, file, _ = RUNS[name]
             place = folder / "place"
             place.mkdir()
-            child = start(folder, command, "--quiet", "-o", f"place/{file}")
-            threading.Timer(0.5, lambda: shutil.rmtree(place)).start()
+            asked = [*command, "--quiet", "-o", f"place/{file}"]
+            began = time.monotonic()
+            run(folder, asked)
+            seconds = time.monotonic() - began
+            child = start(folder, asked)
+            threading.Timer(seconds / 3, lambda: shutil.rmtree(place)).start()
             said = "".join(child.communicate())
             elsewhere = rescued(said)
             is_told = child.returncode == 2 and f"place/{file}" in said
