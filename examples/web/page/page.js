@@ -245,7 +245,11 @@ async function bake() {
   } catch (error) {
     if (!signal.aborted) problem(error);
   } finally {
-    if (baking === own) baking = null;
+    if (baking === own) {
+      baking = null;
+      // What compares it says so.
+      redraw();
+    }
     for (const object of made) await object.free();
   }
 }

@@ -1,7 +1,7 @@
 // The page in a real browser: node page.mjs FOLDER-OF-PAGE [--full] [--pictures FOLDER]
 //
 // Loads, bakes, walks by keyboard, moves sliders, shows truth, difference and mathematics, without an error in the console or a request to elsewhere; axe
-// finds nothing. With --full also on a phone's width and in the dark, with 50 bakes, and pictures for looking at.
+// finds nothing; its shader scatters the lamp's light as the library does. With --full also on a phone's width and in the dark, with 50 bakes, and pictures for looking at.
 
 import { readFile } from "node:fs/promises";
 import { createRequire } from "node:module";
