@@ -6,7 +6,7 @@ use super::estimate::Estimator;
 use super::lookup::{Basis, Reading};
 use super::store::{SurfaceCache, VolumeCache};
 use crate::host::{Hit, Medium, Properties, Rng, Scene};
-use crate::light::{Except, FromPoint, FromRay, Light, LightSample, Lights, Survey, scattered};
+use crate::light::{Except, FromPoint, FromRay, Light, LightSample, Lights, scattered};
 use crate::march::scattering_points;
 use crate::math::{Frame, Ray};
 use crate::path::connection_pdf;
@@ -15,7 +15,7 @@ use crate::sampling::{Generator, mis, uniform, uniform2, warp};
 use crate::spectrum::Spectrum;
 use crate::surface::{Surface, lambert};
 use crate::transmittance::thickness::{Marching, transmittance, until_the_end};
-use crate::world::{MAX_INTERFACES, NearLight, World, beyond, leave, nearest_surface, shadow_ray};
+use crate::world::{Joint, MAX_INTERFACES, NearLight, NearLights, World, beyond, leave, nearest_surface, shadow_ray};
 
 /// Mirrors and panes of glass an eye ray follows: a hall of mirrors must end.
 const MAX_BOUNCES: u32 = 32;
@@ -526,11 +526,8 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Gather<'_, M, S> {
     }
 
     /// Single scattering along a segment of one light within its near field.
-    fn near(&mut self, segment: &Ray, lights: &Survey<'_, '_, FromRay>, choice: f32, u: f32) -> Option<Spectrum> {
+    fn near(&mut self, segment: &Ray, joint: &Joint<'_>) -> Option<Spectrum> {
         let world = &self.estimator.world;
-        let chosen = lights.pick(choice)?;
-        let light = NearLight::of(&world.lights[chosen.index], segment, 0.0, segment.length)?;
-        let joint = light.join(segment, u, uniform2(&mut self.rng))?;
         let properties = world.medium.properties(joint.point);
         if properties.scattering.is_black() {
             return None;
@@ -544,8 +541,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Gather<'_, M, S> {
         let marching = Marching { steps: self.estimator.walk.steps, offset: uniform(&mut self.rng) };
         let through = transmittance(&segment.with_length(joint.distance), world.medium, marching)
             * transmittance(&shadow.with_length(incident.distance), world.medium, marching);
-        let pdf = joint.pdf * chosen.probability;
-        let light = properties.scattering * value * through * incident.irradiance / pdf;
+        let light = properties.scattering * value * through * incident.irradiance / joint.pdf;
         light.is_finite().then_some(light)
     }
 
@@ -595,13 +591,26 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Sight for Gather<'_, M, S> {
             return;
         }
         let count = self.settings.connections.max(1);
-        let sent = FromRay { ray: *segment, near: 0.0, far: segment.length, steep: true, until: None };
         let lights = self.estimator.world.lights;
-        let lights = lights.survey(&sent);
+        let few = NearLights::of(&lights, segment, uniform2(&mut self.rng));
+        let sent = FromRay { ray: *segment, near: 0.0, far: segment.length, steep: true, until: None };
+        let many = few.is_none().then(|| lights.survey(&sent));
         for k in 0..count {
-            let choice = self.along[0] + STEPS[0] * k as f32;
             let u = (k as f32 + self.along[1]) / count as f32;
-            if let Some(light) = self.near(segment, &lights, choice - libm::floorf(choice), u) {
+            let joint = match (&few, &many) {
+                (Some(few), _) => few.join(segment, u),
+                (None, Some(many)) => {
+                    let choice = self.along[0] + STEPS[0] * k as f32;
+                    many.pick(choice - libm::floorf(choice)).and_then(|chosen| {
+                        let near = NearLight::of(&lights[chosen.index], segment, 0.0, segment.length)?;
+                        let mut joint = near.join(segment, u, uniform2(&mut self.rng))?;
+                        joint.pdf *= chosen.probability;
+                        Some(joint)
+                    })
+                }
+                (None, None) => None,
+            };
+            if let Some(light) = joint.and_then(|joint| self.near(segment, &joint)) {
                 self.seen.medium_single += throughput * light / count as f32;
             }
         }

@@ -7,7 +7,7 @@ use glam::Vec3;
 use super::cut::{Cut, MOST, REPRESENTATIVES};
 use super::question::{FromPoint, Question};
 use super::tree::{DEPTH, KINDS, Kind, LightNode, LightTree, NONE};
-use super::{Light, sky};
+use super::{Light, ShadowMap, sky};
 use crate::host::Rng;
 use crate::math::Bounds;
 use crate::sampling::discrete::{self, Choice};
@@ -32,6 +32,8 @@ pub struct Lights<'a> {
     /// Empty without a tree.
     nodes: &'a [LightNode],
     roots: [u32; KINDS],
+    /// Empty, or one for each light.
+    shadows: &'a [Option<ShadowMap<'a>>],
 }
 
 impl<'a> Deref for Lights<'a> {
@@ -45,7 +47,7 @@ impl<'a> Deref for Lights<'a> {
 impl<'a> From<&'a [Light<'a>]> for Lights<'a> {
     #[inline]
     fn from(all: &'a [Light<'a>]) -> Self {
-        Self { all, nodes: &[], roots: [NONE; KINDS] }
+        Self { all, nodes: &[], roots: [NONE; KINDS], shadows: &[] }
     }
 }
 
@@ -79,7 +81,40 @@ impl<'a> Lights<'a> {
     #[must_use]
     pub fn with_tree(all: &'a [Light<'a>], tree: &'a LightTree<'_>) -> Self {
         let (nodes, roots) = tree.nodes();
-        if nodes.len() == 2 * all.len() { Self { all, nodes, roots } } else { Self::from(all) }
+        if nodes.len() == 2 * all.len() { Self { nodes, roots, ..Self::from(all) } } else { Self::from(all) }
+    }
+
+    /// The same lights with what is known of their shadows: a map for each that has one, in their order. Eye rays then look for light where there is some.
+    /// Maps of another number of lights are left aside.
+    ///
+    /// ```
+    /// # use fogbow::{host::Empty, light::{Light, Lights, PointLight, ShadowMap}, math::Vec3, spectrum::Spectrum};
+    /// let lamps = [Light::Point(PointLight::new(Vec3::Z, Spectrum::ONE)?)];
+    /// let mut memory = [0.0; 64];
+    /// let maps = [ShadowMap::new(&lamps[0], &Empty, 8, &mut memory[..])];
+    /// assert!(Lights::from(&lamps).with_shadows(&maps).shadow_map(0).is_some());
+    /// # Ok::<(), fogbow::light::LightError>(())
+    /// ```
+    #[must_use]
+    pub fn with_shadows(self, maps: &'a [Option<ShadowMap<'a>>]) -> Self {
+        if maps.len() == self.all.len() { Self { shadows: maps, ..self } } else { self }
+    }
+
+    /// What is known of the shadows of the light `index`.
+    ///
+    /// ```
+    /// # use fogbow::light::{Light, Lights};
+    /// assert!(Lights::from(&[]).shadow_map(0).is_none());
+    /// ```
+    #[inline]
+    #[must_use]
+    pub fn shadow_map(&self, index: usize) -> Option<&'a ShadowMap<'a>> {
+        self.shadows.get(index)?.as_ref()
+    }
+
+    /// The slice, for as long as it lives.
+    pub(crate) fn all(&self) -> &'a [Light<'a>] {
+        self.all
     }
 
     /// Whether choices go by a tree.

@@ -10,6 +10,7 @@
 //! | [`distant`] | sun, constant and image environments |
 //! | `lights` | [`Lights`]: all of a world, and choices among them |
 //! | `tree` | [`LightTree`]: boxes around many lights |
+//! | `shadow_map` | [`ShadowMap`]: how far the rays of a lamp come |
 //! | `question`, `cut` | what lights send to a place; nodes small enough to choose by it |
 //! | [`emission`] | [`Emission`]: rays that leave a light, with their power |
 //!
@@ -24,6 +25,7 @@ mod lights;
 mod picture;
 pub mod point;
 mod question;
+mod shadow_map;
 mod tree;
 
 use glam::{Vec2, Vec3};
@@ -33,10 +35,11 @@ pub use distant::{EnvironmentMap, Sun};
 pub use emission::Emission;
 pub use geometry::{Falloff, Incident, Source};
 pub use lights::Lights;
-pub(crate) use lights::{Strong, Survey};
+pub(crate) use lights::Strong;
 pub use picture::{LightImage, PictureLight, Projector, Throw};
 pub use point::{PhongLight, PointLight, SpotLight};
 pub(crate) use question::{Except, FromPoint, FromRay, Guess, Question, scattered};
+pub use shadow_map::ShadowMap;
 pub(crate) use tree::Kind;
 pub use tree::{LightNode, LightTree};
 

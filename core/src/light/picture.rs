@@ -342,6 +342,11 @@ pub struct Projector<'a> {
 const LEAST_COSINE: f32 = 1e-3;
 
 impl<'a> Projector<'a> {
+    /// Its axis (unit), and the tangent of the angle from there to its corners.
+    pub(super) fn cone(&self) -> (Vec3, f32) {
+        (self.to_world.z_axis, self.half.length())
+    }
+
     /// From its place (m), its frame in the world (columns: along the picture's rows, along its columns, ahead), the tangents of its half
     /// angles, and radiant intensity (W/sr) as a picture, but for the [`Throw`].
     ///

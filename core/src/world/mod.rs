@@ -8,7 +8,7 @@
 //! | `mod` | [`World`]: medium, surfaces and lights |
 //! | `host/passing` | [`leave`], [`beyond`], [`nearest_surface`]: from surface to surface, past null interfaces |
 //! | `rays` | [`shadow_ray`]: is a light hidden? |
-//! | `near` | [`NearLight`]: rays close by a light, joined to it |
+//! | `near` | [`NearLight`]: rays close by a light, joined to it; few lights together, and where they are in shadow |
 //! | `outline` | [`Outline`]: what methods must know beforehand |
 
 mod near;
@@ -16,6 +16,7 @@ mod outline;
 mod rays;
 
 pub use crate::host::passing::{MAX_INTERFACES, beyond, leave, nearest_surface};
+pub(crate) use near::NearLights;
 pub use near::{Joint, NearLight};
 pub use outline::{LightCounts, Outline};
 pub use rays::{shadow_ray, short_of_end};

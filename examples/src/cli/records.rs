@@ -19,7 +19,7 @@ use super::scene::SceneArguments;
 use super::{Ending, Failure, output};
 use crate::camera::Camera;
 use crate::filter::FilterTable;
-use crate::world::{Storage, World, light_tree, view};
+use crate::world::{LightAids, Storage, World};
 
 /// Draws where the records of radiance caches lie.
 #[derive(Debug, Args)]
@@ -95,7 +95,7 @@ pub(super) fn run(arguments: &RecordsArguments) -> Result<Ending, Failure> {
     let camera = world.camera_for(width, height);
     let filter = FilterTable::new(world.sensor().filter);
     let lights = world.lights();
-    let tree = light_tree(&lights);
+    let aids = LightAids::with_shadows(&lights, &world);
     let mut film = Film::new(width, height, &["total"])?;
     let bar = Bar::new(Voice::unless(arguments.quiet));
     let progress = |progress: &Progress| bar.show(progress, u64::from(width) * u64::from(height));
@@ -110,7 +110,7 @@ pub(super) fn run(arguments: &RecordsArguments) -> Result<Ending, Failure> {
     let paths = path_settings(&scene, arguments.max_depth);
     let cached = world.media().with(CacheJob {
         world: &world,
-        lights: view(&lights, tree.as_ref()),
+        lights: aids.view(&lights),
         filter: &filter,
         camera,
         paths,

@@ -41,7 +41,7 @@ use crate::camera::{Camera, Eye};
 use crate::filter::FilterTable;
 use crate::scene_file::SceneFile;
 use crate::statistics::Statistics;
-use crate::world::{Storage, WithMedium, World, light_tree, view};
+use crate::world::{LightAids, Storage, WithMedium, World};
 
 /// Names of the layers; the first is the image.
 pub(super) const LAYERS: [&str; 6] =
@@ -245,8 +245,8 @@ pub(crate) fn render(arguments: &RenderArguments) -> Result<Rendered, Failure> {
         ..tiles::Settings::default()
     };
     let lights = world.lights();
-    let tree = light_tree(&lights);
-    let lights = view(&lights, tree.as_ref());
+    let aids = LightAids::with_shadows(&lights, &world);
+    let lights = aids.view(&lights);
     let camera = world.camera_for(width, height);
     let filter = FilterTable::new(world.sensor().filter);
     let covariances = if arguments.needs_grid() {

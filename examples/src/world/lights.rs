@@ -2,8 +2,9 @@
 
 use std::path::Path;
 
+use fogbow::host::Scene;
 use fogbow::light::{
-    EnvironmentMap, Light, LightError, LightTree, MeshLight, PictureLight, PointLight, Projector, QuadLight,
+    EnvironmentMap, Light, LightError, LightTree, MeshLight, PictureLight, PointLight, Projector, QuadLight, ShadowMap,
     SphereLight, SpotLight, Sun, Triangle,
 };
 use fogbow::math::{Mat3, Vec3};
@@ -195,16 +196,39 @@ impl<'a> Lights<'a> {
 /// Lights from which on a tree pays: below, looking at all of them is as quick, and chooses best.
 const MANY: usize = 16;
 
-/// A tree over a world's lights, where they are many.
-#[must_use]
-pub fn light_tree(lights: &[Light<'_>]) -> Option<LightTree<'static>> {
-    if lights.len() <= MANY { None } else { LightTree::new(lights, Vec::new()).ok() }
+/// Texels along each side of a shadow map: a quarter of a degree of all directions, and finer in narrow cones.
+const SHADOW_TEXELS: u32 = 256;
+
+/// What is known of a world's lights beforehand: a tree where they are many, maps of the shadows of those that shine from a point where they are few.
+#[derive(Debug, Default)]
+pub struct LightAids {
+    tree: Option<LightTree<'static>>,
+    shadows: Vec<Option<ShadowMap<'static>>>,
 }
 
-/// Lights with their tree, if there is one.
-#[must_use]
-pub fn view<'a>(lights: &'a [Light<'a>], tree: Option<&'a LightTree<'_>>) -> fogbow::light::Lights<'a> {
-    tree.map_or_else(|| lights.into(), |tree| fogbow::light::Lights::with_tree(lights, tree))
+impl LightAids {
+    /// A tree alone, for methods that follow no shafts of light along eye rays.
+    #[must_use]
+    pub fn new(lights: &[Light<'_>]) -> Self {
+        let tree = if lights.len() <= MANY { None } else { LightTree::new(lights, Vec::new()).ok() };
+        Self { tree, shadows: Vec::new() }
+    }
+
+    /// With maps of shadows among the surfaces of `scene`.
+    #[must_use]
+    pub fn with_shadows(lights: &[Light<'_>], scene: &impl Scene) -> Self {
+        let shadows = lights.iter().map(|light| ShadowMap::new(light, scene, SHADOW_TEXELS, Vec::new()));
+        let are_few = lights.len() <= ShadowMap::MOST_LIGHTS;
+        Self { shadows: if are_few { shadows.collect() } else { Vec::new() }, ..Self::new(lights) }
+    }
+
+    /// The lights, with all that.
+    #[must_use]
+    pub fn view<'a>(&'a self, lights: &'a [Light<'a>]) -> fogbow::light::Lights<'a> {
+        let with_tree = |tree| fogbow::light::Lights::with_tree(lights, tree);
+        let all = self.tree.as_ref().map_or_else(|| lights.into(), with_tree);
+        all.with_shadows(&self.shadows)
+    }
 }
 
 fn area_light<'a>(

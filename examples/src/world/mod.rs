@@ -40,7 +40,7 @@ use fogbow::world::{Outline, World as LitWorld, nearest_surface};
 pub use body::{Body, as_box};
 pub use build::bounds_of;
 pub use contained::Contained;
-pub use lights::{Storage, light_tree, view};
+pub use lights::{LightAids, Storage};
 pub use media::{Media, WithMedium};
 
 use crate::camera::Camera;

@@ -21,7 +21,7 @@ use super::{Ending, Failure, output};
 use crate::bake::texture::Texel;
 use crate::bake::{Baked, Layout};
 use crate::error::read_file;
-use crate::world::{Storage, World, light_tree, view};
+use crate::world::{LightAids, Storage, World};
 use job::{BakeJob, Done};
 pub use parts::BakePartArguments;
 use parts::PartOf;
@@ -489,7 +489,7 @@ fn bake(arguments: &BakeArguments, file: &SceneArguments, frame: &Frame<'_>) -> 
     if lights.is_empty() && !world.media().glow() {
         return Err(format!("{}: has no lights, so there is nothing to bake", file.file.display()).into());
     }
-    let tree = light_tree(&lights);
+    let aids = LightAids::new(&lights);
     let method = arguments.method;
     if method == Source::RadianceCache
         && arguments.quantity() == Quantity::Irradiance
@@ -507,7 +507,7 @@ fn bake(arguments: &BakeArguments, file: &SceneArguments, frame: &Frame<'_>) -> 
     let job = BakeJob {
         arguments,
         world: &world,
-        lights: view(&lights, tree.as_ref()),
+        lights: aids.view(&lights),
         paths,
         bounds,
         counts,
