@@ -158,16 +158,20 @@ fn runs(is_lit: impl Fn(f32) -> bool) -> heapless::Vec<Run, LOOKS> {
 }
 
 impl<'a> NearLights<'a> {
-    /// `None` where lights are many. `on_light` as in [`NearLight::join`].
-    pub(crate) fn of(lights: &Lights<'a>, ray: &Ray, on_light: Vec2) -> Option<Self> {
+    /// `None` where lights are many. `on_light`, as in [`NearLight::join`], is asked once if any is near.
+    pub(crate) fn of(lights: &Lights<'a>, ray: &Ray, on_light: impl FnOnce() -> Vec2) -> Option<Self> {
         if lights.len() > FEW {
             return None;
         }
         let mut all = heapless::Vec::new();
+        let (mut on_light, mut drawn) = (Some(on_light), Vec2::ZERO);
         let question = FromRay { ray: *ray, near: 0.0, far: ray.length, steep: true, until: None };
         for (index, light) in lights.all().iter().enumerate() {
             let Some(interval) = question.part(light) else { continue };
-            let Some((pivot, anchor)) = light.anchor(on_light) else { continue };
+            if let Some(draw) = on_light.take() {
+                drawn = draw();
+            }
+            let Some((pivot, anchor)) = light.anchor(drawn) else { continue };
             let Some(law) = Equiangular::new(ray.origin, ray.direction, pivot, interval.0, interval.1) else {
                 continue;
             };
@@ -267,7 +271,7 @@ mod tests {
         let mut sums = [0.0; 2];
         for i in 0..samples {
             let mut rng = Generator::new(u64::from(i));
-            let near = NearLights::of(lights, &ray, Vec2::ZERO).unwrap();
+            let near = NearLights::of(lights, &ray, || Vec2::ZERO).unwrap();
             let shift = uniform(&mut rng);
             let value = |k: u32| {
                 let joint = near.join(&ray, (k as f32 + shift) / 4.0)?;
