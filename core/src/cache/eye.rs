@@ -592,7 +592,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Sight for Gather<'_, M, S> {
         }
         let count = self.settings.connections.max(1);
         let lights = self.estimator.world.lights;
-        let few = NearLights::of(&lights, segment, || uniform2(&mut self.rng));
+        let few = NearLights::of(&lights, segment, &mut self.rng);
         let sent = FromRay { ray: *segment, near: 0.0, far: segment.length, steep: true, until: None };
         let many = few.is_none().then(|| lights.survey(&sent));
         for k in 0..count {

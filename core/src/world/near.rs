@@ -6,6 +6,7 @@ use crate::light::{FromRay, Light, LightSample, Lights, Question, ShadowMap, Sou
 use crate::math::Ray;
 use crate::sampling::distance::Equiangular;
 use crate::sampling::uniform::ONE_MINUS_EPSILON;
+use crate::sampling::{Generator, uniform2};
 
 /// Up to so many lights are looked at each by itself. More: time for every ray; fewer: which light is joined to is left to chance earlier.
 const FEW: usize = ShadowMap::MOST_LIGHTS;
@@ -130,7 +131,7 @@ struct Run {
 }
 
 /// Runs of one value of `is_lit` over [0, 1], each with its length times 1 or [`LEAST_LIT`].
-fn runs(is_lit: impl Fn(f32) -> bool) -> heapless::Vec<Run, LOOKS> {
+fn runs(is_lit: &dyn Fn(f32) -> bool) -> heapless::Vec<Run, LOOKS> {
     let (mut runs, mut from) = (heapless::Vec::new(), 0.0);
     let mut end = |until: f32, lit: bool| {
         let weight = (until - from) * if lit { 1.0 } else { LEAST_LIT };
@@ -158,27 +159,25 @@ fn runs(is_lit: impl Fn(f32) -> bool) -> heapless::Vec<Run, LOOKS> {
 }
 
 impl<'a> NearLights<'a> {
-    /// `None` where lights are many. `on_light`, as in [`NearLight::join`], is asked once if any is near.
-    pub(crate) fn of(lights: &Lights<'a>, ray: &Ray, on_light: impl FnOnce() -> Vec2) -> Option<Self> {
+    /// `None` where lights are many. Where any is near, a point on it is drawn.
+    pub(crate) fn of(lights: &Lights<'a>, ray: &Ray, rng: &mut Generator) -> Option<Self> {
         if lights.len() > FEW {
             return None;
         }
         let mut all = heapless::Vec::new();
-        let (mut on_light, mut drawn) = (Some(on_light), Vec2::ZERO);
+        let mut on_light = None;
         let question = FromRay { ray: *ray, near: 0.0, far: ray.length, steep: true, until: None };
         for (index, light) in lights.all().iter().enumerate() {
             let Some(interval) = question.part(light) else { continue };
-            if let Some(draw) = on_light.take() {
-                drawn = draw();
-            }
-            let Some((pivot, anchor)) = light.anchor(drawn) else { continue };
+            let on_light = *on_light.get_or_insert_with(|| uniform2(rng));
+            let Some((pivot, anchor)) = light.anchor(on_light) else { continue };
             let Some(law) = Equiangular::new(ray.origin, ray.direction, pivot, interval.0, interval.1) else {
                 continue;
             };
             let sent = question.light(light);
             let mut runs = match lights.shadow_map(index) {
-                Some(map) => runs(|u| map.is_lit(ray.at(law.sample(u)))),
-                None => runs(|_| true),
+                Some(map) => runs(&|u| map.is_lit(ray.at(law.sample(u)))),
+                None => runs(&|_| true),
             };
             runs.iter_mut().for_each(|run| run.weight *= sent);
             let total = runs.iter().map(|run| run.weight).sum();
@@ -247,7 +246,7 @@ mod tests {
     use super::*;
     use crate::host::{Hit, Scene};
     use crate::light::{PointLight, SpotLight};
-    use crate::sampling::{Generator, uniform};
+    use crate::sampling::uniform;
     use crate::spectrum::Spectrum;
     use crate::surface::Surface;
     use crate::world::shadow_ray;
@@ -271,7 +270,7 @@ mod tests {
         let mut sums = [0.0; 2];
         for i in 0..samples {
             let mut rng = Generator::new(u64::from(i));
-            let near = NearLights::of(lights, &ray, || Vec2::ZERO).unwrap();
+            let near = NearLights::of(lights, &ray, &mut rng).unwrap();
             let shift = uniform(&mut rng);
             let value = |k: u32| {
                 let joint = near.join(&ray, (k as f32 + shift) / 4.0)?;
