@@ -368,3 +368,19 @@ fn a_probe_writes_a_row_per_point_and_refuses_what_it_cannot_answer() {
         assert!(said(&output).contains(reason), "{arguments:?}: {}", said(&output));
     }
 }
+
+/// Fog too dense for the cells that caches end their walks in is told of before anybody believes its picture.
+#[test]
+fn clouds_of_very_many_free_paths_are_suspicious() {
+    let folder = Folder::new("dense");
+    let box_of_smoke = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/noise-box.xml");
+    let text = std::fs::read_to_string(box_of_smoke).unwrap();
+    let volumes = concat!("value=\"", env!("CARGO_MANIFEST_DIR"), "/scenes/volumes/");
+    for (scale, is_told) in [("4", false), ("400", true)] {
+        let scaled = text.replace("name=\"scale\" value=\"4\"", &format!("name=\"scale\" value=\"{scale}\""));
+        std::fs::write(folder.0.join("scene.xml"), scaled.replace("value=\"volumes/", volumes)).unwrap();
+        let output = folder.run(&["check", "scene.xml"]);
+        let told = format!("{}{}", String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
+        assert_eq!(told.contains("free paths across: radiance caching may leave blotches"), is_told, "{told}");
+    }
+}

@@ -92,6 +92,9 @@ fn media(root: &Element<'_>, scene: &SceneFile) {
     }
 }
 
+/// Free paths across a cloud from which on radiance caching may be blotchy: its cells of light, of which at most 64 are across, then hold more than two.
+const BLOTCHY: f64 = 128.0;
+
 /// What is odd about a medium.
 pub(super) fn of_medium(medium: &MediumDescription) -> Option<String> {
     let (name, depth) = (&medium.id, medium.thickness());
@@ -101,7 +104,13 @@ pub(super) fn of_medium(medium: &MediumDescription) -> Option<String> {
             "medium \"{name}\" is at most {depth:.1e} free paths across: it {seen} be seen; mind its size and its extinction"
         ));
     }
-    let Matter::Homogeneous { absorption, scattering, .. } = &medium.matter else { return None };
+    let Matter::Homogeneous { absorption, scattering, .. } = &medium.matter else {
+        return (depth > BLOTCHY).then(|| {
+            format!(
+                "medium \"{name}\" is up to {depth:.0} free paths across: radiance caching may leave blotches in its densest parts; compare with --method path"
+            )
+        });
+    };
     let extinction: Spectrum = *absorption + *scattering;
     let is_white = |i: usize| scattering.0[i] > 0.9995 * extinction.0[i] && extinction.0[i] > 0.0;
     (depth.is_finite() && depth > 300.0 && (0..3).any(is_white)).then(|| {
