@@ -185,7 +185,7 @@ fn verdict(broken: Option<Broken>, repairs: u32) -> [bool; 4] {
     let change = |mut settings: Settings| {
         for kind in Kind::FINAL {
             let Some(effort) = settings.effort_mut(kind) else { continue };
-            (effort.limits.max, effort.free_paths) = (0.8, f32::INFINITY);
+            (effort.limits.max, effort.free_paths) = (0.6, f32::INFINITY);
             if broken == Some(Broken::Tolerance) {
                 effort.tolerance = 10.0;
             }
@@ -238,7 +238,7 @@ fn few_records_are_right_unless_broken() {
     assert_eq!(verdict(None, 0), [false; 4]);
 }
 
-/// 1.5 ± 0.2 % of all light, and 22 ± 1 % of that in a corner.
+/// −1.0 ± 0.2 % of all light, and 14 ± 1 % of that in a corner.
 #[test]
 fn a_tolerance_of_10_is_found_by_region() {
     assert_eq!(verdict(Some(Broken::Tolerance), 0), [false, true, true, false]);
@@ -249,7 +249,7 @@ fn a_tenth_less_light_is_found() {
     assert_eq!(verdict(Some(Broken::Scale), 0), [true, true, true, false]);
 }
 
-/// Their errors cancel in the mean of a picture, 1.2 ± 0.2 %, and not in all of its parts: 12 ± 2 %. Neighbours contradict them.
+/// Their errors cancel in the mean of a picture, 1.1 ± 0.3 %, and not in all of its parts: 22 ± 3 %. Neighbours contradict them.
 #[test]
 fn gradients_that_are_turned_round_are_found_by_region() {
     assert_eq!(verdict(Some(Broken::Gradients), 0), [false, true, true, true]);
