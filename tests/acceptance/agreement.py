@@ -6,7 +6,7 @@
 
 Every scene that renders as it stands is rendered with 64 pixels along the longer side by `--method path` and by `scalar_rgb`, some runs each with other seeds. The mean of
 each 8 x 8 block must agree within its noise, which the runs tell: scenes are listed by the largest difference in standard errors among blocks, beside the relative
-difference of the whole picture. Python package: mitsuba 3.9.1.
+difference of the whole picture. Those that do not agree are tried once more with box filters on both sides. Python package: mitsuba 3.9.1.
 """
 
 import argparse
@@ -141,7 +141,7 @@ def main():
             # Mitsuba's wide filters are tables of 32 steps, so edges lie a little elsewhere. What box filters see alike differs by that alone.
             if found[0] > 0.02 and (copy := boxed(file)):
                 plain = compared(copy, arguments, options, side)
-                if plain[0] <= 0.02:
+                if plain and plain[0] <= 0.02:
                     by_filter.append(file)
                     found = plain
         except Exception as error:  # noqa: BLE001: whatever it is, the scene cannot be compared

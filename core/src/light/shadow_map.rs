@@ -8,8 +8,8 @@ use crate::host::passing::nearest_surface;
 use crate::math::{Frame, Ray, float};
 use crate::storage::List;
 
-/// Cones narrower than this many times their tangent have a map of their own; wider ones are a part of that of all directions. Larger: less of the map is
-/// spent on what the cone does not reach; smaller: texels at the rim of a cone are finer than in the middle.
+/// The map of a cone is widened until its rim has this tangent, so that the cone fills most of the octahedron; wider cones have the map of all directions. Larger: texels are
+/// wider in the middle of a cone than at its rim; smaller: more of the map lies outside the cone.
 const SPREAD: f32 = 3.0;
 
 /// Distances from a lamp to what stops its light, by direction: a shadow map (Williams 1978).
@@ -39,7 +39,7 @@ pub struct ShadowMap<'s> {
     centre: Vec3,
     /// To the map's axes, in which a narrow cone is wide.
     to_map: Mat3,
-    side: u32,
+    side: u16,
     /// Squared distances (m²), row by row.
     reach2: List<'s, f32>,
 }
@@ -68,8 +68,8 @@ impl<'s> ShadowMap<'s> {
     /// Of more lights than these, maps are of no use: rays are then joined to one after the other that is chosen without them.
     pub const MOST_LIGHTS: usize = 8;
 
-    /// Of `light` among the surfaces of `scene`, with `side`² texels: as many rays and floats of `memory`. `None` for lights that shine
-    /// from more than a point, and where memory is lent and too small.
+    /// Of `light` among the surfaces of `scene`, with `side`² texels: as many rays and floats of `memory`. Directions are folded onto a square as an
+    /// octahedron (Meyer et al. 2010). `None` for lights that shine from more than a point, and where memory is lent and too small.
     ///
     /// ```
     /// # use fogbow::{host::Empty, light::{Light, ShadowMap}, spectrum::Spectrum};
@@ -79,7 +79,7 @@ impl<'s> ShadowMap<'s> {
     pub fn new<S: Scene + ?Sized>(
         light: &Light<'_>,
         scene: &S,
-        side: u32,
+        side: u16,
         memory: impl Into<List<'s, f32>>,
     ) -> Option<Self> {
         let (axis, tangent) = match light {
@@ -97,9 +97,10 @@ impl<'s> ShadowMap<'s> {
         let to_map = Mat3::from_cols(frame.u / across, frame.v / across, frame.w).transpose();
         let mut reach2 = memory.into();
         reach2.reset(side as usize * side as usize, 0.0).ok()?;
+        let width = u32::from(side);
         for (i, texel) in (0_u32..).zip(reach2.as_mut_slice()) {
-            let at = |k: u32| (k as f32 + 0.5) * 2.0 / side as f32 - 1.0;
-            let (mut x, mut y) = (at(i % side), at(i / side));
+            let at = |k: u32| (k as f32 + 0.5) * 2.0 / f32::from(side) - 1.0;
+            let (mut x, mut y) = (at(i % width), at(i / width));
             let z = 1.0 - x.abs() - y.abs();
             if z < 0.0 {
                 (x, y) = ((1.0 - y.abs()).copysign(x), (1.0 - x.abs()).copysign(y));
@@ -113,7 +114,16 @@ impl<'s> ShadowMap<'s> {
         Some(Self { centre, to_map, side, reach2 })
     }
 
-    /// Whether the lamp may be seen from `point`: as far as texels tell, and lit where they do not.
+    /// Whether the lamp may be seen from `point` (m): a texel errs towards light, by up to its own width; of what is smaller than a texel nothing is known.
+    ///
+    /// ```
+    /// # use fogbow::{host::Empty, light::{Light, PointLight, ShadowMap}, math::Vec3, spectrum::Spectrum};
+    /// let lamp = Light::Point(PointLight::new(Vec3::Z, Spectrum::ONE)?);
+    /// let mut memory = [0.0; 16];
+    /// let map = ShadowMap::new(&lamp, &Empty, 4, &mut memory[..]).unwrap();
+    /// assert!(map.is_lit(Vec3::NEG_X));   // no surface is anywhere
+    /// # Ok::<(), fogbow::light::LightError>(())
+    /// ```
     #[inline]
     #[must_use]
     pub fn is_lit(&self, point: Vec3) -> bool {
@@ -125,8 +135,9 @@ impl<'s> ShadowMap<'s> {
         if p.z < 0.0 {
             (x, y) = ((1.0 - y.abs()).copysign(x), (1.0 - x.abs()).copysign(y));
         }
-        let at = |x: f32| ((0.5 * (x + 1.0) * self.side as f32) as u32).min(self.side.saturating_sub(1));
-        let texel = self.reach2.as_slice().get((at(y) * self.side + at(x)) as usize);
+        let side = u32::from(self.side);
+        let at = |x: f32| ((0.5 * (x + 1.0) * side as f32) as u32).min(side.saturating_sub(1));
+        let texel = self.reach2.as_slice().get((at(y) * side + at(x)) as usize);
         texel.is_some_and(|&reach2| offset.length_squared() < reach2)
     }
 }

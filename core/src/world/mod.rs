@@ -43,7 +43,7 @@ pub struct World<'a, M: ?Sized, S: ?Sized> {
     /// The surfaces; [`Empty`](crate::host::Empty) for none.
     pub scene: &'a S,
     /// The lights; [`Hit::light`](crate::host::Hit::light) counts in this order. A few are `(&lights).into()`; many have a
-    /// [`LightTree`](crate::light::LightTree).
+    /// [`LightTree`](crate::light::LightTree), few that shine from a point may have [`ShadowMap`](crate::light::ShadowMap)s.
     ///
     /// An area light (quad, sphere, mesh) is half of a lamp: the other half is its surface, which `scene` must find where the
     /// light says it is, with that number in `Hit::light`. Paths meet it by chance as well as by connections, and the weights of both

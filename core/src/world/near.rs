@@ -108,7 +108,7 @@ impl<'a> NearLight<'a> {
 /// as shadow maps tell, to where it arrives.
 ///
 /// ```text
-/// p(l, t) ∝ I_l/r_l(t)² · (ε + V_l(t))     ε: maps may be wrong
+/// p(l, t) ∝ I_l/r_l(t)² · max(ε, V_l(t))     V: 1 in light, 0 in shadow by the map; ε = 1/10: it may be wrong
 /// ```
 ///
 /// With one number for both, connections that are evenly spread are so over all lights and all distances together.

@@ -245,7 +245,9 @@ pub(crate) fn render(arguments: &RenderArguments) -> Result<Rendered, Failure> {
         ..tiles::Settings::default()
     };
     let lights = world.lights();
-    let aids = LightAids::with_shadows(&lights, &world);
+    // What other methods draw points by knows no shadows.
+    let has_shafts = method == Method::RadianceCache;
+    let aids = if has_shafts { LightAids::with_shadows(&lights, &world) } else { LightAids::new(&lights) };
     let lights = aids.view(&lights);
     let camera = world.camera_for(width, height);
     let filter = FilterTable::new(world.sensor().filter);

@@ -196,8 +196,8 @@ impl<'a> Lights<'a> {
 /// Lights from which on a tree pays: below, looking at all of them is as quick, and chooses best.
 const MANY: usize = 16;
 
-/// Texels along each side of a shadow map: a quarter of a degree of all directions, and finer in narrow cones.
-const SHADOW_TEXELS: u32 = 256;
+/// Texels along each side of a shadow map: 0.8° wide where a lamp shines in all directions, finer in narrow cones.
+const SHADOW_TEXELS: u16 = 256;
 
 /// What is known of a world's lights beforehand: a tree where they are many, maps of the shadows of those that shine from a point where they are few.
 #[derive(Debug, Default)]
