@@ -104,7 +104,7 @@ pub struct PhotonDeposit {
     /// Where (m), and the direction of travel.
     at: Vec3,
     direction: Vec3,
-    /// Power times the length of the way (W·m).
+    /// Power times the length of the way (W·m); black, while photons are only counted, where nothing scatters.
     light: Spectrum,
 }
 
@@ -118,6 +118,10 @@ pub struct PhotonCell {
     last: u32,
     /// Where the first did (m).
     met: Vec3,
+    /// Whether something scatters in it, as far as counted photons have seen.
+    scatters: bool,
+    /// Whether it or one beside it scatters: only there light is asked for.
+    is_lit: bool,
     /// Whether no surface cuts it.
     is_whole: bool,
 }
@@ -301,16 +305,33 @@ impl<'s> PhotonGrid<'s> {
             if counted < due {
                 return Some(counted.min(due - counted));
             }
+            // Cells that later counts find have missed photons before.
+            if counted == paths {
+                self.widen();
+            }
             self.lit = Some(most.min(wanted as u32));
         }
         let end = self.lit.map_or(0, |end| end.min(most));
         (paths < end).then(|| paths.min(end - paths))
     }
 
+    /// Asks for light where something scatters and beside it, where slopes look. Ends of rows are beside beginnings: some cells more.
+    fn widen(&mut self) {
+        let [nx, ny, _] = self.counts.map(|count| count as usize);
+        let cells = self.cells.as_mut_slice();
+        for number in 0..cells.len() {
+            let scatters = |number: usize| cells.get(number).is_some_and(|cell| cell.scatters);
+            let beside = |stride| scatters(number.wrapping_sub(stride)) || scatters(number + stride);
+            let is_lit = scatters(number) || [1, nx, nx * ny].into_iter().any(beside);
+            cells[number].is_lit = is_lit;
+        }
+    }
+
     /// How many times the counted paths it takes until `enough` photons have passed nearly every cell that walks may end in.
     /// Infinite if none has been passed by some.
     fn times(&self, enough: u32) -> f64 {
-        let lit = || self.cells.as_slice().iter().map(|cell| cell.paths).filter(|&paths| paths >= LEAST_PATHS);
+        let scattering = self.cells.as_slice().iter().filter(|cell| cell.scatters);
+        let lit = || scattering.clone().map(|cell| cell.paths).filter(|&paths| paths >= LEAST_PATHS);
         let (all, most) = lit().fold((0_u32, 0), |(all, most), paths| (all + 1, most.max(paths)));
         let most_dark = (1.0 - KNOWN) * f64::from(all);
         // The most photons that nearly every cell has met.
@@ -355,6 +376,7 @@ impl<'s> PhotonGrid<'s> {
         let mut rng = Generator::new(mix(seed ^ 0x9407) ^ u64::from(path));
         let mut along = Generator::child(&mut rng);
         let (mut flights, mut kept, bounds) = (0, Ok(()), self.bounds());
+        let is_counted = self.lit.is_none();
         // What walks connect to is no business of cells.
         let mut is_straight = false;
         trace(world, &effort.bounds, settings, &mut rng, &mut |event: &Event<'_>| match *event {
@@ -372,11 +394,14 @@ impl<'s> PhotonGrid<'s> {
                 let step = length / count as f32;
                 for i in 0..count {
                     let at = reach.at(near + (i as f32 + uniform(&mut along)) * step);
-                    if let Some(cell) = self.cell_of(at) {
-                        let cell = self.number(cell);
-                        let deposit = PhotonDeposit { cell, path, at, direction: reach.direction, light: power * step };
-                        kept = kept.and(deposits.push(deposit));
-                    }
+                    let Some(cell) = self.cell_of(at).map(|cell| self.number(cell)) else { continue };
+                    let is_lit = || self.cells.as_slice().get(cell as usize).is_some_and(|cell| cell.is_lit);
+                    let light = match is_counted {
+                        true if world.medium.properties(at).scattering == Spectrum::ZERO => Spectrum::ZERO,
+                        false if !is_lit() => continue,
+                        _ => power * step,
+                    };
+                    kept = kept.and(deposits.push(PhotonDeposit { cell, path, at, direction: reach.direction, light }));
                 }
             }
             Event::Collided { .. } | Event::Met { .. } => {}
@@ -399,6 +424,7 @@ impl<'s> PhotonGrid<'s> {
                 if cell.paths == 0 || cell.last != deposit.path {
                     (cell.paths, cell.last) = (cell.paths + 1, deposit.path);
                 }
+                cell.scatters |= deposit.light != Spectrum::ZERO;
             }
             return;
         }
@@ -415,7 +441,8 @@ impl<'s> PhotonGrid<'s> {
 
     /// Whether no surface cuts a cell, seen from where a photon came by; of cells that none did, `false`.
     pub(super) fn is_whole<S: Scene + ?Sized>(&self, number: u32, scene: &S) -> bool {
-        let Some(cell) = self.cells.as_slice().get(number as usize).filter(|cell| cell.paths >= LEAST_PATHS) else {
+        let is_known = |cell: &&PhotonCell| cell.is_lit && cell.paths >= LEAST_PATHS;
+        let Some(cell) = self.cells.as_slice().get(number as usize).filter(is_known) else {
             return false;
         };
         let [nx, ny, _] = self.counts;
@@ -619,6 +646,21 @@ mod tests {
         let change = at(0.0, turned).0.radiance[0] - ahead.radiance[0];
         let told = at(0.0, (away + turned).normalize()).1.channel(0).dot(turned - away);
         assert!((change / told - 1.0).abs() < 0.01, "{change} {told}");
+    }
+
+    /// Where nothing scatters no walk ends, and photons leave nothing; slopes look one cell beyond.
+    #[test]
+    fn cells_far_from_all_fog_are_dark() {
+        let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::ONE, Phase::ISOTROPIC).unwrap();
+        let ball = Placed::new(fog, Region::sphere(Vec3::ZERO, 0.15).unwrap());
+        let sky = [Light::Constant(Spectrum::ONE)];
+        let world = World { medium: &ball, scene: &crate::host::Empty, lights: (&sky).into() };
+        let effort = PhotonEffort { cells: 11, ..effort(20_000) };
+        let cells = PhotonGrid::lit(&world, &effort, &path::Settings::default(), 1);
+        let at = |i: u32| cells.scattered(Vec3::X * (2.0 / 11.0 * i as f32), Vec3::Z, &fog.properties(Vec3::ZERO));
+        assert_eq!([0, 1, 2, 3, 4, 5].map(|i| at(i).is_some()), [true, true, true, false, false, false]);
+        let (light, _) = at(0).unwrap();
+        assert!((light.radiance[0] - 1.0).abs() < 0.1, "{light:?}");
     }
 
     /// A finer level goes on where a coarser one has ended; with another division or other random numbers all begins anew.

@@ -66,9 +66,9 @@ pub fn march(ray: &Ray, medium: &(impl Medium + ?Sized), marching: Marching, u: 
                 draw.advance(from, until - from, here, here);
                 whole.value += extinction * (until - from);
             }
-            Part::Changing { from, until } => {
+            Part::Changing { from, until, densest } => {
                 let (mut at, mut last) = (from, None);
-                marching.samples(from, until, |t, weight| {
+                marching.samples((from, until, densest), |t, weight| {
                     if !to_end && draw.found.is_some() {
                         return;
                     }

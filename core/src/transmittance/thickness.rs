@@ -20,6 +20,11 @@ const MIN_FACE_COSINE: f32 = 1e-3;
 /// positions resolve, and a mistaken step length must not hang the host.
 const MAX_SAMPLES: u32 = 1 << 16;
 
+/// Free paths of a step of some length, by the bound of extinction. `τ` of a random offset is off by half of what extinction differs by from end to
+/// end, times a step, either way: what is seen through it is too bright by up to `sinh(x/2)/(x/2) − 1` for a step of `x` free paths. Larger: light that
+/// gets into clouds from outside is too bright; smaller: time.
+const FREE_PATHS: f32 = 0.5;
+
 /// Segments after which a changing part is marched, so that an endless one can end where nothing is seen
 /// through it.
 const MAX_JOINED: usize = 256;
@@ -27,7 +32,7 @@ const MAX_JOINED: usize = 256;
 /// How finely a part of a ray where extinction changes is sampled.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Steps {
-    /// Steps of about this length (m): `N = max(1, ⌈part / length⌉)`.
+    /// Steps of at most this length (m), and of at most half a free path where fog is densest: `N = max(1, ⌈part / length⌉)`.
     Length(f32),
     /// This many steps per part, whatever its length: the choice for finite differences. A part ends
     /// after 256 segments of the medium at the latest.
@@ -77,13 +82,13 @@ impl Marching {
         Self { offset, ..self }
     }
 
-    /// Calls `visit(distance, weight)` for the samples of a part; the weights sum to its length.
+    /// Calls `visit(distance, weight)` for the samples of a part in which extinction (m⁻¹) is `densest` at most; the weights sum to its length.
     #[inline]
-    pub(super) fn samples(&self, from: f32, until: f32, mut visit: impl FnMut(f32, f32)) {
+    pub(super) fn samples(&self, (from, until, densest): (f32, f32, f32), mut visit: impl FnMut(f32, f32)) {
         let extent = until - from;
         let count = match self.steps {
             // A length that is not positive gives NaN or ∞; both end at the maximum or at 1.
-            Steps::Length(length) => libm::ceilf(extent / length) as u32,
+            Steps::Length(length) => libm::ceilf(extent / length.min(FREE_PATHS / densest)) as u32,
             Steps::Count(count) | Steps::Gauss(count) => count,
         };
         let count = count.clamp(1, MAX_SAMPLES);
@@ -151,20 +156,11 @@ impl Thickness {
 /// A part of a ray on which the medium is either constant or to be marched.
 pub(super) enum Part {
     /// Extinction (m⁻¹) from one distance (m) to another.
-    Constant {
-        extinction: Spectrum,
-        from: f32,
-        until: f32,
-    },
-    Changing {
-        from: f32,
-        until: f32,
-    },
+    Constant { extinction: Spectrum, from: f32, until: f32 },
+    /// With a bound of extinction.
+    Changing { from: f32, until: f32, densest: f32 },
     /// Extinction without end: channels that are not 0 are opaque.
-    Endless {
-        extinction: Spectrum,
-        from: f32,
-    },
+    Endless { extinction: Spectrum, from: f32 },
 }
 
 /// Most segments asked for where a medium ends.
@@ -187,18 +183,18 @@ pub(crate) fn until_the_end(ray: &Ray, medium: &(impl Medium + ?Sized)) -> Ray {
 /// is seen beyond. What lies behind the most [`segments`](super::segments()) there may be counts as vacuum.
 #[inline]
 pub(super) fn for_each_part(ray: &Ray, medium: &(impl Medium + ?Sized), mut visit: impl FnMut(Part, bool) -> bool) {
-    let (mut end, mut changing_from, mut joined) = (0.0_f32, None, 0);
+    let (mut end, mut changing_from, mut joined, mut densest) = (0.0_f32, None, 0, 0.0_f32);
     for (visited, (from, segment)) in marching_segments(medium, ray).enumerate() {
         let is_endless = ray.length.is_infinite() || visited > 16 * MAX_JOINED;
         let until = segment.until;
         let is_changing = until.is_finite() && !segment.is_constant();
         if !is_changing || joined >= MAX_JOINED {
             if let Some(start) = changing_from.take()
-                && visit(Part::Changing { from: start, until: from }, is_endless)
+                && visit(Part::Changing { from: start, until: from, densest }, is_endless)
             {
                 return;
             }
-            joined = 0;
+            (joined, densest) = (0, 0.0);
         }
         if until.is_infinite() {
             visit(Part::Endless { extinction: segment.majorant, from }, true);
@@ -207,6 +203,7 @@ pub(super) fn for_each_part(ray: &Ray, medium: &(impl Medium + ?Sized), mut visi
         if is_changing {
             changing_from = changing_from.or(Some(from));
             joined += 1;
+            densest = densest.max(segment.majorant.max_element());
         } else if !segment.majorant.is_black()
             && visit(Part::Constant { extinction: segment.majorant, from, until }, is_endless)
         {
@@ -215,7 +212,7 @@ pub(super) fn for_each_part(ray: &Ray, medium: &(impl Medium + ?Sized), mut visi
         end = until;
     }
     if let Some(from) = changing_from {
-        visit(Part::Changing { from, until: end }, false);
+        visit(Part::Changing { from, until: end, densest }, false);
     }
 }
 
@@ -255,8 +252,8 @@ pub fn optical_thickness(ray: &Ray, medium: &(impl Medium + ?Sized), marching: M
     for_each_part(ray, medium, |part, is_endless| {
         match part {
             Part::Constant { extinction, from, until } => value += extinction * (until - from),
-            Part::Changing { from, until } => {
-                marching.samples(from, until, |t, weight| value += medium.extinction(ray.at(t)) * weight);
+            Part::Changing { from, until, densest } => {
+                marching.samples((from, until, densest), |t, weight| value += medium.extinction(ray.at(t)) * weight);
             }
             Part::Endless { extinction, .. } => value += endless(extinction),
         }
@@ -297,7 +294,7 @@ pub fn optical_thickness_with_gradients(ray: &Ray, medium: &(impl Medium + ?Size
     for_each_part(ray, medium, |part, is_endless| {
         match part {
             Part::Constant { extinction, from, until } => sum.value += extinction * (until - from),
-            Part::Changing { from, until } => marching.samples(from, until, |t, weight| {
+            Part::Changing { from, until, densest } => marching.samples((from, until, densest), |t, weight| {
                 let (extinction, gradient) = medium.extinction_with_gradient(ray.at(t));
                 sum.value += extinction * weight;
                 let slope = gradient * weight;
@@ -375,6 +372,35 @@ mod tests {
             let extinction = Spectrum::splat(if passed % 2 == 1 { 1.0 } else { 0.0 });
             MajorantSegment { until, minorant: extinction, majorant: extinction }
         }
+    }
+
+    /// Fog that becomes denser along x, from nothing at 0 to 8 m⁻¹ at 1.
+    struct Ramp;
+
+    impl Medium for Ramp {
+        fn properties(&self, point: Vec3) -> Properties {
+            Properties { absorption: Spectrum::splat(8.0 * point.x), ..Properties::VACUUM }
+        }
+        fn majorant_segment(&self, _: &Ray, _: f32) -> MajorantSegment {
+            MajorantSegment { until: 1.0, minorant: Spectrum::ZERO, majorant: Spectrum::splat(8.0) }
+        }
+    }
+
+    /// One step of a metre is off by up to four free paths, and what comes through is 6.8 times too bright.
+    #[test]
+    fn what_comes_out_of_dense_fog_is_not_too_bright_where_steps_are_long() {
+        let out_of_it = Ray::new(Vec3::X, Vec3::NEG_X).with_length(1.0);
+        let offsets = || (0..64).map(|i| (i as f32 + 0.5) / 64.0);
+        let through = |steps| {
+            let seen = |offset| transmittance(&out_of_it, &Ramp, Marching { steps, offset })[0];
+            offsets().map(seen).sum::<f32>() / 64.0 / (-4.0_f32).exp()
+        };
+        let limit = libm::sinhf(0.25) / 0.25;
+        let light = through(Steps::Length(1.0));
+        assert!(light > 1.0 && light < limit + 1e-3, "{light}");
+        assert!(through(Steps::Count(1)) > 6.0);
+        // Shorter steps are as they were asked for.
+        assert_eq!(through(Steps::Length(0.01)), through(Steps::Count(100)));
     }
 
     #[test]
