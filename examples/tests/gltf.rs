@@ -480,6 +480,48 @@ fn a_scene_without_fog_says_so() {
     assert_eq!(told(), 1);
     let fog = folder.write("room.fog.toml", FOG);
     assert_eq!(told(), 0);
+    let media = |options: &ReadOptions| SceneFile::read_with(&scene, options).into_scene().unwrap().media.len();
+    let without = ReadOptions { is_without_fog: true, ..ReadOptions::default() };
+    assert_eq!([media(&ReadOptions::default()), media(&without)], [1, 0]);
+    assert_ne!(fingerprint_with(&scene, &without).unwrap(), fingerprint(&scene).unwrap());
     std::fs::remove_file(fog).unwrap();
     assert_eq!(told(), 1);
+    assert!(SceneFile::read_with(&scene, &without).notes.iter().all(|note| !note.to_string().contains("fog.toml")));
+}
+
+/// No mistake in a file of fog hides another.
+#[test]
+fn all_mistakes_in_a_fog_file_are_told_at_once() {
+    let folder = Folder::new("mistakes");
+    let scene = folder.write("room.gltf", triangle("", ",\"nodes\":[{\"mesh\":0}]"));
+    let fog = "[sky]\nradiance = \"blue\"\n[moon]\n[sun]\nfrom = [0, 1, 0]\n\
+        [[fog]]\nvisibilty = 3\nalbedo = true\ng = 0.5\n[[fog]]\nshape = \"sphere\"\nmin = [0, 0, 0]\nground = 1\n\
+        [[fog]]\nshape = \"sphere\"\ncentre = [0, 0, 0]\nradius = 1\nextinction = 1\n";
+    folder.write("room.fog.toml", fog);
+    let errors = SceneFile::read_with(&scene, &ReadOptions::default()).errors;
+    let expected = [
+        "fog.toml:2: [sky]: must be a number, or three",
+        "fog.toml:3: nothing is called \"moon\" here",
+        "fog.toml:7: [[fog]] 1: unknown field `visibilty`, expected one of",
+        "fog.toml:8: [[fog]] 1: must be a number, or three",
+        "[sun]: needs \"from\" and \"irradiance\"",
+        "[[fog]] 2: \"min\", \"ground\" have no meaning for this shape",
+    ];
+    let told: Vec<_> = errors.iter().map(ToString::to_string).collect();
+    assert_eq!(told.len(), expected.len(), "{told:#?}");
+    for (told, words) in told.iter().zip(expected) {
+        assert!(told.contains(words), "{words} in {told:#?}");
+    }
+    assert!(told.iter().any(|told| told.contains("(is \"visibility\" meant?)")), "{told:#?}");
+}
+
+/// A scene of glTF may have no nodes: an empty room with fog from a file.
+#[test]
+fn a_scene_may_be_empty() {
+    let folder = Folder::new("empty");
+    let scene = folder.write("cloud.gltf", r#"{"asset":{"version":"2.0"},"scenes":[{}],"scene":0}"#);
+    folder.write("cloud.fog.toml", "[[fog]]\nshape = \"sphere\"\ncentre = [0, 0, 0]\nradius = 1\nextinction = 1\n");
+    let findings = SceneFile::read_with(&scene, &ReadOptions::default());
+    assert_eq!(findings.errors, []);
+    assert_eq!(findings.scene.unwrap().media.len(), 1);
 }

@@ -5,8 +5,8 @@ use fogbow::math::Bounds;
 
 use super::scene::{SceneArguments, said};
 use super::{Ending, Failure, output};
-use crate::scene_file::{Findings, NoteKind, SceneFile};
-use crate::transform::to_array;
+use crate::scene_file::{Findings, NoteKind, SceneFile, Sensor};
+use crate::transform::{normalized, to_array, to_vec3};
 use crate::world::{Storage, World, bounds_of};
 
 /// Says all at once what of a scene cannot be rendered, has no effect, or looks like a mistake, and how large and thick its media are.
@@ -52,7 +52,23 @@ fn inventory(scene: &SceneFile) -> Vec<String> {
         let place = extent(medium.bounds());
         format!("medium \"{}\": {place}; extinction up to {most:.3} per m: {across:.2} free paths across", medium.id)
     });
-    surfaces.into_iter().chain(media).collect()
+    surfaces.into_iter().chain(media).chain(camera(scene)).collect()
+}
+
+/// Where the camera stands, as an option that may be changed.
+fn camera(scene: &SceneFile) -> Option<String> {
+    let Sensor { to_world, width, height, .. } = &scene.sensor;
+    let (origin, axis) = (to_world.column(3), normalized(to_world.column(2))?);
+    let shapes = scene.shapes.iter().map(|shape| bounds_of(&shape.geometry)).fold(Bounds::EMPTY, Bounds::union);
+    let media = scene.media.iter().map(|medium| medium.bounds().map(to_vec3));
+    let all = media.fold(shapes, |all, [min, max]| all.union(Bounds { min, max }));
+    // What it looks at: before the middle of all there is.
+    let middle = to_array(all.centre());
+    let ahead = (0..3).map(|i| (middle[i] - origin[i]) * axis[i]).sum::<f64>();
+    let ahead = if ahead > 0.0 && ahead.is_finite() { ahead } else { 1.0 };
+    let target = [0, 1, 2].map(|i| origin[i] + ahead * axis[i]);
+    let point = |at: [f64; 3]| at.map(|c| (c as f32).to_string()).join(",");
+    Some(format!("camera: {width} x {height} pixels, --camera \"{} {}\"", point(origin), point(target)))
 }
 
 /// A box in words.

@@ -11,6 +11,7 @@ mod compare;
 pub(crate) mod covariance;
 mod defaults;
 mod ellipsoids;
+mod exposure;
 mod figures;
 mod film_file;
 mod help;

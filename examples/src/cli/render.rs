@@ -36,7 +36,7 @@ use super::photon_beams::BeamJob;
 use super::radiance_cache::{Audited, CacheJob};
 use super::report::{Bar, Report};
 use super::vpl::{self, Audit, VplJob};
-use super::{Ending, Failure, bias_layers, ellipsoids, output};
+use super::{Ending, Failure, bias_layers, ellipsoids, exposure, output};
 use crate::camera::{Camera, Eye};
 use crate::filter::FilterTable;
 use crate::scene_file::SceneFile;
@@ -145,6 +145,11 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<Ending, Failure> {
     }
     if !arguments.quiet {
         report.print();
+        let is_png = |file: &PathBuf| file.extension().is_some_and(|e| e.eq_ignore_ascii_case("png"));
+        let picture = film.mean(0).filter(|_| outputs.iter().any(is_png));
+        if let Some(advice) = picture.and_then(|picture| exposure::advice(&picture, arguments.exposure)) {
+            say!("{advice}");
+        }
     }
     let bar = Bar::new(arguments.voice());
     outputs.iter().for_each(|file| bar.wrote(file));

@@ -34,6 +34,9 @@ pub struct ReadArguments {
     /// Fog for a glTF scene, in TOML [default: SCENE.fog.toml beside it, if there is one].
     #[arg(help_heading = "Scenes", long, value_name = "FILE.toml")]
     pub fog: Option<PathBuf>,
+    /// Leaves out the fog that lies beside a glTF scene.
+    #[arg(help_heading = "Scenes", long, conflicts_with = "fog")]
+    pub no_fog: bool,
 }
 
 fn definition(text: &str) -> Result<(String, String), String> {
@@ -46,12 +49,21 @@ fn definition(text: &str) -> Result<(String, String), String> {
 impl SceneArguments {
     /// A scene that is read as it stands.
     pub(crate) fn plain(file: PathBuf) -> Self {
-        Self { file, reading: ReadArguments { define: Vec::new(), sensor: 0, lenient: false, fog: None } }
+        Self {
+            file,
+            reading: ReadArguments { define: Vec::new(), sensor: 0, lenient: false, fog: None, no_fog: false },
+        }
     }
 
     fn options(&self) -> ReadOptions {
-        let ReadArguments { define, sensor, lenient, fog } = &self.reading;
-        ReadOptions { parameters: define.clone(), sensor: *sensor, is_lenient: *lenient, fog: fog.clone() }
+        let ReadArguments { define, sensor, lenient, fog, no_fog } = &self.reading;
+        ReadOptions {
+            parameters: define.clone(),
+            sensor: *sensor,
+            is_lenient: *lenient,
+            fog: fog.clone(),
+            is_without_fog: *no_fog,
+        }
     }
 
     /// All that is in the scene, or wrong with it.

@@ -83,6 +83,8 @@ pub struct ReadOptions {
     pub is_lenient: bool,
     /// Fog for a glTF scene, where it is not in the file beside it.
     pub fog: Option<PathBuf>,
+    /// Whether a glTF scene has no fog, whatever lies beside it.
+    pub is_without_fog: bool,
 }
 
 /// What was found in a scene file.

@@ -33,23 +33,27 @@ use fogbow::math::{Bounds, Vec3};
 use fogbow::phase::{Lobe, Phase};
 use fogbow::spectrum::Spectrum;
 use serde::Deserialize;
+use serde::de::{DeserializeOwned, IntoDeserializer};
+use toml::Spanned;
+use toml::de::{DeString, DeTable, DeValue};
 
 use crate::error::{SceneError, read_file};
 use crate::picture::Picture;
 use crate::scene_file::description::{Container, Emitter, Matter, MediumDescription, Place, SceneFile};
+use crate::scene_file::notes::Sink;
+use crate::scene_file::plugin::suggestion;
 use crate::transform::{Transform, normalized, to_array, to_vec3};
 use crate::vdb;
 use crate::volume::{Values, Volume};
 use crate::world::bounds_of;
 
-/// All of a file.
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
+/// All of a file, as far as it can be.
+#[derive(Debug, Default)]
 struct FogFile {
     sky: Option<Sky>,
     sun: Option<Sun>,
-    #[serde(default)]
-    fog: Vec<toml::Spanned<Fog>>,
+    /// With their lines and numbers.
+    fog: Vec<(u32, usize, Fog)>,
 }
 
 #[derive(Debug, Deserialize)]
@@ -63,8 +67,8 @@ struct Sky {
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Sun {
-    from: [f64; 3],
-    irradiance: Colour,
+    from: Option<[f64; 3]>,
+    irradiance: Option<Colour>,
 }
 
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize)]
@@ -78,7 +82,7 @@ enum Form {
 }
 
 #[derive(Debug, Clone, Copy, Deserialize)]
-#[serde(untagged)]
+#[serde(untagged, expecting = "must be a number, or three in brackets")]
 enum Colour {
     Grey(f32),
     Three([f32; 3]),
@@ -131,38 +135,128 @@ const VISIBLE: f32 = 3.912;
 /// its height.
 const LAYERS: u32 = 256;
 
-/// Reads a file of fog, and adds what is in it to a scene.
-///
-/// # Errors
-/// A file that is missing, is no TOML, or says something that cannot be.
-pub(super) fn read(file: &Path, scene: &mut SceneFile) -> Result<(), SceneError> {
-    let whole = |reason: String| SceneError { file: file.to_owned(), reason, ..SceneError::default() };
-    let bytes = read_file(file).map_err(|e| whole(e.reason))?;
-    let text = String::from_utf8(bytes).map_err(|e| whole(format!("is not UTF-8 text: {e}")))?;
-    let line_of = |at: usize| text.as_bytes().iter().take(at).filter(|byte| **byte == b'\n').count() as u32 + 1;
-    let fog: FogFile = toml::from_str(&text)
-        .map_err(|e| SceneError { line: e.span().map(|span| line_of(span.start)), ..whole(e.message().to_owned()) })?;
+/// What tells of mistakes in a file of fog: all of them, each with its line.
+struct Reader<'a> {
+    file: &'a Path,
+    text: &'a str,
+    sink: &'a Sink,
+}
+
+impl Reader<'_> {
+    fn line_of(&self, at: usize) -> u32 {
+        self.text.as_bytes().iter().take(at).filter(|byte| **byte == b'\n').count() as u32 + 1
+    }
+
+    fn error(&self, line: impl Into<Option<u32>>, element: &str, reason: impl Into<String>) {
+        self.sink.error(SceneError {
+            file: self.file.to_owned(),
+            line: line.into(),
+            element: element.to_owned(),
+            reason: reason.into(),
+            ..SceneError::default()
+        });
+    }
+
+    /// What a table holds, key by key, so that one mistake hides no other: all of `T` is optional.
+    fn table<T: DeserializeOwned>(&self, element: &str, value: Spanned<DeValue<'_>>) -> Option<T> {
+        let (span, line) = (value.span(), self.line_of(value.span().start));
+        let DeValue::Table(table) = value.into_inner() else {
+            self.error(line, element, "must be a table");
+            return None;
+        };
+        let read = |table: DeTable<'_>| T::deserialize(Spanned::new(span.clone(), table).into_deserializer());
+        let mut is_good = true;
+        for (key, value) in in_order(&table) {
+            let one = DeTable::from_iter([(key.clone(), value.clone())]);
+            if let Err(e) = read(one) {
+                // Of what is unknown the words name all that is known.
+                let known = e.message().split('`').skip(3).step_by(2);
+                let near = suggestion(key.get_ref(), known);
+                let at = e.span().map_or(key.span().start, |span| span.start);
+                self.error(self.line_of(at), element, format!("{}{near}", e.message().trim_end()));
+                is_good = false;
+            }
+        }
+        is_good.then(|| read(table)).and_then(Result::ok)
+    }
+
+    fn all(&self) -> FogFile {
+        let mut fog = FogFile::default();
+        let (whole, errors) = DeTable::parse_recoverable(self.text);
+        for e in &errors {
+            self.error(e.span().map(|span| self.line_of(span.start)), "", e.message());
+        }
+        if !errors.is_empty() {
+            return fog;
+        }
+        for (key, value) in in_order(whole.get_ref()) {
+            let line = self.line_of(key.span().start);
+            match key.get_ref().as_ref() {
+                "sky" => fog.sky = self.table("[sky]", value.clone()),
+                "sun" => fog.sun = self.table("[sun]", value.clone()),
+                "fog" => {
+                    let DeValue::Array(each) = value.get_ref() else {
+                        self.error(line, "", "\"fog\" must be a list of tables: [[fog]]");
+                        continue;
+                    };
+                    for (number, one) in each.iter().enumerate() {
+                        let line = self.line_of(one.span().start);
+                        fog.fog.extend(self.table(&element_of(number), one.clone()).map(|one| (line, number, one)));
+                    }
+                }
+                other => {
+                    let near = suggestion(other, ["sky", "sun", "fog"].into_iter());
+                    self.error(line, "", format!("nothing is called \"{other}\" here{near}"));
+                }
+            }
+        }
+        fog
+    }
+}
+
+/// What a table holds, as it is written.
+fn in_order<'t, 'i>(
+    table: &'t DeTable<'i>,
+) -> impl Iterator<Item = (&'t Spanned<DeString<'i>>, &'t Spanned<DeValue<'i>>)> {
+    let mut all: Vec<_> = table.iter().collect();
+    all.sort_by_key(|(key, _)| key.span().start);
+    all.into_iter()
+}
+
+fn element_of(number: usize) -> String {
+    format!("[[fog]] {}", number + 1)
+}
+
+/// Reads a file of fog, and adds what is in it to a scene. A file that is missing, is no TOML, or says something that cannot be is an error.
+pub(super) fn read(sink: &Sink, file: &Path, scene: &mut SceneFile) {
+    let text = read_file(file).map_err(|e| e.reason);
+    let text = text.and_then(|bytes| String::from_utf8(bytes).map_err(|e| format!("is not UTF-8 text: {e}")));
+    let reader = |text| Reader { file, text, sink };
+    let text = match text {
+        Ok(text) => text,
+        Err(reason) => return reader("").error(None, "", reason),
+    };
+    let reader = reader(&text);
+    let fog = reader.all();
+    let mut add = |element: &str, emitter: Result<Emitter, String>| match emitter {
+        Ok(emitter) => scene.emitters.push(emitter),
+        Err(reason) => reader.error(None, element, reason),
+    };
     if let Some(sky) = fog.sky {
-        let error = |reason: String| SceneError { element: "[sky]".to_owned(), ..whole(reason) };
-        scene.emitters.push(read_sky(file, &sky).map_err(error)?);
+        add("[sky]", read_sky(file, &sky));
     }
     if let Some(sun) = fog.sun {
-        let error = |reason: &str| SceneError { element: "[sun]".to_owned(), ..whole(reason.to_owned()) };
-        let direction = normalized(sun.from.map(|c| -c)).ok_or_else(|| error("\"from\" has no direction"))?;
-        let irradiance = sun.irradiance.spectrum();
-        if !irradiance.is_valid() {
-            return Err(error("\"irradiance\" is negative or not finite"));
-        }
-        scene.emitters.push(Emitter::Directional { direction, irradiance });
+        add("[sun]", read_sun(&sun));
     }
     let around = scene.shapes.iter().map(|shape| bounds_of(&shape.geometry)).fold(Bounds::EMPTY, Bounds::union);
-    for (number, one) in fog.fog.iter().enumerate() {
-        let error = |reason: String| SceneError {
-            line: Some(line_of(one.span().start)),
-            element: format!("[[fog]] {}", number + 1),
-            ..whole(reason)
+    for (line, number, one) in &fog.fog {
+        let (matter, container) = match medium(file, one, around) {
+            Ok(found) => found,
+            Err(reason) => {
+                reader.error(*line, &element_of(*number), reason);
+                continue;
+            }
         };
-        let (matter, container) = medium(file, one.get_ref(), around).map_err(error)?;
         let places = vec![Place { container, holes: Vec::new() }];
         scene.media.push(MediumDescription {
             id: format!("fog {}", number + 1),
@@ -173,14 +267,13 @@ pub(super) fn read(file: &Path, scene: &mut SceneFile) -> Result<(), SceneError>
             heat: None,
         });
     }
-    Ok(())
 }
 
 /// Hands out the bytes of all files that a file of fog names, as far as they can be read.
 pub(super) fn each_file(file: &Path, each: &mut impl FnMut(&[u8])) {
     let text = read_file(file).ok().and_then(|bytes| String::from_utf8(bytes).ok()).unwrap_or_default();
-    let Ok(fog) = toml::from_str::<FogFile>(&text) else { return };
-    let named = fog.fog.iter().filter_map(|fog| fog.get_ref().file.as_ref());
+    let fog = Reader { file, text: &text, sink: &Sink::default() }.all();
+    let named = fog.fog.iter().filter_map(|(_, _, fog)| fog.file.as_ref());
     for name in named.chain(fog.sky.iter().filter_map(|sky| sky.image.as_ref())) {
         if let Ok(bytes) = read_file(&beside(file, name)) {
             each(&bytes);
@@ -190,6 +283,18 @@ pub(super) fn each_file(file: &Path, each: &mut impl FnMut(&[u8])) {
 
 fn beside(file: &Path, name: &str) -> std::path::PathBuf {
     file.parent().unwrap_or("".as_ref()).join(name)
+}
+
+fn read_sun(sun: &Sun) -> Result<Emitter, String> {
+    let (Some(from), Some(irradiance)) = (sun.from, sun.irradiance) else {
+        return Err("needs \"from\" and \"irradiance\"".to_owned());
+    };
+    let direction = normalized(from.map(|c| -c)).ok_or("\"from\" has no direction")?;
+    let irradiance = irradiance.spectrum();
+    if !irradiance.is_valid() {
+        return Err("\"irradiance\" is negative or not finite".to_owned());
+    }
+    Ok(Emitter::Directional { direction, irradiance })
 }
 
 fn read_sky(file: &Path, sky: &Sky) -> Result<Emitter, String> {
@@ -308,9 +413,12 @@ fn check_names(fog: &Fog) -> Result<(), String> {
         ("rotate", fog.rotate.is_some(), &[Grid]),
         ("translate", fog.translate.is_some(), &[Grid]),
     ];
-    match given.iter().find(|(_, is_given, forms)| *is_given && !forms.contains(&fog.shape)) {
-        Some((name, ..)) => Err(format!("\"{name}\" has no meaning for this shape")),
-        None => Ok(()),
+    let is_idle = |(_, is_given, forms): &&(&str, bool, &[Form])| *is_given && !forms.contains(&fog.shape);
+    let idle: Vec<_> = given.iter().filter(is_idle).map(|(name, ..)| format!("\"{name}\"")).collect();
+    match idle[..] {
+        [] => Ok(()),
+        [ref name] => Err(format!("{name} has no meaning for this shape")),
+        _ => Err(format!("{} have no meaning for this shape", idle.join(", "))),
     }
 }
 

@@ -150,8 +150,14 @@ fn document(source: &Source<'_>, bytes: &[u8]) -> Result<(Document, Option<Vec<u
     } else {
         (bytes.into(), None)
     };
-    let mut root: json::Root =
-        json::deserialize::from_slice(&text).map_err(|e| source.error("", format!("is not usable glTF: {e}")))?;
+    let unusable = |e| source.error("", format!("is not usable glTF: {e}"));
+    let mut value: json::Value = json::deserialize::from_slice(&text).map_err(unusable)?;
+    // A scene may be empty, which the crate has not heard of.
+    let scenes = value.get_mut("scenes").and_then(json::Value::as_array_mut).into_iter().flatten();
+    for scene in scenes.filter_map(json::Value::as_object_mut) {
+        scene.entry("nodes").or_insert_with(|| json::Value::Array(Vec::new()));
+    }
+    let mut root: json::Root = json::deserialize::from_value(value).map_err(unusable)?;
     let mut missing = Ok(());
     for name in core::mem::take(&mut root.extensions_required) {
         let is_material = name.starts_with("KHR_materials_");
@@ -207,9 +213,9 @@ fn read_scene(source: &Source<'_>, bytes: &[u8], options: &ReadOptions) -> Resul
         emitters: emitters.collect::<Result<Vec<_>, _>>()?,
     };
     match fog_file(source.file, options) {
-        Some(file) => fog::read(&file, &mut scene_file)?,
+        Some(file) => fog::read(source.sink, &file, &mut scene_file),
         // A fog file that was there, or is called otherwise, is missed here.
-        None if scene_file.media.is_empty() => {
+        None if scene_file.media.is_empty() && !options.is_without_fog => {
             let name = beside(source.file);
             let name = name.file_name().unwrap_or_default().display();
             let reason =
@@ -231,9 +237,12 @@ fn read_scene(source: &Source<'_>, bytes: &[u8], options: &ReadOptions) -> Resul
     Ok(scene_file)
 }
 
-/// The file of fog that was named, or the one that lies beside the scene. One that cannot be asked for counts as there, and is an error
+/// The file of fog that was named, or the one that lies beside the scene, if any is wanted. One that cannot be asked for counts as there, and is an error
 /// when it is read.
 fn fog_file(file: &Path, options: &ReadOptions) -> Option<PathBuf> {
+    if options.is_without_fog {
+        return None;
+    }
     options.fog.clone().or_else(|| Some(beside(file)).filter(|file| file.try_exists().unwrap_or(true)))
 }
 
