@@ -9,6 +9,12 @@ use crate::transform::{Transform, to_vec3};
 /// Pieces that a segment of a spline becomes.
 const PIECES: u32 = 8;
 
+/// Sides of a cross-section, at least and at most. Fewer: where light grazes a side, it is dark; more: memory.
+const SIDES: [u32; 2] = [12, 48];
+
+/// Triangles of a file from which on cross-sections have fewer sides: hair is seen from afar.
+const MANY_TRIANGLES: usize = 1 << 21;
+
 /// Most points of all curves: beyond, their triangles fill the memory.
 const MOST_POINTS: usize = 1 << 17;
 
@@ -16,10 +22,7 @@ const MOST_POINTS: usize = 1 << 17;
 type Point = ([f64; 3], f64);
 
 pub(super) fn read(file: &Path, bytes: &[u8], is_smooth: bool, to_world: &Transform) -> Result<Mesh, DataError> {
-    let (mut mesh, mut curve, mut count) = (Mesh::default(), Vec::new(), 0);
-    // Of all curves of the file: the second texture coordinate runs along all of them.
-    let mut segments = 0;
-    let bead = Mesh::bead();
+    let (mut curves, mut curve, mut count) = (Vec::new(), Vec::new(), 0);
     let lines = bytes.split(|b| *b == b'\n').chain([b"".as_slice()]);
     for (number, line) in lines.enumerate() {
         let fail = |reason: String| DataError::new(file, format!("line {}", number + 1), reason);
@@ -31,10 +34,7 @@ pub(super) fn read(file: &Path, bytes: &[u8], is_smooth: bool, to_world: &Transf
             if count > MOST_POINTS {
                 return Err(fail(format!("curves have more than {MOST_POINTS} points")));
             }
-            let mut along = if is_smooth { Mesh::tube(&points) } else { straight(&points, &bead) };
-            along.texcoords.iter_mut().for_each(|uv| uv.y = segments as f32 + uv.y * own as f32);
-            mesh.append(&along);
-            segments += own;
+            curves.push((points, own));
             curve.clear();
             continue;
         }
@@ -46,19 +46,32 @@ pub(super) fn read(file: &Path, bytes: &[u8], is_smooth: bool, to_world: &Transf
             _ => return Err(fail("four numbers are due: a point and a positive radius".to_owned())),
         }
     }
+    // Two triangles for a side, and where straight pieces meet a ball of as many as the square.
+    let of_each = MANY_TRIANGLES / count.max(1);
+    let sides = if is_smooth { of_each / 2 } else { of_each.isqrt() };
+    let sides = (sides as u32).clamp(SIDES[0], SIDES[1]);
+    let bead = Mesh::bead(sides);
+    // Of all curves of the file: the second texture coordinate runs along all of them.
+    let (mut mesh, mut segments) = (Mesh::default(), 0);
+    for (points, own) in &curves {
+        let mut along = if is_smooth { Mesh::tube(points, sides) } else { straight(points, &bead, sides) };
+        along.texcoords.iter_mut().for_each(|uv| uv.y = segments as f32 + uv.y * *own as f32);
+        mesh.append(&along);
+        segments += own;
+    }
     mesh.texcoords.iter_mut().for_each(|uv| uv.y /= segments.max(1) as f32);
     Ok(mesh)
 }
 
 /// Straight pieces, round where they meet and end.
-fn straight(points: &[Point], bead: &Mesh) -> Mesh {
+fn straight(points: &[Point], bead: &Mesh, sides: u32) -> Mesh {
     let mut mesh = Mesh::default();
     if points.len() < 2 {
         return mesh;
     }
     let last = (points.len() - 1) as f32;
     for (k, pair) in points.windows(2).enumerate() {
-        let mut piece = Mesh::tube(pair);
+        let mut piece = Mesh::tube(pair, sides);
         piece.texcoords.iter_mut().for_each(|uv| uv.y = (k as f32 + uv.y) / last);
         mesh.append(&piece);
     }
@@ -101,6 +114,21 @@ fn spline(points: &[Point]) -> Result<Vec<Point>, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Curves that become wider face back, and a file of few has many sides.
+    #[test]
+    fn normals_are_those_of_cones_and_few_curves_are_round() {
+        let read = |text: &str| read(Path::new("x.txt"), text.as_bytes(), true, &Transform::IDENTITY).unwrap();
+        let few = read("0 0 0 0.1\n1 0 0 0.3\n2 0 0 0.5\n3 0 0 0.7\n");
+        assert_eq!(few.vertices.len(), 9 * 49);
+        let due = -0.2 / 1.04_f32.sqrt();
+        assert!(few.normals.iter().all(|normal| (normal.x - due).abs() < 1e-5 && normal.is_normalized()));
+        let many = read(&"0 0 0 0.1\n1 0 0 0.1\n2 0 0 0.1\n3 0 0 0.1\n\n".repeat(13_000));
+        assert_eq!(many.vertices.len(), 13_000 * 9 * 13);
+        // A curve that stands still has normals all the same.
+        let still = read("0 0 0 0.1\n0 0 0 0.2\n0 0 0 0.3\n0 0 0 0.4\n");
+        assert!(still.normals.iter().all(|normal| normal.is_normalized()));
+    }
 
     /// Around an axis along x Mitsuba counts from y by way of z; along, over all curves of a file.
     #[test]

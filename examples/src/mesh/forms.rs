@@ -10,9 +10,6 @@ use crate::transform::{Transform, cross, dot, normalized, to_vec3};
 /// Sides of a circle.
 const AROUND: u32 = 96;
 
-/// Sides of a curve's cross-section.
-const AROUND_CURVE: u32 = 12;
-
 impl Mesh {
     /// The unit disc at z = 0, normal +z; with as much area as the disc.
     #[must_use]
@@ -66,34 +63,36 @@ impl Mesh {
         mesh.mirrored(to_world)
     }
 
-    /// The unit sphere of a few triangles, with as much area.
-    pub(super) fn bead() -> Self {
-        let down = AROUND_CURVE / 2;
+    /// The unit sphere with so many sides around and half as many down, and as much area.
+    pub(super) fn bead(sides: u32) -> Self {
+        let down = sides / 2;
         let at = |i: u32, j: u32| {
-            let (theta, phi) = (PI * f64::from(j) / f64::from(down), 2.0 * PI * f64::from(i) / f64::from(AROUND_CURVE));
+            let (theta, phi) = (PI * f64::from(j) / f64::from(down), 2.0 * PI * f64::from(i) / f64::from(sides));
             [theta.sin() * phi.cos(), theta.sin() * phi.sin(), theta.cos()]
         };
-        let mut mesh = Self::patch(AROUND_CURVE, down, &Transform::IDENTITY, |i, j| (at(i, j), at(i, j), [0.0; 2]));
+        let mut mesh = Self::patch(sides, down, &Transform::IDENTITY, |i, j| (at(i, j), at(i, j), [0.0; 2]));
         let area: f64 = 0.5 * mesh.triangles.iter().map(|t| twice_area(mesh.corners(*t))).sum::<f64>();
         let grown = (4.0 * PI / area).sqrt() as f32;
         mesh.vertices.iter_mut().for_each(|v| *v *= grown);
         mesh
     }
 
-    /// A tube along points with radii, with texture coordinates around and along; its cross-sections are as long around as circles, so it is as wide in the mean.
+    /// A tube of so many sides along points with radii, with texture coordinates around and along; its cross-sections are as long around as circles, so it is as wide
+    /// in the mean.
     #[must_use]
-    pub fn tube(points: &[([f64; 3], f64)]) -> Self {
+    pub fn tube(points: &[([f64; 3], f64)], sides: u32) -> Self {
         let mut mesh = Self::default();
         if points.len() < 2 {
             return mesh;
         }
         let (mut side, mut turn) = ([1.0, 0.0, 0.0], 0.0);
-        let half = PI / f64::from(AROUND_CURVE);
+        let half = PI / f64::from(sides);
         let wide = half / half.sin();
         for (k, (point, radius)) in points.iter().enumerate() {
             let before = points[k.saturating_sub(1)];
             let after = points[(k + 1).min(points.len() - 1)];
             let along = [0, 1, 2].map(|i| after.0[i] - before.0[i]);
+            let taper = (after.1 - before.1) / dot(along, along).sqrt();
             let along = normalized(along).unwrap_or([0.0, 0.0, 1.0]);
             // The cross-section is carried along, so that it does not twist.
             let across = [0, 1, 2].map(|i| side[i] - along[i] * dot(side, along));
@@ -104,18 +103,20 @@ impl Mesh {
             // rings are near each other, or the texture would run backwards between them.
             let found = from_guide(along, side);
             turn = found + if k == 0 { 0.0 } else { f64::round(turn - found) };
-            for i in 0..=AROUND_CURVE {
-                let (sin, cos) = (2.0 * PI * f64::from(i) / f64::from(AROUND_CURVE)).sin_cos();
+            for i in 0..=sides {
+                let (sin, cos) = (2.0 * PI * f64::from(i) / f64::from(sides)).sin_cos();
                 let out = [0, 1, 2].map(|axis| side[axis] * cos + up[axis] * sin);
                 mesh.vertices.push(to_vec3([0, 1, 2].map(|axis| point[axis] + out[axis] * radius * wide)));
-                mesh.normals.push(to_vec3(out));
+                // Leaning back where it becomes wider.
+                let normal = normalized([0, 1, 2].map(|axis| out[axis] - taper * along[axis]));
+                mesh.normals.push(to_vec3(normal.unwrap_or(out)));
                 let v = k as f32 / (points.len() - 1) as f32;
-                mesh.texcoords.push(Vec2::new(turn as f32 + i as f32 / AROUND_CURVE as f32, v));
+                mesh.texcoords.push(Vec2::new(turn as f32 + i as f32 / sides as f32, v));
             }
         }
         for k in 0..points.len() as u32 - 1 {
-            for i in 0..AROUND_CURVE {
-                let (low, high) = (k * (AROUND_CURVE + 1) + i, (k + 1) * (AROUND_CURVE + 1) + i);
+            for i in 0..sides {
+                let (low, high) = (k * (sides + 1) + i, (k + 1) * (sides + 1) + i);
                 mesh.triangles.extend([[low, low + 1, high + 1], [low, high + 1, high]]);
             }
         }
