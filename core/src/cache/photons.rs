@@ -322,8 +322,10 @@ impl<'s> PhotonGrid<'s> {
         for number in 0..cells.len() {
             let scatters = |number: usize| cells.get(number).is_some_and(|cell| cell.scatters);
             let beside = |stride| scatters(number.wrapping_sub(stride)) || scatters(number + stride);
-            let is_lit = scatters(number) || [1, nx, nx * ny].into_iter().any(beside);
-            cells[number].is_lit = is_lit;
+            let is_lit = scatters(number) || beside(1) || beside(nx) || beside(nx * ny);
+            if let Some(cell) = cells.get_mut(number) {
+                cell.is_lit = is_lit;
+            }
         }
     }
 

@@ -69,9 +69,6 @@ pub fn march(ray: &Ray, medium: &(impl Medium + ?Sized), marching: Marching, u: 
             Part::Changing { from, until, densest } => {
                 let (mut at, mut last) = (from, None);
                 marching.samples((from, until, densest), |t, weight| {
-                    if !to_end && draw.found.is_some() {
-                        return;
-                    }
                     let (extinction, gradient) = medium.extinction_with_gradient(ray.at(t));
                     let here = (extinction[0], gradient);
                     draw.advance(at, t - at, last.unwrap_or(here), here);
@@ -79,6 +76,7 @@ pub fn march(ray: &Ray, medium: &(impl Medium + ?Sized), marching: Marching, u: 
                     whole.value += extinction * weight;
                     whole.gradient_joint += gradient * weight;
                     moment += gradient * (weight * t);
+                    !to_end && draw.found.is_some()
                 });
                 if let Some(last) = last {
                     draw.advance(at, until - at, last, last);

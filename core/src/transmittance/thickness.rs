@@ -32,7 +32,8 @@ const MAX_JOINED: usize = 256;
 /// How finely a part of a ray where extinction changes is sampled.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Steps {
-    /// Steps of at most this length (m), and of at most half a free path where fog is densest: `N = max(1, ⌈part / length⌉)`.
+    /// Steps of at most this length (m), and of at most half a free path where fog is densest: `N = max(1, ⌈part · max(1/length, 2 σₜ)⌉)`, `σₜ` (m⁻¹) a
+    /// bound of extinction.
     Length(f32),
     /// This many steps per part, whatever its length: the choice for finite differences. A part ends
     /// after 256 segments of the medium at the latest.
@@ -82,9 +83,10 @@ impl Marching {
         Self { offset, ..self }
     }
 
-    /// Calls `visit(distance, weight)` for the samples of a part in which extinction (m⁻¹) is `densest` at most; the weights sum to its length.
+    /// Calls `visit(distance, weight)` for the samples of a part in which extinction (m⁻¹) is `densest` at most, until it says that nothing is
+    /// seen any more; the weights sum to its length.
     #[inline]
-    pub(super) fn samples(&self, (from, until, densest): (f32, f32, f32), mut visit: impl FnMut(f32, f32)) {
+    pub(super) fn samples(&self, (from, until, densest): (f32, f32, f32), mut visit: impl FnMut(f32, f32) -> bool) {
         let extent = until - from;
         let count = match self.steps {
             // A length that is not positive gives NaN or ∞; both end at the maximum or at 1.
@@ -98,8 +100,8 @@ impl Marching {
                 for (node, weight) in GAUSS_8 {
                     visit(from + (j as f32 + node) * step, weight * step);
                 }
-            } else {
-                visit(from + (j as f32 + self.offset) * step, step);
+            } else if visit(from + (j as f32 + self.offset) * step, step) {
+                return;
             }
         }
     }
@@ -235,7 +237,7 @@ pub(super) fn endless(extinction: Spectrum) -> Spectrum {
 ///
 /// Exact on constant segments; elsewhere unbiased for a random offset. A ray that never leaves
 /// the medium is infinitely thick in the channels where its last segment may be anything but vacuum;
-/// where bounds have no last segment (noise), the sum ends once every channel exceeds
+/// where extinction changes, and where bounds have no last segment (noise), the sum ends once every channel exceeds
 /// [`OPAQUE`](crate::math::float::OPAQUE), or after 65536 segments.
 /// 0 for a ray without length. Source: Jarosz et al. 2008, Eq. 16 and 21.
 ///
@@ -253,7 +255,10 @@ pub fn optical_thickness(ray: &Ray, medium: &(impl Medium + ?Sized), marching: M
         match part {
             Part::Constant { extinction, from, until } => value += extinction * (until - from),
             Part::Changing { from, until, densest } => {
-                marching.samples((from, until, densest), |t, weight| value += medium.extinction(ray.at(t)) * weight);
+                marching.samples((from, until, densest), |t, weight| {
+                    value += medium.extinction(ray.at(t)) * weight;
+                    is_opaque(value)
+                });
             }
             Part::Endless { extinction, .. } => value += endless(extinction),
         }
@@ -300,6 +305,7 @@ pub fn optical_thickness_with_gradients(ray: &Ray, medium: &(impl Medium + ?Size
                 let slope = gradient * weight;
                 sum.gradient_joint += slope;
                 sum.gradient_fixed += slope * (1.0 - t * inverse);
+                is_opaque(sum.value)
             }),
             Part::Endless { extinction, .. } => sum.value += endless(extinction),
         }
