@@ -330,9 +330,12 @@ impl<'s> PhotonGrid<'s> {
     }
 
     /// How many times the counted paths it takes until `enough` photons have passed nearly every cell that walks may end in.
-    /// Infinite if none has been passed by some.
+    /// Infinite if none of them has been passed by some, and 0 if there are none.
     fn times(&self, enough: u32) -> f64 {
         let scattering = self.cells.as_slice().iter().filter(|cell| cell.scatters);
+        if scattering.clone().next().is_none() {
+            return 0.0;
+        }
         let lit = || scattering.clone().map(|cell| cell.paths).filter(|&paths| paths >= LEAST_PATHS);
         let (all, most) = lit().fold((0_u32, 0), |(all, most), paths| (all + 1, most.max(paths)));
         let most_dark = (1.0 - KNOWN) * f64::from(all);
@@ -663,6 +666,10 @@ mod tests {
         assert_eq!([0, 1, 2, 3, 4, 5].map(|i| at(i).is_some()), [true, true, true, false, false, false]);
         let (light, _) = at(0).unwrap();
         assert!((light.radiance[0] - 1.0).abs() < 0.1, "{light:?}");
+        // Where nothing scatters at all, a first look is enough.
+        let dark = Homogeneous::new(Spectrum::ONE, Spectrum::ZERO, Phase::ISOTROPIC).unwrap();
+        let clear = World { medium: &dark, scene: &crate::host::Empty, lights: (&sky).into() };
+        assert_eq!(PhotonGrid::lit(&clear, &effort, &path::Settings::default(), 1).paths(), FIRST);
     }
 
     /// A finer level goes on where a coarser one has ended; with another division or other random numbers all begins anew.

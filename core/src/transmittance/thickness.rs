@@ -62,7 +62,7 @@ pub struct Marching {
 }
 
 impl Marching {
-    /// Steps of `length` (m) with a random `offset` in [0, 1).
+    /// Steps of at most `length` (m), see [`Steps::Length`], with a random `offset` in [0, 1).
     #[inline]
     #[must_use]
     pub const fn new(length: f32, offset: f32) -> Self {
@@ -331,8 +331,8 @@ pub(super) fn face_term(direction: Vec3, normal: Vec3, jump: Spectrum) -> Gradie
 
 /// Transmittance along `ray`: `e^{−τ}`, 0 beyond [`OPAQUE`](crate::math::float::OPAQUE).
 ///
-/// By Jensen's inequality slightly too high in the mean where extinction changes within a step;
-/// ratio tracking is unbiased.
+/// By Jensen's inequality slightly too high in the mean where extinction changes within a step: in the first order of the step by up to
+/// `sinh(x/2)/(x/2) − 1` for `x` free paths in it (Euler–Maclaurin), 1 % with [`Steps::Length`] (decision 89). Ratio tracking is unbiased.
 ///
 /// ```
 /// # use fogbow::{host::Empty, math::{Ray, Vec3}, spectrum::Spectrum};

@@ -84,3 +84,26 @@ fn extent([low, high]: [[f64; 3]; 2]) -> String {
 fn counted(count: usize, what: &str) -> String {
     format!("{count} {what}{}", if count == 1 { "" } else { "s" })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cli::output;
+    use crate::scene_file::ReadOptions;
+    use crate::transform::{Transform, dot};
+
+    /// What is told may be given back, and the camera stands and looks as before.
+    #[test]
+    fn the_camera_that_is_told_is_that_of_the_scene() {
+        let file = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/room.glb");
+        let scene = SceneFile::read_with(file.as_ref(), &ReadOptions::default()).into_scene().unwrap();
+        let told = camera(&scene).unwrap();
+        let option = told.split('"').nth(1).unwrap();
+        let [origin, target] = output::camera(option).unwrap();
+        let again = Transform::look_at(origin, target, [0.0, 1.0, 0.0]).unwrap();
+        let (due, found) = (&scene.sensor.to_world, &again);
+        assert!((0..3).all(|i| (due.column(3)[i] - found.column(3)[i]).abs() < 1e-5), "{told}");
+        let [a, b] = [due, found].map(|to_world| normalized(to_world.column(2)).unwrap());
+        assert!(dot(a, b) > 1.0 - 1e-9, "{told}");
+    }
+}
