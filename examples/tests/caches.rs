@@ -170,7 +170,7 @@ fn caches_of_anything_else_are_refused() {
 fn records_are_drawn_by_kind_and_in_section() {
     let folder = Folder::new("records");
     let size = ["--size", "32x24"];
-    let rough: Vec<&str> = ROUGH[2..12].to_vec();
+    let rough = [&ROUGH[2..12], &["--error", "0.2"]].concat();
     let draw = |more: &[&str]| {
         let output = folder.run(&[&["records", SCENE, "-o", "r.png"], &size[..], &rough, more].concat());
         assert_eq!(output.status.code(), Some(0), "{more:?}: {}", said(&output));

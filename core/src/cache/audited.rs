@@ -52,7 +52,7 @@ fn repaired(
     let world = World { medium: &ball, scene: &crate::host::Empty, lights: lights.into() };
     let bounds = Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE };
     let camera = |at: [f32; 2]| Ray::new(3.0 * Vec3::Z, Vec3::new(at[0] - 0.5, at[1] - 0.5, -2.0).normalize());
-    let settings = Settings::for_outline(&Outline::of(&world, bounds), 0.02).with_walks(1024);
+    let settings = Settings::for_outline(&Outline::of(&world, bounds), 0.02).with_walks(512);
     let settings = change(Settings { rays: 4096, ..settings });
     let fill = |caches: RadianceCaches<'static>| {
         let mut filling = caches.fill(Asked::View { ray: camera, pixel: 0.02 });

@@ -31,7 +31,7 @@ fn killed(folder: &Folder, options: &[&str], signal: &str, checkpoints: u32) -> 
             "render",
             SCENE,
             "--size",
-            "32x32",
+            "24x24",
             "-q",
             "-o",
             "a.pfm",
@@ -70,7 +70,7 @@ fn a_render_killed_in_the_middle_is_gone_on_with_to_the_same_bits() {
     for options in METHODS {
         let whole = Folder::new("care-whole");
         let render = |folder: &Folder, more: &[&str]| {
-            let all = [&["render", SCENE, "--size", "32x32", "-q", "-o", "a.pfm"], options, more].concat();
+            let all = [&["render", SCENE, "--size", "24x24", "-q", "-o", "a.pfm"], options, more].concat();
             let output = folder.run(&all);
             assert_eq!(output.status.code(), Some(0), "{}", said(&output));
             std::fs::read(folder.0.join("a.pfm")).unwrap()
@@ -92,7 +92,7 @@ fn a_render_killed_in_the_middle_is_gone_on_with_to_the_same_bits() {
 fn a_finished_checkpoint_takes_more_samples() {
     let folder = Folder::new("care-more");
     let render = |spp: &str, more: &[&str]| {
-        let all = [&["render", SCENE, "--size", "32x32", "--method", "path", "-q", "-o", "a.pfm", "--spp", spp], more]
+        let all = [&["render", SCENE, "--size", "24x24", "--method", "path", "-q", "-o", "a.pfm", "--spp", spp], more]
             .concat();
         let output = folder.run(&all);
         assert_eq!(output.status.code(), Some(0), "{}", said(&output));
@@ -113,10 +113,10 @@ fn checkpoints_of_other_renders_and_damaged_ones_are_refused() {
                 .concat();
         folder.run(&all)
     };
-    let done = render(&["--size", "32x32", "--spp", "4"]);
+    let done = render(&["--size", "24x24", "--spp", "4"]);
     assert_eq!(done.status.code(), Some(0), "{}", said(&done));
     for other in [["--size", "32x16"], ["--seed", "1"], ["--max-depth", "2"]] {
-        let size: &[&str] = if other[0] == "--size" { &[] } else { &["--size", "32x32"] };
+        let size: &[&str] = if other[0] == "--size" { &[] } else { &["--size", "24x24"] };
         let refused = render(&[size, &other[..], &["--spp", "4"]].concat());
         assert_eq!(refused.status.code(), Some(2), "{other:?}");
         assert!(
@@ -133,7 +133,7 @@ fn checkpoints_of_other_renders_and_damaged_ones_are_refused() {
         (b"PNG".to_vec(), "neither a checkpoint"),
     ] {
         std::fs::write(&file, &damaged).unwrap();
-        let refused = render(&["--size", "32x32", "--spp", "4"]);
+        let refused = render(&["--size", "24x24", "--spp", "4"]);
         assert_eq!(refused.status.code(), Some(2));
         assert!(said(&refused).contains(word), "{}", said(&refused));
         assert_eq!(std::fs::read(&file).unwrap(), damaged, "a refused file is left alone");
@@ -144,7 +144,7 @@ fn checkpoints_of_other_renders_and_damaged_ones_are_refused() {
 #[test]
 fn an_old_picture_survives_whatever_stops_the_next() {
     let old = Folder::new("care-old");
-    let made = old.run(&["render", SCENE, "--size", "32x32", "--method", "path", "--spp", "4", "-q", "-o", "a.pfm"]);
+    let made = old.run(&["render", SCENE, "--size", "24x24", "--method", "path", "--spp", "4", "-q", "-o", "a.pfm"]);
     assert_eq!(made.status.code(), Some(0), "{}", said(&made));
     let old_bytes = std::fs::read(old.0.join("a.pfm")).unwrap();
     let long: [&[&str]; 5] = [
@@ -160,7 +160,7 @@ fn an_old_picture_survives_whatever_stops_the_next() {
         for (signal, after) in [signals[number % 4], signals[(number + 2) % 4]] {
             let mut child = old
                 .fogbow()
-                .args(["render", SCENE, "--size", "32x32", "-q", "-o", "a.pfm"])
+                .args(["render", SCENE, "--size", "24x24", "-q", "-o", "a.pfm"])
                 .args(options)
                 .stderr(Stdio::null())
                 .spawn()

@@ -150,7 +150,7 @@ fn every_picture_from_caches_says_how_far_it_is_off() {
     let folder = Folder::new("cache-audit");
     std::fs::write(folder.0.join("scene.xml"), World::of(&[FOG, CONTAINER, WALLS, LAMP]).text()).unwrap();
     let render = |options: &[&str]| {
-        let walks = ["--paths", if options.contains(&"--extrapolation") { "1" } else { "128" }];
+        let walks = ["--paths", if options.contains(&"--extrapolation") { "1" } else { "64" }];
         let common = ["render", "scene.xml", "--method", "radiance-cache", "--spp", "1", "-o", "a.pfm"];
         let output = folder.run(&[&common[..], &walks, &["--stats", "s.json"], options].concat());
         assert_eq!(output.status.code(), Some(0), "{options:?}: {}", said(&output));
@@ -175,7 +175,7 @@ fn every_picture_from_caches_says_how_far_it_is_off() {
     let (_, again, same) = render(&["--threads", "3"]);
     assert!(again == audit && same == image);
     // So coarse that walls are wrong, and somewhere more than elsewhere: that is mended.
-    let coarse = ["--tolerance", "30", "--extrapolation", "constant", "--audit", "196608"];
+    let coarse = ["--tolerance", "30", "--extrapolation", "constant", "--audit", "98304"];
     let (told, ..) = render(&[&coarse[..], &["--aov", "-o", "a.exr"]].concat());
     assert!(told.contains("repaired: bias was ") && told.contains("; in places, most in columns "), "{told}");
     assert!(!told.contains("warning: "), "{told}");
@@ -213,7 +213,7 @@ fn caching_is_what_is_taken_unless_something_speaks_against_it() {
         let render = |more: &[&str]| {
             let common = ["render", "scene.xml", "--spp", "1", "--stats", "s.json", "-o", "a.pfm"];
             let is_cached = words[0] == cached && !more.contains(&"--method");
-            let quick: &[&str] = if is_cached { &["--paths", "16"] } else { &[] };
+            let quick: &[&str] = if is_cached { &["--paths", "16", "--error", "0.5"] } else { &[] };
             let options: Vec<&str> = if is_cached {
                 options.to_vec()
             } else {
