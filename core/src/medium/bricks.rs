@@ -16,6 +16,9 @@ pub const NODE: u32 = 16;
 /// Cells of a brick.
 const CELLS: usize = (BRICK * BRICK * BRICK) as usize;
 
+/// Cells along the edge of a node.
+const NODE_CELLS: u32 = NODE * BRICK;
+
 /// Slots of a node.
 const SLOTS: usize = (NODE * NODE * NODE) as usize;
 
@@ -25,8 +28,8 @@ const SLOTS: usize = (NODE * NODE * NODE) as usize;
 /// x fastest; `slots` 16³ for each node that is there, and `cells` 8³ for each brick, x fastest in both. An entry is the place of what
 /// it means in the next list, or [`Bricks::NOTHING`]: everything below it is zero. Several slots may share a brick.
 ///
-/// Memory and time go with what is filled. A brick takes 2 KiB, a node 16 KiB, and 32 KiB more for bounds that
-/// [`SparseGrid`](super::SparseGrid) has filled in.
+/// Memory and time go with what is filled. A brick takes 2 KiB, a node 16 KiB, and 49 KiB more for the [`NodeBounds`] that
+/// [`SparseGrid`](super::SparseGrid) fills in.
 ///
 /// ```
 /// # use fogbow::medium::Bricks;
@@ -47,6 +50,93 @@ pub struct Bricks<'a> {
     pub slots: &'a [u32],
     /// Densities, finite and not negative.
     pub cells: &'a [f32],
+}
+
+/// What walks and look-ups ask of the slots of a node: lent to a [`SparseGrid`](super::SparseGrid), which fills it in.
+///
+/// ```
+/// # use fogbow::medium::{Bricks, NodeBounds};
+/// let slots = [Bricks::NOTHING; 4096];
+/// // One for each node that is there.
+/// let bounds = vec![NodeBounds::EMPTY; slots.len() / NodeBounds::SLOTS];
+/// assert_eq!(bounds.len(), 1);
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct NodeBounds {
+    /// For each aligned cube of 1, 2, 4 and 8 slots along its edge, x fastest, a bit that says whether something is there: of a box of
+    /// thousands of cells they stay in a cache, where bounds do not.
+    filled: ([u64; SLOTS / 64], [u64; SLOTS / 512], u64, u64),
+    slots: [Slot; SLOTS],
+}
+
+/// Bounds of a slot beside its brick: who comes to the one wants the other next.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Slot {
+    bounds: MinMax,
+    brick: u32,
+}
+
+impl NodeBounds {
+    /// Slots of a node.
+    pub const SLOTS: usize = SLOTS;
+
+    /// A node with nothing in it.
+    pub const EMPTY: Self = Self {
+        filled: ([0; _], [0; _], 0, 0),
+        slots: [Slot { bounds: MinMax { min: 0.0, max: 0.0 }, brick: Bricks::NOTHING }; _],
+    };
+
+    /// Bounds of a slot, by its place in the node.
+    #[inline]
+    pub(super) fn bounds(&self, [x, y, z]: [u32; 3]) -> MinMax {
+        self.slots.get(place([x, y, z], 0)).map_or(MinMax::default(), |slot| slot.bounds)
+    }
+
+    fn set_bounds(&mut self, at: [u32; 3], bounds: MinMax) {
+        self.slots[place(at, 0)].bounds = bounds;
+        if bounds.max > 0.0 {
+            let set = |words: &mut [u64], level: u32| {
+                let bit = place(at, level);
+                words[bit / 64] |= 1 << (bit % 64);
+            };
+            let (slots, twos, fours, eights) = &mut self.filled;
+            set(slots, 0);
+            set(twos, 1);
+            set(core::slice::from_mut(fours), 2);
+            set(core::slice::from_mut(eights), 3);
+        }
+    }
+
+    /// Slots along the edge of the largest aligned cube around a slot in which nothing is; 0 where something is in the slot.
+    #[inline]
+    pub(super) fn gap(&self, at: [u32; 3]) -> u32 {
+        let is_filled = |words: &[u64], level: u32| {
+            let bit = place(at, level);
+            words.get(bit / 64).is_some_and(|word| (word >> (bit % 64)) & 1 == 1)
+        };
+        let (slots, twos, fours, eights) = &self.filled;
+        if is_filled(slots, 0) {
+            0
+        } else if is_filled(twos, 1) {
+            1
+        } else if is_filled(&[*fours], 2) {
+            2
+        } else if is_filled(&[*eights], 3) {
+            4
+        } else if *eights != 0 {
+            8
+        } else {
+            NODE
+        }
+    }
+}
+
+/// The place of a cube of `2^level` slots along its edge, among those of its node.
+#[inline(always)]
+fn place(slot: [u32; 3], level: u32) -> usize {
+    let [x, y, z] = slot.map(|c| ((c % NODE) >> level) as usize);
+    let along = (NODE >> level) as usize;
+    (z * along + y) * along + x
 }
 
 impl Bricks<'_> {
@@ -116,9 +206,7 @@ impl Bricks<'_> {
     /// The place in `slots` of a slot, in bricks from the corner; `None` where its node is not there.
     #[inline]
     pub(super) fn slot(&self, brick: [u32; 3]) -> Option<usize> {
-        let node = self.node(brick.map(|c| c / NODE))?;
-        let [x, y, z] = brick.map(|c| (c % NODE) as usize);
-        Some(node * SLOTS + (z * NODE as usize + y) * NODE as usize + x)
+        Some(self.node(brick.map(|c| c / NODE))? * SLOTS + place(brick, 0))
     }
 
     /// The cells of a brick, in bricks from the corner; `None` where there is nothing.
@@ -128,17 +216,22 @@ impl Bricks<'_> {
         self.cells.get(entry * CELLS..)?.first_chunk()
     }
 
-    /// Bounds of every slot, over the cells that interpolation inside it touches, one more on each side; and those of all. Where there is
-    /// nothing, the lower bound is no bound, but tells how far nothing reaches: see [`gap`].
+    /// Bounds of every slot, over the cells that interpolation inside it touches, one more on each side; and those of all.
     ///
     /// # Errors
     /// Where a slot that is not there would have some: in a node that is missing beside a cell that is not empty. Outermost cells
     /// that are not empty.
-    pub(super) fn fill(&self, bounds: &mut [MinMax]) -> Result<MinMax, MediumError> {
-        if bounds.len() != self.slots.len() {
+    pub(super) fn fill(&self, bounds: &mut [NodeBounds]) -> Result<MinMax, MediumError> {
+        let nodes = self.slots.as_chunks::<SLOTS>().0;
+        if bounds.len() != nodes.len() {
             return Err(MediumError::Blocks);
         }
-        bounds.fill(MinMax::default());
+        for (bounds, bricks) in bounds.iter_mut().zip(nodes) {
+            *bounds = NodeBounds::EMPTY;
+            for (slot, brick) in bounds.slots.iter_mut().zip(bricks) {
+                slot.brick = *brick;
+            }
+        }
         let along = nodes_along(self.size);
         let bricks = self.size.map(|n| n.div_ceil(BRICK));
         let mut whole = MinMax { min: 0.0, max: 0.0 };
@@ -152,13 +245,13 @@ impl Bricks<'_> {
                 if (0..3).any(|axis| brick[axis] >= bricks[axis]) {
                     continue;
                 }
-                match self.slot(brick) {
+                match self.node(node) {
                     Some(place) => {
                         self.check_border(brick)?;
                         let found = self.around(brick).padded();
                         whole = whole.union(&found);
-                        if let Some(bound) = bounds.get_mut(place) {
-                            *bound = found;
+                        if let Some(bounds) = bounds.get_mut(place) {
+                            bounds.set_bounds(slot, found);
                         }
                     }
                     // Only those along the faces of a missing node have neighbours that are there.
@@ -171,7 +264,6 @@ impl Bricks<'_> {
                 }
             }
         }
-        bounds.as_chunks_mut::<SLOTS>().0.iter_mut().for_each(mark_gaps);
         Ok(whole)
     }
 
@@ -217,36 +309,9 @@ impl Bricks<'_> {
     }
 }
 
-/// Tells slots that belong to larger gaps so: aligned cubes of 2, 4 or 8 slots along each edge, or all of the node.
-fn mark_gaps(bounds: &mut [MinMax; SLOTS]) {
-    for edge in [2, 4, 8, NODE] {
-        for corner in positions([NODE / edge; 3]) {
-            let place = |offset: [u32; 3]| {
-                let [x, y, z] = [0, 1, 2].map(|axis| (corner[axis] * edge + offset[axis]) as usize);
-                (z * NODE as usize + y) * NODE as usize + x
-            };
-            // A gap is made of eight gaps of half its edge, or of slots.
-            let parts = positions([2; 3]).map(|part| part.map(|c| c * edge / 2));
-            let is_half =
-                |part: [u32; 3]| bounds.get(place(part)).is_some_and(|b| b.max == 0.0 && gap(b) >= (edge / 2) as i32);
-            if parts.into_iter().all(is_half) {
-                for offset in positions([edge; 3]) {
-                    bounds[place(offset)] = MinMax { min: -(edge as f32), max: 0.0 };
-                }
-            }
-        }
-    }
-}
-
-/// Slots along the edge of the aligned cube around an empty slot in which nothing is.
-#[inline]
-pub(super) fn gap(bounds: &MinMax) -> i32 {
-    (-bounds.min as i32).max(1)
-}
-
 /// Nodes along each axis.
 fn nodes_along(size: [u32; 3]) -> [u32; 3] {
-    size.map(|n| n.div_ceil(NODE * BRICK))
+    size.map(|n| n.div_ceil(NODE_CELLS))
 }
 
 /// Place of a cell in its brick.
@@ -264,29 +329,31 @@ fn positions(size: [u32; 3]) -> impl Iterator<Item = [u32; 3]> {
 impl Bricks<'_> {
     /// The densities around a point, from `p·n + 1/2`.
     #[inline]
-    pub(super) fn corners(&self, shifted: Vec3) -> Corners {
+    pub(super) fn corners(&self, bounds: &[NodeBounds], shifted: Vec3) -> Corners {
         // Shifted by one, a truncation is the floor; the cell below is one less.
         let upper = shifted.to_array().map(|s| s as i32);
         let fraction =
             (shifted - Vec3::new(upper[0] as f32, upper[1] as f32, upper[2] as f32)).clamp(Vec3::ZERO, Vec3::ONE);
         let high = upper.map(|c| c as u32);
         let low = high.map(|c| c.wrapping_sub(1));
-        const NODE_CELLS: u32 = NODE * BRICK;
         // What is below zero wraps, and lies in no node with its neighbour.
         let is_one_node =
             (0..3).all(|axis| low[axis] / NODE_CELLS == high[axis] / NODE_CELLS && high[axis] < self.size[axis]);
-        let values = if is_one_node { self.in_node(low, high) } else { self.apart(low, high) };
+        let values = if is_one_node { self.in_node(bounds, low, high) } else { self.apart(low, high) };
         Corners { values, fraction }
     }
 
     /// The values of cells of one node, as nearly all are.
     #[inline]
-    fn in_node(&self, low: [u32; 3], high: [u32; 3]) -> [f32; 8] {
+    fn in_node(&self, bounds: &[NodeBounds], low: [u32; 3], high: [u32; 3]) -> [f32; 8] {
         const ROW: usize = BRICK as usize;
         const LAYER: usize = ROW * ROW;
-        let Some(first) = self.slot([low[0] / BRICK, low[1] / BRICK, low[2] / BRICK]) else { return [0.0; 8] };
+        let node = self.node(low.map(|c| c / NODE_CELLS)).and_then(|node| bounds.get(node));
+        let Some(node) = node else { return [0.0; 8] };
+        let first = place(low.map(|c| c / BRICK), 0);
         let start = |slot: usize| {
-            self.slots.get(slot).filter(|entry| **entry != Bricks::NOTHING).map(|entry| *entry as usize * CELLS)
+            let brick = node.slots.get(slot)?.brick;
+            (brick != Bricks::NOTHING).then_some(brick as usize * CELLS)
         };
         let at = |brick: Option<usize>, place: usize| {
             brick.and_then(|start| self.cells.get(start + place)).copied().unwrap_or(0.0)
@@ -298,9 +365,9 @@ impl Bricks<'_> {
             let Some(cells) = start(first).and_then(|start| self.cells.get(start..)?.first_chunk::<CELLS>()) else {
                 return [0.0; 8];
             };
-            let place = within(low);
+            let corner = within(low);
             let row = |from: usize| {
-                cells.get(place + from..).and_then(|row| row.first_chunk::<2>()).copied().unwrap_or_default()
+                cells.get(corner + from..).and_then(|row| row.first_chunk::<2>()).copied().unwrap_or_default()
             };
             let ([a, b], [c, d], [e, f], [g, h]) = (row(0), row(ROW), row(LAYER), row(LAYER + ROW));
             return [a, b, c, d, e, f, g, h];

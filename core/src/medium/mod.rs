@@ -48,7 +48,7 @@ pub mod sparse;
 mod sparse_bounds;
 
 pub use any::AnyMedium;
-pub use bricks::Bricks;
+pub use bricks::{Bricks, NodeBounds};
 pub use density::Density;
 pub use error::MediumError;
 pub use grid::DensityGrid;

@@ -2,7 +2,7 @@
 
 use glam::{Affine3, Mat3, Vec3};
 
-use super::bricks::Bricks;
+use super::bricks::{Bricks, NodeBounds};
 use super::density::{Corners, central_hessian};
 use super::joining::Joining;
 use super::majorant::{MinMax, Reach};
@@ -28,7 +28,7 @@ use crate::spectrum::{Gradient, Hessian, Spectrum};
 /// ```
 /// # use fogbow::host::{Medium, Properties};
 /// # use fogbow::math::{Affine3, Ray, Vec3};
-/// # use fogbow::medium::{Bricks, MinMax, SparseGrid};
+/// # use fogbow::medium::{Bricks, NodeBounds, SparseGrid};
 /// # use fogbow::spectrum::Spectrum;
 /// // 1000 cells along x, of which only those around the middle of the first eight are filled.
 /// let mut cells = [0.0; 512];
@@ -38,7 +38,7 @@ use crate::spectrum::{Gradient, Hessian, Spectrum};
 /// let mut nodes = [Bricks::NOTHING; 8];
 /// nodes[0] = 0;
 /// let bricks = Bricks { size: [1000, 9, 9], nodes: &nodes, slots: &slots, cells: &cells };
-/// let mut bounds = [MinMax::default(); 4096];
+/// let mut bounds = [NodeBounds::EMPTY];
 /// let smoke = Properties { scattering: Spectrum::ONE, ..Properties::VACUUM };
 /// let metres = Affine3::from_scale(Vec3::new(1000.0, 9.0, 9.0));
 /// let grid = SparseGrid::new(bricks, &smoke, metres, &mut bounds)?;
@@ -53,8 +53,8 @@ use crate::spectrum::{Gradient, Hessian, Spectrum};
 #[derive(Debug, Clone, Copy)]
 pub struct SparseGrid<'a> {
     pub(super) bricks: Bricks<'a>,
-    /// Like the slots of the bricks.
-    pub(super) bounds: &'a [MinMax],
+    /// Like the nodes of the bricks.
+    pub(super) bounds: &'a [NodeBounds],
     pub(super) whole: MinMax,
     /// From the world to `p·n`.
     pub(super) cells_from_world: Affine3,
@@ -70,18 +70,18 @@ pub struct SparseGrid<'a> {
 
 impl<'a> SparseGrid<'a> {
     /// `properties` are those where density is 1; their emission is not looked at. `local_to_world` places the unit cube, which is
-    /// the box of the bricks; `bounds`, as many as [`Bricks::slots`], is filled here.
+    /// the box of the bricks; `bounds`, one for each node that is there, is filled here.
     ///
     /// # Errors
     /// Whatever is not finite, not invertible, negative or of the wrong size; outermost cells that are not empty; a node that is not
     /// there beside a cell that is not empty.
     ///
     /// ```
-    /// # use fogbow::{host::Properties, math::Affine3, medium::{Bricks, MediumError, MinMax, SparseGrid}, spectrum::Spectrum};
+    /// # use fogbow::{host::Properties, math::Affine3, medium::{Bricks, MediumError, NodeBounds, SparseGrid}, spectrum::Spectrum};
     /// let mut slots = [Bricks::NOTHING; 4096];
     /// slots[0] = 0;
     /// let full = Bricks { size: [8; 3], nodes: &[0], slots: &slots, cells: &[1.0; 512] };
-    /// let (smoke, mut bounds) = (Properties { scattering: Spectrum::ONE, ..Properties::VACUUM }, [MinMax::default(); 4096]);
+    /// let (smoke, mut bounds) = (Properties { scattering: Spectrum::ONE, ..Properties::VACUUM }, [NodeBounds::EMPTY]);
     /// let refused = SparseGrid::new(full, &smoke, Affine3::IDENTITY, &mut bounds);
     /// assert_eq!(refused.map(|_| ()), Err(MediumError::Border));   // its outermost cells are filled
     /// let empty = Bricks { cells: &[0.0; 512], ..full };
@@ -91,7 +91,7 @@ impl<'a> SparseGrid<'a> {
         bricks: Bricks<'a>,
         properties: &Properties,
         local_to_world: Affine3,
-        bounds: &'a mut [MinMax],
+        bounds: &'a mut [NodeBounds],
     ) -> Result<Self, MediumError> {
         let Properties { absorption, scattering, phase, .. } = *properties;
         if !(absorption.is_valid() && scattering.is_valid()) {
@@ -153,7 +153,7 @@ impl<'a> SparseGrid<'a> {
         let shifted = self.shifted_from_world.transform_point3(point);
         let [x, y, z] = self.bricks.size.map(|n| n as f32 + 0.5);
         let is_inside = shifted.cmpge(Vec3::splat(0.5)).all() && shifted.cmple(Vec3::new(x, y, z)).all();
-        is_inside.then(|| self.bricks.corners(shifted))
+        is_inside.then(|| self.bricks.corners(self.bounds, shifted))
     }
 
     #[inline]
@@ -226,7 +226,7 @@ impl Medium for SparseGrid<'_> {
         }
         let centre = self.shifted_from_world.transform_point3(point);
         // Half a cell before the first, where a truncation would no longer be the floor, nothing is left.
-        let at = |offset: Vec3| self.bricks.corners((centre + offset).max(Vec3::ZERO)).value();
+        let at = |offset: Vec3| self.bricks.corners(self.bounds, (centre + offset).max(Vec3::ZERO)).value();
         central_hessian(&self.cells_from_world.matrix3, |offset| self.extinction * at(offset))
     }
 

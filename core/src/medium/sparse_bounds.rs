@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 use super::SparseGrid;
-use super::bricks::{BRICK, Bricks, NODE, gap};
+use super::bricks::{BRICK, Bricks, NODE, NodeBounds};
 use super::joining::{Found, Joining, Span};
 use super::majorant::MinMax;
 use super::region::LocalLine;
@@ -33,14 +33,15 @@ impl<'w> Walk<'w> {
 
     /// The next part in which the line has a length; `None` beyond the last.
     #[inline]
-    fn next(&mut self, table: &Bricks<'_>, bounds: &[MinMax]) -> Option<Span<MinMax>> {
+    fn next(&mut self, table: &Bricks<'_>, bounds: &[NodeBounds]) -> Option<Span<MinMax>> {
         let (origin, direction, inverse) =
             (self.line.origin.to_array(), self.line.direction.to_array(), self.line.inverse.to_array());
         while !self.is_over {
             let brick = self.at.map(|c| c as u32);
-            let (step, found) = match table.slot(brick).and_then(|slot| bounds.get(slot)) {
-                Some(bounds) if bounds.max > 0.0 => (1, *bounds),
-                Some(nothing) => (gap(nothing), MinMax::default()),
+            let node = table.node(brick.map(|c| c / NODE)).and_then(|node| bounds.get(node));
+            let (step, found) = match node.map(|node| (node, node.gap(brick))) {
+                Some((node, 0)) => (1, node.bounds(brick)),
+                Some((_, gap)) => (gap as i32, MinMax::default()),
                 None => (NODE as i32, MinMax::default()),
             };
             // What ends where: the first brick that is not in it any more, and the distance to the face between. Edges of gaps are

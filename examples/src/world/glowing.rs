@@ -2,7 +2,7 @@
 
 use fogbow::host::{Face, Gradients, MajorantSegment, Medium, Properties};
 use fogbow::math::{Ray, Vec3};
-use fogbow::medium::{AnyMedium, MediumError, MinMax, SparseGrid};
+use fogbow::medium::{AnyMedium, MediumError, NodeBounds, SparseGrid};
 use fogbow::phase::Phase;
 use fogbow::spectrum::{Gradient, Hessian, Spectrum};
 
@@ -18,9 +18,9 @@ pub(super) struct Glowing<'a> {
 }
 
 impl<'a> Glowing<'a> {
-    pub(super) fn new(medium: AnyMedium<'a>, heat: &'a Heat, blocks: &'a mut [MinMax]) -> Result<Self, MediumError> {
+    pub(super) fn new(medium: AnyMedium<'a>, heat: &'a Heat, nodes: &'a mut [NodeBounds]) -> Result<Self, MediumError> {
         let one = Properties { absorption: Spectrum::ONE, ..Properties::VACUUM };
-        let temperature = SparseGrid::new(heat.bricks.bricks(), &one, heat.to_world.to_affine(), blocks)?;
+        let temperature = SparseGrid::new(heat.bricks.bricks(), &one, heat.to_world.to_affine(), nodes)?;
         Ok(Self { medium, temperature, heat })
     }
 

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use fogbow::host::{Medium, Properties};
 use fogbow::math::Affine3;
 use fogbow::medium::{
-    AnyMedium, Density, DensityGrid, Homogeneous, MediumError, MinMax, Overlap, Placed, Region, SparseGrid,
+    AnyMedium, Density, DensityGrid, Homogeneous, MediumError, MinMax, NodeBounds, Overlap, Placed, Region, SparseGrid,
 };
 
 use fogbow::phase::Phase;
@@ -18,6 +18,7 @@ use super::rotated::{Padded, shows_border};
 use crate::error::SceneError;
 use crate::scene_file::{Container, Matter, MediumDescription, Place, SceneFile};
 use crate::transform::{Transform, to_vec3};
+use crate::vdb::BrickStorage;
 use crate::volume::Values;
 
 /// Tables a medium borrows.
@@ -25,10 +26,12 @@ use crate::volume::Values;
 pub(super) struct MediumTable {
     /// Bounds of density per block of the grid.
     blocks: Vec<MinMax>,
+    /// The same per node of a sparse grid.
+    nodes: Vec<NodeBounds>,
     /// The grid with its border repeated, where that shows.
     padded: Option<Padded>,
-    /// The same for a grid of temperatures.
-    heat: Vec<MinMax>,
+    /// Those of a grid of temperatures.
+    heat: Vec<NodeBounds>,
     /// For each place of the medium, its holes.
     holes: Vec<Vec<Region>>,
 }
@@ -36,6 +39,7 @@ pub(super) struct MediumTable {
 impl MediumTable {
     pub(super) fn bytes(&self) -> usize {
         size_of_val(&*self.blocks)
+            + size_of_val(&*self.nodes)
             + size_of_val(&*self.heat)
             + self.padded.as_ref().map_or(0, |padded| padded.volume.bytes())
     }
@@ -44,9 +48,7 @@ impl MediumTable {
 pub(super) fn tables(scene: &SceneFile) -> Vec<MediumTable> {
     let table = |medium: &MediumDescription| match &medium.matter {
         Matter::Homogeneous { .. } | Matter::Coloured { .. } => MediumTable::default(),
-        Matter::Sparse { bricks, .. } => {
-            MediumTable { blocks: vec![MinMax::default(); bricks.bricks().slots.len()], ..MediumTable::default() }
-        }
+        Matter::Sparse { bricks, .. } => MediumTable { nodes: nodes_of(bricks), ..MediumTable::default() },
         Matter::Grid { volume, to_world, .. } => {
             let padded = shows_border(volume, to_world, &medium.places)
                 .then(|| Padded::new(volume, to_world, &medium.places))
@@ -59,11 +61,16 @@ pub(super) fn tables(scene: &SceneFile) -> Vec<MediumTable> {
             }
         }
     };
-    let heated = |medium: &MediumDescription| {
-        let blocks = medium.heat.as_ref().map_or(0, |heat| heat.bricks.bricks().slots.len());
-        MediumTable { heat: vec![MinMax::default(); blocks], ..table(medium) }
+    let heated = |medium: &MediumDescription| MediumTable {
+        heat: medium.heat.as_ref().map_or(vec![], |heat| nodes_of(&heat.bricks)),
+        ..table(medium)
     };
     scene.media.iter().map(heated).collect()
+}
+
+/// Room for the bounds of a sparse grid.
+fn nodes_of(bricks: &BrickStorage) -> Vec<NodeBounds> {
+    vec![NodeBounds::EMPTY; bricks.bricks().slots.len() / NodeBounds::SLOTS]
 }
 
 /// The media of a scene, in the simplest form that holds them all: tracking is compiled for each.
@@ -158,7 +165,7 @@ impl<'a> Media<'a> {
         let mut media = Vec::new();
         for (description, table) in scene.media.iter().zip(tables) {
             let refused = |e: Refusal| fail(format!("<medium id=\"{}\">", description.id), e.to_string());
-            let MediumTable { blocks, padded, heat, .. } = table;
+            let MediumTable { blocks, nodes, padded, heat, .. } = table;
             let padded = padded.as_ref();
             let medium = match &description.matter {
                 Matter::Coloured { extinction, albedo, scale, phase } => {
@@ -166,7 +173,7 @@ impl<'a> Media<'a> {
                     Stuff::Coloured(coloured.ok_or_else(|| refused(MediumError::Coefficients.into()))?)
                 }
                 _ => {
-                    let medium = matter(description, padded, blocks).map_err(refused)?;
+                    let medium = matter(description, padded, (blocks, nodes)).map_err(refused)?;
                     match &description.heat {
                         Some(hot) => Stuff::Glowing(Glowing::new(medium, hot, heat).map_err(|e| refused(e.into()))?),
                         None => Stuff::Core(medium),
@@ -259,9 +266,9 @@ fn moved<'a, N>(place: &Placed<'_, AnyMedium<'_>>, holes: &'a [Region], medium: 
 type PlacedHoles<'a> = (Placed<'a, AnyMedium<'a>>, &'a [Region]);
 
 fn place<'a>(medium: &'a MediumDescription, table: &'a mut MediumTable) -> Result<Vec<PlacedHoles<'a>>, Refusal> {
-    let MediumTable { blocks, padded, holes, .. } = table;
+    let MediumTable { blocks, nodes, padded, holes, .. } = table;
     let padded = padded.as_ref();
-    let any = matter(medium, padded, blocks)?;
+    let any = matter(medium, padded, (blocks, nodes))?;
     for place in &medium.places {
         holes.push(place.holes.iter().map(region).collect::<Result<_, _>>()?);
     }
@@ -299,7 +306,7 @@ pub(super) fn straight(low: [f64; 3], high: [f64; 3]) -> Result<Region, MediumEr
 fn matter<'a>(
     medium: &'a MediumDescription,
     padded: Option<&'a Padded>,
-    blocks: &'a mut [MinMax],
+    (blocks, nodes): (&'a mut [MinMax], &'a mut [NodeBounds]),
 ) -> Result<AnyMedium<'a>, Refusal> {
     Ok(match &medium.matter {
         // Of the host: see `Media::contained`.
@@ -326,7 +333,7 @@ fn matter<'a>(
         Matter::Sparse { bricks, to_world, absorption, scattering, phase } => {
             let (absorption, scattering, phase) = (*absorption, *scattering, *phase);
             let properties = Properties { absorption, scattering, phase, emission: absorption * medium.glow };
-            AnyMedium::from(SparseGrid::new(bricks.bricks(), &properties, to_world.to_affine(), blocks)?)
+            AnyMedium::from(SparseGrid::new(bricks.bricks(), &properties, to_world.to_affine(), nodes)?)
         }
     })
 }

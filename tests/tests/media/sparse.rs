@@ -2,7 +2,7 @@
 
 use fogbow::host::Medium;
 use fogbow::math::{Affine3, Ray, Vec3};
-use fogbow::medium::{Bricks, MediumError, MinMax, SparseGrid};
+use fogbow::medium::{Bricks, MediumError, NodeBounds, SparseGrid};
 use fogbow::sampling::{Generator, uniform};
 
 use super::common::*;
@@ -17,7 +17,7 @@ struct Sparse {
     nodes: Vec<u32>,
     slots: Vec<u32>,
     cells: Vec<f32>,
-    bounds: Vec<MinMax>,
+    bounds: Vec<NodeBounds>,
 }
 
 impl Sparse {
@@ -43,7 +43,7 @@ impl Sparse {
             let [x, y, z] = at.map(|c| c as usize % 8);
             sparse.cells[sparse.slots[slot] as usize * CELLS + (z * 8 + y) * 8 + x] = value;
         }
-        sparse.bounds = vec![MinMax::default(); sparse.slots.len()];
+        sparse.bounds = vec![NodeBounds::EMPTY; sparse.slots.len() / NodeBounds::SLOTS];
         sparse
     }
 
@@ -204,7 +204,7 @@ fn tables_that_do_not_fit_are_refused() {
     assert_eq!(refused(&|s| s.cells.truncate(500)), Some(MediumError::Size));
     assert_eq!(refused(&|s| s.cells[3] = f32::NAN), Some(MediumError::Density));
     assert_eq!(refused(&|s| s.cells[3] = -1.0), Some(MediumError::Density));
-    assert_eq!(refused(&|s| s.bounds.truncate(5)), Some(MediumError::Blocks));
+    assert_eq!(refused(&|s| s.bounds.truncate(1)), Some(MediumError::Blocks));
     // Cell 127 lies beside the second node.
     assert_eq!(refused(&|s| s.nodes[1] = Bricks::NOTHING), Some(MediumError::Nodes));
     assert_eq!(refused(&|s| s.size = [140, 9, 5]), Some(MediumError::Border));
