@@ -72,6 +72,21 @@ fn projectors_and_spots_throw_their_textures_where_the_independent_renderer_has_
             assert_near(found, truth, 1e-4, &format!("{name} at {x}, {y}"));
         }
     }
+    // Without an angle, that of a lens of 50 mm, along the diagonal.
+    let lens = scene(
+        &format!("<emitter type=\"projector\"><float name=\"scale\" value=\"2\"/>{at}BOARD</emitter>"),
+        "irradiance",
+    );
+    for ([x, y], truth) in [
+        ([0.4, -0.3], [0.4731, 0.236_55, 0.118_275]),
+        ([-0.1, 0.3], [0.528_778, 0.264_389, 0.132_194]),
+        ([0.75, -0.4], even(0.054_837_1)),
+    ] {
+        assert_near(seen(&lens, [x, y, 1.0], Vec3::NEG_Z, 1), truth, 1e-4, &format!("by a lens at {x}, {y}"));
+    }
+    for [x, y] in [[-0.5, 0.3], [0.3, 0.64]] {
+        assert_eq!(seen(&lens, [x, y, 1.0], Vec3::NEG_Z, 1), [0.0; 3], "beyond its picture at {x}, {y}");
+    }
 }
 
 #[test]

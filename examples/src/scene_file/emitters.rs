@@ -132,7 +132,6 @@ fn projector(plugin: &Plugin<'_>) -> Result<Emitter, SceneError> {
         _ => [1.0; 2],
     };
     let mut camera = Sensor { width: width as u32, height: height as u32, ..Sensor::default() };
-    camera.fov_axis = FovAxis::X;
     sensor::field_of_view(plugin, &mut camera)?;
     let scale = plugin.number_in("scale", 1.0, 0.0..=1e12)? as f32;
     let tangent = (0.5 * camera.fov).to_radians().tan();

@@ -169,6 +169,7 @@ pub(super) fn field_of_view(plugin: &Plugin<'_>, sensor: &mut Sensor) -> Result<
         (None, length) => {
             // Of a film of 36 mm × 24 mm, whose diagonal the angle spans.
             plugin.skip(&["fov_axis"]);
+            sensor.fov_axis = FovAxis::Diagonal;
             if let Some((text, source)) = length {
                 let millimetres: Option<f64> = text.trim().trim_end_matches("mm").trim().parse().ok();
                 let millimetres = millimetres.filter(|f| *f > 1e-3 && *f < 1e6);
