@@ -47,9 +47,9 @@ const CELLS_PER_FREE_PATH: f32 = 2.0;
 /// See [`CELLS_PER_FREE_PATH`].
 const CELLS: [u32; 2] = [32, 64];
 
-/// Photons, and their flights, at most; in fog that hardly absorbs, photons fly for long. More: time; fewer: dark parts of a picture
-/// are too bright or too dark as a whole, for their cells see the same few photons.
-const PHOTONS: u32 = 1 << 20;
+/// Photons, and their flights, at most; in fog that hardly absorbs, photons fly for long, and where a cloud is small beside its bounds, most of them meet nothing. More:
+/// time; fewer: dark parts of a picture, or all of a cloud, are too bright or too dark as a whole, for their cells see the same few photons.
+const PHOTONS: u32 = 1 << 22;
 
 /// See [`PHOTONS`].
 const FLIGHTS: f64 = 3e7;
