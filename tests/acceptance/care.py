@@ -120,7 +120,8 @@ def stops():
                         (folder / file).write_bytes(old)
                         code, said = stopped(folder, command, number, stage, after, "-o", file)
                         kept = (folder / file).read_bytes()
-                        is_done = code == 0 and kept == due
+                        # SIGKILL may come between the renaming and the end.
+                        is_done = kept == due and (code == 0 or kept != old)
                         ended["finished" if is_done else "stopped"] += 1
                         where = f"{number.name} in {stage or f'{after:.1f} s'}: exit code {code}"
                         if kept != old and not is_done:
