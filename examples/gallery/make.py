@@ -22,7 +22,7 @@ PICTURES = [
     ("room", "examples/scenes/room.glb --size 1280x720 --spp 32 --exposure -1", "A room from a modelling program, with fog from the file beside it."),
     ("cloud", "examples/scenes/cloud.xml --size 1280x720", "A cloud of 96 free paths from a NanoVDB file, in the sun."),
     ("plume", "examples/scenes/room-plume.xml --size 1280x720", "A plume of smoke in a room."),
-    ("lantern", "examples/scenes/lantern.xml --size 1280x720", "A lantern's bars throw shadows into fog."),
+    ("lantern", "examples/scenes/lantern.xml --size 1280x720", "A lantern with holes throws shafts of light into fog."),
 ]
 
 
