@@ -121,7 +121,7 @@ def stops():
                         code, said = stopped(folder, command, number, stage, after, "-o", file)
                         kept = (folder / file).read_bytes()
                         # SIGKILL may come between the renaming and the end.
-                        is_done = kept == due and (code == 0 or kept != old)
+                        is_done = kept == due and (code == 0 or number == signal.SIGKILL and kept != old)
                         ended["finished" if is_done else "stopped"] += 1
                         where = f"{number.name} in {stage or f'{after:.1f} s'}: exit code {code}"
                         if kept != old and not is_done:

@@ -65,7 +65,7 @@ pub struct Bricks<'a> {
 pub struct NodeBounds {
     /// For each aligned cube of 1, 2, 4 and 8 slots along its edge, x fastest, a bit that says whether something is there: of a box of
     /// thousands of cells they stay in a cache, where bounds do not.
-    filled: ([u64; SLOTS / 64], [u64; SLOTS / 512], u64, u64),
+    filled: ([u64; SLOTS / 64], [u64; SLOTS / 512], [u64; 1], [u64; 1]),
     slots: [Slot; SLOTS],
 }
 
@@ -82,14 +82,14 @@ impl NodeBounds {
 
     /// A node with nothing in it.
     pub const EMPTY: Self = Self {
-        filled: ([0; _], [0; _], 0, 0),
+        filled: ([0; _], [0; _], [0], [0]),
         slots: [Slot { bounds: MinMax { min: 0.0, max: 0.0 }, brick: Bricks::NOTHING }; _],
     };
 
     /// Bounds of a slot, by its place in the node.
     #[inline]
-    pub(super) fn bounds(&self, [x, y, z]: [u32; 3]) -> MinMax {
-        self.slots.get(place([x, y, z], 0)).map_or(MinMax::default(), |slot| slot.bounds)
+    pub(super) fn bounds(&self, at: [u32; 3]) -> MinMax {
+        self.slots.get(place(at, 0)).map_or(MinMax::default(), |slot| slot.bounds)
     }
 
     fn set_bounds(&mut self, at: [u32; 3], bounds: MinMax) {
@@ -102,8 +102,8 @@ impl NodeBounds {
             let (slots, twos, fours, eights) = &mut self.filled;
             set(slots, 0);
             set(twos, 1);
-            set(core::slice::from_mut(fours), 2);
-            set(core::slice::from_mut(eights), 3);
+            set(fours, 2);
+            set(eights, 3);
         }
     }
 
@@ -119,11 +119,11 @@ impl NodeBounds {
             0
         } else if is_filled(twos, 1) {
             1
-        } else if is_filled(&[*fours], 2) {
+        } else if is_filled(fours, 2) {
             2
-        } else if is_filled(&[*eights], 3) {
+        } else if is_filled(eights, 3) {
             4
-        } else if *eights != 0 {
+        } else if *eights != [0] {
             8
         } else {
             NODE
