@@ -72,8 +72,10 @@ enum Round {
     Look,
     /// Estimates for new records.
     Make,
-    /// What records tell at some places, and estimates there.
-    Pilot,
+    /// What records tell at some places, and estimates there, by pilots from a job on.
+    Pilot {
+        from: u32,
+    },
     /// What eye rays read before records are estimated anew, and after.
     Glance {
         is_second: bool,
@@ -459,7 +461,7 @@ impl<'s, F> Filling<'s, F> {
                     _ => self.next_look(),
                 }
             }
-            Round::Pilot => self.shrink(),
+            Round::Pilot { from } => self.take_pilots(from),
             Round::Glance { is_second } => {
                 if is_second {
                     self.plan_more();
@@ -523,7 +525,7 @@ where
             Round::Weigh => self.weigh(job, world, output),
             Round::Look => self.look(job, output),
             Round::Make => self.make(job, world, output),
-            Round::Pilot => self.pilot(job, world, output),
+            Round::Pilot { from } => self.pilot(from + job, world, output),
             Round::Glance { .. } => self.glance(job, world, output),
             Round::Again { from } => self.again(from, job, world, output),
             Round::Smooth { from } => self.smooth(from, job, output),
@@ -567,7 +569,7 @@ where
             Round::Shoot | Round::Divide => "fill photons",
             Round::Done => "",
             Round::Weigh | Round::Glance { .. } => "fill glances",
-            Round::Look | Round::Make | Round::Pilot | Round::Again { .. } | Round::Smooth { .. } => {
+            Round::Look | Round::Make | Round::Pilot { .. } | Round::Again { .. } | Round::Smooth { .. } => {
                 match self.at_hand().map_or(Kind::Multiple, |(step, _)| step.kind) {
                     Kind::Single => "fill single",
                     Kind::Surface => "fill surface",

@@ -34,6 +34,10 @@ const PART: u64 = 10;
 /// Jobs at least and at most. Fewer do not tell what is wrong from chance; more take time and tell no more.
 const JOBS: [u32; 2] = [32, 1024];
 
+/// Jobs of a second round over those of the first, where that says that radii must shrink: a fill has a dozen such verdicts, and one by chance makes five times
+/// the records. More: time where the first was right; fewer: chance decides.
+pub(super) const AGAIN: u32 = 3;
+
 /// Jobs of the pilots of a kind, of which so many samples have been taken.
 pub(super) fn jobs_for(samples: u64) -> u32 {
     let jobs = samples / (PART * u64::from(SAMPLES * PLACES_PER_JOB));

@@ -2,9 +2,11 @@
 
 use super::{Filling, Round};
 use crate::cache::guide::{Guided, Looks};
+use crate::cache::kind::Step;
 use crate::cache::lookup::Basis;
 use crate::cache::memory::{Estimate, FilledRecords};
 use crate::cache::pilots::{self, Pilots};
+use crate::cache::settings::Effort;
 use crate::cache::slot::learnt_near;
 use crate::host::{Medium, Scene};
 use crate::math::Vec3;
@@ -21,7 +23,7 @@ impl<F> Filling<'_, F> {
             return false;
         }
         self.pilots = Pilots::default();
-        self.enter(Round::Pilot, pilots::jobs_for(self.computed * u64::from(effort.samples)));
+        self.enter(Round::Pilot { from: 0 }, pilots::jobs_for(self.computed * u64::from(effort.samples)));
         true
     }
 
@@ -81,16 +83,24 @@ impl<F> Filling<'_, F> {
         }
     }
 
-    /// Shrinks radii if pilots say so, and makes records where then none reach.
-    pub(super) fn shrink(&mut self) {
+    /// Shrinks radii if pilots say so, those of two rounds, and makes records where then none reach.
+    pub(super) fn take_pilots(&mut self, from: u32) {
         let found = self.at_hand().and_then(|at_hand| {
             let error = self.settings().error * self.settings().coarser[at_hand.0.kind as usize];
             Some((at_hand, self.pilots.factor(error)?))
         });
-        let Some(((step, effort), factor)) = found else {
+        let Some((at_hand, factor)) = found else {
             self.begin(self.step + 1);
             return;
         };
+        if from == 0 {
+            self.enter(Round::Pilot { from: self.jobs }, pilots::AGAIN * self.jobs);
+        } else {
+            self.shrink(at_hand, factor);
+        }
+    }
+
+    fn shrink(&mut self, (step, effort): (Step, Effort), factor: f32) {
         self.shrunk += 1;
         if let Some(effort) = self.caches.settings.effort_mut(step.kind) {
             *effort = effort.nearer(factor);
