@@ -11,7 +11,7 @@ use super::photons::{PhotonGrid, SHARPEST};
 use super::record::Facing;
 use super::store::SurfaceCache;
 use crate::host::{Hit, Medium, Properties, Rng, Scene};
-use crate::light::{FromPoint, Light, Question};
+use crate::light::{FromPoint, Light};
 use crate::math::{Frame, Ray, float};
 use crate::multiple_scatter::{self, Cones, Incoming, Start, Walk};
 use crate::path;
@@ -22,7 +22,7 @@ use crate::single_scatter::{self, Arrival, Contribution, Directional, Sums, Towa
 use crate::spectrum::{Gradient, Spectrum};
 use crate::surface::{Surface, lambert};
 use crate::transmittance::thickness::{Marching, Transmittance, transmittance, transmittance_with_gradients};
-use crate::world::{World, leave, nearest_surface, shadow_ray};
+use crate::world::{World, leave, nearest_surface};
 
 /// Least cosine in the gradient of an irradiance sample: at grazing directions `1/cos` has a
 /// variance without bound.
@@ -446,34 +446,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
         let origin = |to_light: Vec3| leave(point, hit.normal, to_light, hit.distance);
         let cosine = |to_light: Vec3, _| Spectrum::splat(if hit.faces(to_light) { hit.cosine(to_light) } else { 0.0 });
         let weight = FromPoint { sky: with_sky, ..FromPoint::all(point) };
-        self.connected((&weight, point), origin, cosine, random, rng)
-    }
-
-    /// Light of one of the lights, chosen by `weight`, times `value(to_light, pdf)` with the density (sr⁻¹) of that choice, 0 for
-    /// lights without extent. Transmittance is marched: what ratio tracking adds in noise would rule pictures whose other
-    /// parts have none.
-    pub(super) fn connected(
-        &self,
-        (weight, point): (&impl Question, Vec3),
-        origin: impl Fn(Vec3) -> Vec3,
-        value: impl Fn(Vec3, f32) -> Spectrum,
-        random: (f32, Vec2),
-        rng: &mut Generator,
-    ) -> Spectrum {
-        let World { medium, scene, lights } = self.world;
-        let Some(chosen) = lights.pick(weight, random.0) else { return Spectrum::ZERO };
-        let Some(sample) = lights[chosen.index].sample(point, random.1) else { return Spectrum::ZERO };
-        let value = value(sample.incident.to_light, sample.pdf * chosen.probability);
-        if value.is_black() {
-            return Spectrum::ZERO;
-        }
-        let shadow = shadow_ray(origin(sample.incident.to_light), &sample.source);
-        if scene.is_blocked(&shadow) {
-            return Spectrum::ZERO;
-        }
-        let marching = Marching { steps: self.walk.steps, offset: uniform(rng) };
-        let through = transmittance(&shadow, medium, marching);
-        value * sample.incident.irradiance * through / chosen.probability
+        self.connected((&weight, point), &origin, &cosine, random, rng)
     }
 
     /// Irradiance (W·m⁻²) that is not straight from the lights but from a sky, by one path.
@@ -511,7 +484,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
             }
             value * mis::power(pdf, hit.pdf(to_eye, to_light))
         };
-        self.connected((&FromPoint::all(point), point), origin, value, random, rng)
+        self.connected((&FromPoint::all(point), point), &origin, &value, random, rng)
     }
 
     /// Light of all lights but a sky, scattered once at `point` towards `to_eye`: one sample of each, or of those that stand

@@ -520,9 +520,8 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Gather<'_, M, S> {
             (x - libm::floorf(x)).min(1.0 - f32::EPSILON)
         });
         let (to, phase) = (FromPoint { point, except: Except::Steep, sky: !self.settings.indirect }, &properties.phase);
-        let value = |to_light: Vec3, _| phase.value(deflection(to_light, to_eye));
         let weight = scattered(to, to_eye, phase);
-        self.estimator.connected((&weight, point), |_| point, value, (choice, Vec2::new(u, v)), &mut self.rng)
+        self.estimator.scattered((&weight, point), to_eye, phase, (choice, Vec2::new(u, v)), &mut self.rng)
     }
 
     /// Single scattering along a segment of one light within its near field.

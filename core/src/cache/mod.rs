@@ -41,6 +41,7 @@
 //! | `aim` | where random walks start towards |
 //! | `guide` | [`Guide`], [`Guided`]: where light was found to come from; [`Looks`]: how samples are drawn |
 //! | `estimate` | [`Estimator`]: what records are made of |
+//! | `connect` | connections of points to lights, for records and for eye rays |
 //! | `evidence` | how far gradients can be believed; edges of the sky |
 //! | `eye` | [`places`] and [`radiance`] of eye rays |
 //! | `agreement` | whether gradients of records agree with the records around them |
@@ -58,6 +59,7 @@ mod audited;
 mod bias_map;
 pub mod bytes;
 mod caches;
+mod connect;
 mod estimate;
 mod evidence;
 mod extrapolate;
