@@ -12,9 +12,9 @@ TARGET=${CARGO_TARGET_DIR:-$own/../../target}/web
 linker=$(rustc --print sysroot)/lib/rustlib/$(rustc --print host-tuple)/bin/rust-lld
 # Functions are inlined where they are very short, those that ask for it where they are short: smaller by a quarter, and what must be inlined says so.
 # Loops are unrolled where that leaves no loop and little code, and not otherwise; none of them is worth the vectors that a compiler sees in it. Panics have no words,
-# nobody prints with `{:?}`, and the library's own sorting is the small one, whose results are the same.
+# nobody prints with `{:?}`, and the library's own sorting is the small one, whose results are the same. What the core has made of a generic function is not made again.
 flags="-Cllvm-args=-inlinehint-threshold=50 -Cllvm-args=-unroll-threshold=40 -Cllvm-args=-unroll-runtime=0 -Cllvm-args=-unroll-allow-partial=0 -Cno-vectorize-loops
-    -Zunstable-options -Cpanic=immediate-abort -Zfmt-debug=none -Zlocation-detail=none"
+    -Zshare-generics=y -Zunstable-options -Cpanic=immediate-abort -Zfmt-debug=none -Zlocation-detail=none"
 # module NAME OPT-LEVEL-OF-THE-CORE FLAGS
 module() {
     env RUSTC=/usr/bin/rustc RUSTDOC=/usr/bin/rustdoc RUSTC_BOOTSTRAP=1 CARGO_TARGET_WASM32_UNKNOWN_UNKNOWN_LINKER="$linker" RUSTFLAGS="$flags $3" \
