@@ -86,15 +86,18 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
         let World { scene, lights, .. } = self.world;
         let (light, sample) = (&lights[chosen.index], phase.sample(to_eye, uniform2(rng)));
         let ray = Ray::new(point, sample.to_light);
-        let Some(hit) = nearest_surface(&ray, scene).filter(|hit| hit.light == Some(chosen.index as u32)) else {
-            return Spectrum::ZERO;
+        let (radiance, distance, normal) = match nearest_surface(&ray, scene) {
+            None => (light.background(ray.direction), f32::INFINITY, Vec3::ZERO),
+            Some(hit) if hit.light == Some(chosen.index as u32) => {
+                (light.radiance(ray.at(hit.distance), hit.normal, -ray.direction), hit.distance, hit.normal)
+            }
+            Some(_) => return Spectrum::ZERO,
         };
-        let radiance = light.radiance(ray.at(hit.distance), hit.normal, -ray.direction);
         if radiance.is_black() {
             return Spectrum::ZERO;
         }
-        let share = mis::power(sample.pdf, light.pdf(point, ray.direction, hit.distance, hit.normal));
-        sample.weight * radiance * self.passed(&ray.with_length(hit.distance), rng) * (share / chosen.probability)
+        let share = mis::power(sample.pdf, light.pdf(point, ray.direction, distance, normal));
+        sample.weight * radiance * self.passed(&ray.with_length(distance), rng) * (share / chosen.probability)
     }
 
     /// What a ray lets pass.
@@ -108,8 +111,10 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
 mod tests {
     use super::*;
     use crate::host::{Empty, Hit};
-    use crate::light::{FromPoint, Light, QuadLight};
+    use crate::light::{EnvironmentMap, FromPoint, Light, QuadLight};
+    use crate::math::Mat3;
     use crate::phase::Lobe;
+    use crate::sampling::warp;
     use crate::surface::Surface;
     use crate::transmittance::thickness::Steps;
     use crate::{multiple_scatter, path};
@@ -162,6 +167,44 @@ mod tests {
         }
         let deviation = (found[1] - found[0] * found[0]).sqrt() / found[0];
         ([found[0], deviation], [sums[0], alone])
+    }
+
+    /// A sky with a bright corner, which is no sky that caches keep.
+    #[test]
+    fn a_bright_corner_of_the_sky_is_found_with_all_its_light() {
+        const SIZE: [usize; 2] = [16, 8];
+        let mut texels = [Spectrum::splat(0.2); SIZE[0] * SIZE[1]];
+        texels[2 * SIZE[0] + 5] = Spectrum::splat(40.0);
+        let (mut weights, mut column) = ([0.0; SIZE[0] * SIZE[1]], [0.0; SIZE[1]]);
+        let map = EnvironmentMap::new(SIZE[0], SIZE[1], &texels, &mut weights, &mut column, Mat3::IDENTITY).unwrap();
+        let lights = [Light::Environment(&map)];
+        assert!(!lights[0].is_sky());
+        let world = World { medium: &Empty, scene: &Empty, lights: (&lights).into() };
+        let walk = multiple_scatter::Settings::new(Steps::Length(0.1));
+        let (paths, light_samples) = (path::Settings::default(), 1);
+        let estimator = Estimator { world, surfaces: None, photons: None, walk, paths, light_samples, finest: 0.0 };
+        let (phase, question) = (Phase::from(Lobe::HenyeyGreenstein { g: 0.85 }), FromPoint::all(Vec3::ZERO));
+        const COUNT: u32 = 40_000;
+        for to_eye in [Vec3::X, Vec3::NEG_Y, Vec3::new(-0.3, -0.6, 0.7).normalize()] {
+            let mut sums = [[0.0; 2]; 2];
+            for i in 0..COUNT {
+                let mut rng = Generator::new(u64::from(i));
+                let random = (uniform(&mut rng), uniform2(&mut rng));
+                let found = estimator.scattered((&question, Vec3::ZERO), to_eye, &phase, random, &mut rng);
+                // Directions that know of neither.
+                let direction = warp::uniform_sphere(uniform2(&mut rng));
+                let blind = lights[0].background(direction) * phase.value(deflection(direction, to_eye))
+                    / warp::uniform_sphere_pdf();
+                for (sum, light) in sums.iter_mut().zip([found, blind]) {
+                    let light = f64::from(light[0]) / f64::from(COUNT);
+                    (sum[0], sum[1]) = (sum[0] + light, sum[1] + light * light * f64::from(COUNT));
+                }
+            }
+            let [[found, squares], [blind, blind_squares]] = sums;
+            let error = ((squares + blind_squares - found * found - blind * blind) / f64::from(COUNT)).sqrt();
+            assert!(error < 0.05 * blind, "{error} of {blind}");
+            assert!((found - blind).abs() < 4.0 * error, "{to_eye}: {found} instead of {blind}, ± {error}");
+        }
     }
 
     #[test]

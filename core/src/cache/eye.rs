@@ -547,7 +547,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Gather<'_, M, S> {
     /// The mean of some connections from a surface: of one where there is one light, for which of several was chosen is the most part of the noise.
     fn several(
         &mut self,
-        connection: impl Fn(&Estimator<'_, M, S>, (f32, Vec2), &mut Generator) -> Spectrum,
+        connection: &dyn Fn(&Estimator<'_, M, S>, (f32, Vec2), &mut Generator) -> Spectrum,
     ) -> Spectrum {
         let (choice, at) = self.surface;
         let count = if self.estimator.world.lights.len() > 1 { self.settings.connections.max(1) } else { 1 };
@@ -655,13 +655,14 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Sight for Gather<'_, M, S> {
                 lambert::value(reflectance)
             }
             _ => {
-                let light = self.several(|estimator, random, rng| estimator.reflected(point, hit, to_eye, random, rng));
+                let light =
+                    self.several(&|estimator, random, rng| estimator.reflected(point, hit, to_eye, random, rng));
                 self.seen.surface_direct += weight * light;
                 return;
             }
         };
         let with_sky = !self.settings.indirect;
-        let direct = self.several(|estimator, random, rng| estimator.direct_at(point, hit, with_sky, random, rng));
+        let direct = self.several(&|estimator, random, rng| estimator.direct_at(point, hit, with_sky, random, rng));
         self.seen.surface_direct += weight * value * direct;
         if !self.settings.indirect {
             return;
