@@ -494,6 +494,9 @@ fn gathered<M: Medium + ?Sized, S: Scene + ?Sized>(
     gather.seen
 }
 
+/// One connection from a surface, by such random numbers for the light and the point on it.
+type Connection<'c, M, S> = dyn Fn(&Estimator<'_, M, S>, (f32, Vec2), &mut Generator) -> Spectrum + 'c;
+
 struct Gather<'a, M: ?Sized, S: ?Sized> {
     estimator: &'a Estimator<'a, M, S>,
     caches: &'a Caches<'a>,
@@ -545,10 +548,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Gather<'_, M, S> {
     }
 
     /// The mean of some connections from a surface: of one where there is one light, for which of several was chosen is the most part of the noise.
-    fn several(
-        &mut self,
-        connection: &dyn Fn(&Estimator<'_, M, S>, (f32, Vec2), &mut Generator) -> Spectrum,
-    ) -> Spectrum {
+    fn several(&mut self, connection: &Connection<'_, M, S>) -> Spectrum {
         let (choice, at) = self.surface;
         let count = if self.estimator.world.lights.len() > 1 { self.settings.connections.max(1) } else { 1 };
         let mut sum = Spectrum::ZERO;
