@@ -4,7 +4,7 @@ use glam::{Vec2, Vec3};
 
 use super::estimate::Estimator;
 use crate::host::{Medium, Scene};
-use crate::light::Question;
+use crate::light::{Light, Question};
 use crate::math::Ray;
 use crate::phase::{Phase, deflection};
 use crate::sampling::discrete::Choice;
@@ -55,7 +55,8 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
         value * sample.incident.irradiance * self.passed(&shadow, rng) / chosen.probability
     }
 
-    /// Light of one of the lights, chosen by `weight`, scattered once at `point` towards `to_eye`.
+    /// Light of one of the lights, chosen by `weight`, scattered once at `point` towards `to_eye`: radiance for each unit of scattering (W·m⁻²·sr⁻¹), unbiased but for
+    /// marching.
     ///
     /// What a peaked phase function makes bright of a wide light may be a small part of it, which hardly any connection meets. So that looks for the light as well; what
     /// both find is weighed by the power heuristic (Veach 1997, § 9.2.4).
@@ -68,7 +69,12 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
         rng: &mut Generator,
     ) -> Spectrum {
         let Some(chosen) = self.world.lights.pick(weight, random.0) else { return Spectrum::ZERO };
-        let is_peaked = phase.mean_cosine().map(f32::abs).max_element() > PEAKED;
+        // No direction meets a light without extent.
+        let is_wide = !matches!(
+            self.world.lights[chosen.index],
+            Light::Sun(_) | Light::Point(_) | Light::Phong(_) | Light::Spot(_) | Light::Projector(_)
+        );
+        let is_peaked = is_wide && phase.mean_cosine().map(f32::abs).max_element() > PEAKED;
         let value = |to_light: Vec3, pdf: f32| {
             let deflection = deflection(to_light, to_eye);
             let value = phase.value(deflection);

@@ -2,7 +2,7 @@
 //!
 //! At some places that eye rays ask for, what the cache of a kind tells is compared with estimates of their own. The mean of the
 //! differences is what extrapolation gets wrong there, records mixed and carried as pictures have them; noise has no mean. Where it is certainly
-//! more than a part of the error that is asked for, all radii of the kind shrink, and what then has no record gets one.
+//! more than a part of the error that is asked for, and a second, larger round agrees, all radii of the kind shrink, and what then has no record gets one.
 //!
 //! Radii in free paths or of a tolerance cannot know this: how light bends within a free path depends on whether fog ends at a wall or in the open.
 
