@@ -107,6 +107,23 @@ fn emitted_light_falls_on_a_probe_as_connections_say() {
     });
 }
 
+/// Rays that pass the world by are lost.
+#[test]
+fn light_from_afar_comes_to_the_bounds_from_outside() {
+    let bounds = Bounds { min: Vec3::new(-4.0, 0.0, 1.0), max: Vec3::new(4.0, 1.0, 3.0) };
+    let mut rng = Generator::new(3);
+    for light in [Light::Constant(COLOUR), Light::Sun(Sun::new(Vec3::new(0.3, 0.9, -0.2), COLOUR).unwrap())] {
+        let mut sum = Spectrum::ZERO;
+        for _ in 0..2000 {
+            let emission = light.emit(&bounds, uniform2(&mut rng), uniform2(&mut rng)).unwrap();
+            let (near, far) = bounds.intersect(&emission.ray).expect("a ray that meets nothing");
+            assert!(near > 0.0 && far >= near, "{emission:?}");
+            sum += emission.power * (1.0 / 2000.0);
+        }
+        assert!((sum[1] / light.power(&bounds)[1] - 1.0).abs() < 0.02, "{sum:?}");
+    }
+}
+
 #[test]
 fn directions_leave_as_their_densities_say() {
     let axis = Vec3::new(0.6, 0.0, -0.8);

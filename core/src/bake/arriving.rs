@@ -8,16 +8,17 @@ use crate::cache::{Basis, Kind, RadianceCaches, Reader, VolumeCache};
 use crate::host::{Medium, Scene};
 use crate::light::{Light, Lights};
 use crate::math::Ray;
-use crate::math::float::{PI, sqrt};
+use crate::math::float::{PI, floor, sqrt};
 use crate::path;
 use crate::phase::Phase;
-use crate::sampling::{Generator, uniform2, warp};
+use crate::sampling::{Generator, uniform, uniform2, warp};
 use crate::single_scatter::lattice;
 use crate::spectrum::Spectrum;
 use crate::world::World;
 
-/// Points of every light with extent that a pass connects to. More: less noise in half shadows, for more shadow rays.
-const CONNECTIONS: u32 = 4;
+/// Points of every light with extent that a pass connects to, spread evenly: next to a lamp, which fills half of what a probe sees, there is as much light as in
+/// a thousand probes elsewhere, and photons serve all until the grid as a whole is good. More: shadow rays for less and less noise; fewer: bakes wait for such probes.
+const CONNECTIONS: u32 = 16;
 
 /// Lights without extent, all connected to: one connection is as good as many.
 fn is_even(lights: &Lights<'_>) -> bool {
@@ -32,6 +33,8 @@ pub(super) struct Sampler<'a, 'c> {
     pub(super) caches: Option<&'a RadianceCaches<'c>>,
     /// Whether photons bring all that was scattered before, and light of a sky.
     pub(super) has_photons: bool,
+    /// Directions in which light is looked for.
+    pub(super) directions: u32,
 }
 
 /// The phase function of a probe: that of the medium there, or the usual one beside it.
@@ -73,8 +76,12 @@ impl Sampler<'_, '_> {
         let mut connect = |lights: Lights<'_>, rng: &mut Generator| {
             let connections = if is_even(&lights) { 1 } else { CONNECTIONS };
             let (share, world) = (1.0 / connections as f32, World { lights, ..*world });
-            for _ in 0..connections {
-                path::arriving(&world, point, rng, |to_light, light| add(to_light, light * share));
+            let (first, shift) = (uniform(rng), uniform2(rng));
+            for j in 0..connections {
+                // Which light goes by another sequence than where on it.
+                let chosen = first + 0.754_877_7 * j as f32;
+                let random = (chosen - floor(chosen), lattice(j, connections, shift));
+                path::arriving(&world, point, random, rng, |to_light, light| add(to_light, light * share));
             }
         };
         if due.lights {
@@ -87,7 +94,7 @@ impl Sampler<'_, '_> {
         if paths.max_scatterings == 1 || !(due.surfaces || due.medium) {
             return;
         }
-        let count = self.settings.directions;
+        let count = self.directions;
         let weight = 4.0 * PI / count as f32;
         let shift = uniform2(rng);
         for j in 0..count {

@@ -683,17 +683,17 @@ mod tests {
         let mut cells = PhotonGrid::lit(&world, &effort(2_000), &walk, 1);
         cells.finish(&effort(2_000), 1);
         assert_eq!(cells.paths(), 2_000);
-        cells.prepare(&effort(100_000), 1).unwrap();
+        cells.prepare(&effort(400_000), 1).unwrap();
         assert_eq!((cells.paths(), cells.is_made()), (2_000, false));
-        cells.light(&world, (&effort(100_000), &walk, 1));
-        assert_eq!(cells.paths(), 100_000);
-        let counted = f64::from(cells.counted) / 100_000.0;
+        cells.light(&world, (&effort(400_000), &walk, 1));
+        assert_eq!(cells.paths(), 400_000);
+        let counted = f64::from(cells.counted) / 400_000.0;
         assert!((counted - COUNTED).abs() < 0.01, "{counted}");
         let (light, _) = cells.scattered(Vec3::splat(0.1), Vec3::Z, &ball.properties(Vec3::ZERO)).unwrap();
         assert!((light.radiance[0] - 1.0).abs() < 0.05, "{light:?}");
-        for (other, seed) in [(PhotonEffort { cells: 6, ..effort(200_000) }, 1), (effort(200_000), 2), (effort(10), 1)]
+        for (other, seed) in [(PhotonEffort { cells: 6, ..effort(800_000) }, 1), (effort(800_000), 2), (effort(10), 1)]
         {
-            cells.finish(&effort(100_000), 1);
+            cells.finish(&effort(400_000), 1);
             cells.prepare(&other, seed).unwrap();
             assert_eq!(cells.paths(), 0);
             cells.light(&world, (&effort(1), &walk, 1));

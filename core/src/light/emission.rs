@@ -1,10 +1,10 @@
 //! Light as it leaves: rays with the power they stand for.
 
-use glam::{Vec2, Vec3};
+use glam::{Vec2, Vec3, Vec3Swizzles};
 
 use super::Light;
 use super::geometry::spot;
-use crate::math::{Bounds, Frame, Ray, float, float::PI};
+use crate::math::{Bounds, Frame, Ray, float::PI};
 use crate::sampling::warp;
 use crate::spectrum::Spectrum;
 
@@ -16,7 +16,7 @@ pub struct Emission {
     pub ray: Ray,
     /// Normal of the light's surface there; `None` for lights without a surface.
     pub normal: Option<Vec3>,
-    /// Power (W) it stands for: flux over density. Its mean over rays is [`Light::power`].
+    /// Power (W) it stands for: flux over density. Its mean over rays is [`Light::power`]; of an environment map that is not even, about.
     pub power: Spectrum,
 }
 
@@ -32,19 +32,32 @@ impl Emission {
         Self { ray: Ray::new(position, direction), normal: None, power }
     }
 
-    /// Through the disc across the ball around `bounds`, where the light enters that ball's cylinder.
-    #[inline]
+    /// Through the faces of `bounds` that the light comes to, each as often as it is seen from there.
     fn from_afar(to_light: Vec3, irradiance: Spectrum, bounds: &Bounds, u: Vec2) -> Option<Self> {
-        let radius = 0.5 * bounds.size().length();
-        if !(radius > 0.0 && radius.is_finite()) {
+        let size = bounds.size();
+        let seen = faces(size) * to_light.abs();
+        let area = seen.element_sum();
+        if !(area > 0.0 && area.is_finite()) {
             return None;
         }
-        let (sin, cos) = float::sin_cos(2.0 * PI * u.y);
-        let across = Vec3::new(cos, sin, 0.0) * (radius * float::sqrt(u.x));
-        let origin = bounds.centre() + to_light * radius + Frame::around(to_light).to_world(across);
-        let power = irradiance * (PI * radius * radius);
-        Some(Self { ray: Ray::new(origin, -to_light), normal: None, power })
+        let on_face = |at: f32, area: f32| Vec3::new(0.5, (at / area).min(1.0) - 0.5, u.y - 0.5);
+        let at = u.x * area;
+        let place = if at < seen.x {
+            on_face(at, seen.x)
+        } else if at < seen.x + seen.y {
+            on_face(at - seen.x, seen.y).zxy()
+        } else {
+            on_face(at - seen.x - seen.y, seen.z).yzx()
+        };
+        // From beyond the face, in which a surface may lie.
+        let origin = bounds.centre() + place * size.copysign(to_light) + to_light * size.max_element();
+        Some(Self { ray: Ray::new(origin, -to_light), normal: None, power: irradiance * area })
     }
+}
+
+/// Areas (m²) of the faces of a box across each axis.
+pub(super) fn faces(size: Vec3) -> Vec3 {
+    Vec3::new(size.y * size.z, size.z * size.x, size.x * size.y)
 }
 
 #[inline]
@@ -64,11 +77,10 @@ impl Light<'_> {
     /// | projector | directions by the picture |
     /// | picture | points by the picture, directions as the cosine |
     /// | quad, sphere, mesh | uniform over the area, directions as the cosine |
-    /// | sun | uniform over the disc across the ball around `bounds` |
+    /// | sun | uniform over `bounds`, as they are seen from the sun |
     /// | constant, environment | directions as [`Light::sample`], then as the sun |
     ///
-    /// Lights at infinity shine through the ball around `bounds` only: these should hold all surfaces and
-    /// media, as in [`Light::power`].
+    /// Lights at infinity shine through `bounds` only: these should hold all surfaces and media, as in [`Light::power`].
     ///
     /// ```
     /// # use fogbow::{light::{Light, PointLight}, math::*, spectrum::Spectrum};

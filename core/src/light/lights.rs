@@ -226,24 +226,26 @@ impl<'a> Lights<'a> {
         runs.chain(self.has_tree().then_some(others))
     }
 
-    /// Chooses a light in proportion to its [power](Light::power).
+    /// Chooses a light in proportion to its [power](Light::power); in a tree, that of suns as if the bounds were a cube.
     pub(crate) fn emitting(&self, bounds: &Bounds, u: f32) -> Option<Choice> {
         if !self.has_tree() {
             let lights = self.all.iter().map(|light| (light.power(bounds).mean(), ()));
             return discrete::choose(lights, u).map(|((), choice)| choice);
         }
-        let disc = crate::math::float::PI * 0.25 * bounds.size().length_squared();
-        let of_kind = |kind: &Kind| if matches!(kind, Kind::Sun | Kind::Sky) { disc } else { 1.0 };
-        let weighted = Kind::ALL.iter().zip(self.roots).filter(|(_, root)| *root != NONE);
-        let weighted = weighted.map(|(kind, root)| (self.node(root).power * of_kind(kind), root));
-        let (mut node, Choice { mut probability, mut remainder, .. }) = discrete::choose(weighted, u)?;
+        // As the bounds are seen from a direction, in the mean.
+        let seen = 0.5 * super::emission::faces(bounds.size()).element_sum();
+        let of_kind = |kind: &Kind| if matches!(kind, Kind::Sun | Kind::Sky) { seen } else { 1.0 };
+        let roots = Kind::ALL.iter().zip(self.roots).filter(|(_, root)| *root != NONE);
+        let mut nodes: heapless::Vec<(f32, u32), KINDS> =
+            roots.map(|(kind, root)| (self.node(root).power * of_kind(kind), root)).collect();
+        let (mut probability, mut remainder) = (1.0, u);
         loop {
-            let children = match self.node(node).leaf() {
-                Some(index) => return Some(Choice { index, probability, remainder }),
-                None => self.node(node).children(),
-            };
-            let (child, choice) = discrete::choose(children.map(|child| (self.node(child).power, child)), remainder)?;
-            (node, remainder, probability) = (child, choice.remainder, probability * choice.probability);
+            let (node, choice) = discrete::choose(nodes.iter().copied(), remainder)?;
+            (remainder, probability) = (choice.remainder, probability * choice.probability);
+            if let Some(index) = self.node(node).leaf() {
+                return Some(Choice { index, probability, remainder });
+            }
+            nodes = self.node(node).children().into_iter().map(|child| (self.node(child).power, child)).collect();
         }
     }
 

@@ -535,19 +535,20 @@ impl Light<'_> {
         }
     }
 
-    /// Radiant power (W) emitted into a scene within `bounds`; distant lights shine through its
-    /// bounding sphere.
+    /// Radiant power (W) emitted into a scene within `bounds`, which is all that lights at infinity shine through. Environment maps count as if they were even.
     ///
     /// ```
     /// # use fogbow::{light::{Light, Sun}, math::{Bounds, Vec3, float::PI}, spectrum::Spectrum};
-    /// let bounds = Bounds { min: Vec3::ZERO, max: Vec3::ONE };   // its sphere has the radius √3/2
+    /// let bounds = Bounds { min: Vec3::ZERO, max: Vec3::new(2.0, 1.0, 1.0) };
     /// let sun = Light::Sun(Sun::new(Vec3::Y, Spectrum::splat(1000.0)).unwrap());
-    /// assert!((sun.power(&bounds)[0] - 1000.0 * PI * 0.75).abs() < 1e-2);
+    /// assert_eq!(sun.power(&bounds)[0], 2000.0);
+    /// let sky = Light::Constant(Spectrum::ONE);
+    /// assert!((sky.power(&bounds)[0] - 10.0 * PI).abs() < 1e-5);   // π of each square metre outside
     /// ```
     #[must_use]
     pub fn power(&self, bounds: &Bounds) -> Spectrum {
         use crate::math::float::PI;
-        let disc = PI * 0.25 * bounds.size().length_squared();
+        let faces = emission::faces(bounds.size());
         match self {
             Self::Point(light) => light.intensity * (4.0 * PI),
             Self::Phong(light) => light.power(),
@@ -557,9 +558,9 @@ impl Light<'_> {
             Self::Mesh(light) => light.radiance * (PI * light.area()),
             Self::Projector(light) => light.power(),
             Self::Picture(light) => light.mean_radiance() * (PI * light.area()),
-            Self::Sun(light) => light.irradiance * disc,
-            Self::Constant(radiance) => *radiance * (4.0 * PI * disc),
-            Self::Environment(map) => map.mean_radiance() * (4.0 * PI * disc),
+            Self::Sun(light) => light.irradiance * faces.dot(light.to_light.abs()),
+            Self::Constant(radiance) => *radiance * (2.0 * PI * faces.element_sum()),
+            Self::Environment(map) => map.mean_radiance() * (2.0 * PI * faces.element_sum()),
         }
     }
 }

@@ -157,6 +157,8 @@ pub struct SpotLight {
     pub intensity: Spectrum,
     /// Cosine a little beyond the cut-off, so that rounding cannot hide a point that is still lit.
     outer_cosine: f32,
+    /// Power per intensity (sr): a quadrature, which every photon would do again.
+    solid_angle: f32,
 }
 
 impl SpotLight {
@@ -171,7 +173,11 @@ impl SpotLight {
             return Err(LightError::Cone);
         }
         let outer_cosine = libm::cosf((cutoff + 1e-3).min(PI)) - 1e-6;
-        Ok(Self { position, axis, beam, cutoff: cutoff.min(PI), intensity, outer_cosine })
+        let cutoff = cutoff.min(PI);
+        let full = 1.0 - libm::cosf(beam);
+        let border = quadrature::integrate(beam, cutoff, |a| spot(libm::cosf(a), beam, cutoff) * libm::sinf(a));
+        let solid_angle = 2.0 * PI * (full + border);
+        Ok(Self { position, axis, beam, cutoff, intensity, outer_cosine, solid_angle })
     }
 
     /// Half angle within which intensity is full (rad).
@@ -206,11 +212,7 @@ impl SpotLight {
     /// Radiant power (W): `2π I ∫ f(γ) sin γ dγ`.
     #[must_use]
     pub fn power(&self) -> Spectrum {
-        let full = 1.0 - libm::cosf(self.beam);
-        let border = quadrature::integrate(self.beam, self.cutoff, |a| {
-            spot(libm::cosf(a), self.beam, self.cutoff) * libm::sinf(a)
-        });
-        self.intensity * (2.0 * PI * (full + border))
+        self.intensity * self.solid_angle
     }
 
     /// The light as a [`Source`].

@@ -61,7 +61,7 @@ pub struct LightNode {
     pub(super) radius2: f32,
     /// Sum of the greatest radiant intensities (W/sr), or at infinity of irradiances (W·m⁻²), mean of the channels.
     pub(super) strength: f32,
-    /// Radiant power (W, mean of the channels); at infinity over the cross section of the world (W·m⁻²).
+    /// Radiant power (W, mean of the channels); at infinity over the mean cross section of the world, as if that were a cube (W·m⁻²).
     pub(super) power: f32,
     /// Around it (unit) light leaves, …
     pub(super) axis: Vec3,
@@ -122,8 +122,9 @@ impl LightNode {
     fn of(index: usize, light: &Light<'_>) -> Self {
         // Rounding must not hide what is lit.
         const SLACK: f32 = 2e-3;
-        // A cross section of 1 m².
-        let unit = Bounds { min: Vec3::ZERO, max: Vec3::X * float::sqrt(4.0 / PI) };
+        // √(2/3) m: a cross section of 1 m², in the mean over directions.
+        const SIDE: f32 = 0.816_496_6;
+        let unit = Bounds { min: Vec3::ZERO, max: Vec3::splat(SIDE) };
         let bounds = light.bounds();
         let (axis, spread) = match light {
             Light::Phong(light) => (light.axis, 0.5 * PI + SLACK),

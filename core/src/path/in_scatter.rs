@@ -51,14 +51,14 @@ fn connected<M: Medium + ?Sized, S: Scene + ?Sized>(
 }
 
 /// What the lights alone send to `point`: calls `visit(to_light, irradiance across the light)` (W·m⁻²) for a connection to each, or to one
-/// of them where there are more than a few. The sums over the calls are unbiased.
+/// of them where there are more than a few. `random` chooses among these and on the light; the sums over the calls are unbiased.
 pub(crate) fn arriving<M: Medium + ?Sized, S: Scene + ?Sized>(
     world: &World<'_, M, S>,
     point: Vec3,
+    random: (f32, Vec2),
     rng: &mut Generator,
     mut visit: impl FnMut(Vec3, Spectrum),
 ) {
-    let random = (uniform(rng), uniform2(rng));
     let mut connect = |lights| {
         let direction = Cell::new(Vec3::ZERO);
         let noted = |to_light: Vec3| {
