@@ -110,3 +110,50 @@ impl<F> Filling<'_, F> {
         self.next_batch();
     }
 }
+
+#[cfg(all(test, feature = "alloc"))]
+mod tests {
+    use super::*;
+    use crate::cache::{Asked, RadianceCaches, Settings};
+    use crate::host::Empty;
+    use crate::light::{Light, PointLight};
+    use crate::math::Bounds;
+    use crate::medium::{Homogeneous, Placed, Region};
+    use crate::phase::Phase;
+    use crate::spectrum::Spectrum;
+    use crate::work;
+    use crate::world::Outline;
+
+    fn found(bias: f32) -> Pilots {
+        let mut pilots = Pilots::default();
+        (0..100).for_each(|_| pilots.add(Spectrum::splat(1.0 + bias), Spectrum::ONE));
+        pilots
+    }
+
+    /// A verdict by chance costs a second look, and no records.
+    #[test]
+    fn radii_shrink_where_two_rounds_of_pilots_say_so() {
+        let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::ONE, Phase::ISOTROPIC).unwrap();
+        let ball = Placed::new(fog, Region::sphere(Vec3::ZERO, 1.0).unwrap());
+        let lamps = [Light::Point(PointLight::from_flux(Vec3::Y * 2.0, Spectrum::ONE).unwrap())];
+        let world = World { medium: &ball, scene: &Empty, lights: (&lamps).into() };
+        let bounds = Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE };
+        let settings =
+            Settings { rays: 40, ..Settings::for_outline(&Outline::of(&world, bounds), 0.02).with_walks(16) };
+        for (second, shrunk) in [(found(0.0), 0), (found(0.1), 1)] {
+            let mut filling = RadianceCaches::new(settings).fill(Asked::anywhere_in(bounds));
+            let mut output = FilledRecords::default();
+            while !matches!(filling.round, Round::Pilot { from: 0 }) {
+                assert!(work::step(&mut filling, &world, &mut output), "no pilots");
+            }
+            let (step, jobs) = (filling.step, filling.jobs);
+            filling.pilots = found(0.1);
+            filling.take_pilots(0);
+            assert!(matches!(filling.round, Round::Pilot { from } if from == jobs) && filling.jobs == 3 * jobs);
+            assert_eq!((filling.step, filling.shrunk), (step, 0));
+            filling.pilots = second;
+            filling.take_pilots(jobs);
+            assert_eq!((filling.shrunk, filling.step == step), (shrunk, shrunk > 0));
+        }
+    }
+}
