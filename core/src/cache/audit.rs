@@ -28,10 +28,11 @@ use core::ops::Range;
 
 use super::Estimator;
 use super::agreement;
-use super::bias_map::{BiasMap, RegionSums, Sample};
+use super::bias_map::{Apart, BiasMap, RegionSums, Sample};
 use super::caches::RadianceCaches;
 use super::eye::{Caches, radiance};
 use super::kind::Kind;
+use super::presets::{BLAMED, MENDED};
 use super::slot::ByKind;
 use crate::host::{Medium, Scene};
 use crate::math::Ray;
@@ -63,6 +64,10 @@ pub(super) fn rays_for(walks: u64) -> u32 {
     u32::try_from(walks / WALKS_PER_RAY).unwrap_or(u32::MAX).clamp(RAYS[0], RAYS[1])
 }
 
+/// Rays of a second look over those of the first, where that says that records are wrong. The estimates of rays have heavy tails, as those that come near a lamp, and of a dozen verdicts
+/// one is chance: to make records anew by it takes longer than all else. More: time where the first was right; fewer: chance decides.
+const AGAIN: u32 = 3;
+
 /// Standard errors beyond which a difference is no chance.
 pub(super) const SURE: f64 = 3.0;
 
@@ -90,6 +95,11 @@ impl Deviation {
     #[must_use]
     pub fn exceeds(&self, most: f64) -> bool {
         self.bias.abs() - SURE * self.error > most
+    }
+
+    /// Whether it is more than `most`, or, in the mean of a picture, certainly no chance and more than half of that: what is certain is mended before it is all of the error.
+    pub(super) fn is_to_be_mended(&self, most: f64) -> bool {
+        self.exceeds(most) || self.exceeds(0.0) && self.bias.abs() > MENDED * most
     }
 
     /// Whether so little is known that nothing can be said: the standard error is more than half of the light. Not where there is no light, and
@@ -219,6 +229,30 @@ impl Findings {
     pub fn is_misled(&self, kind: Kind) -> bool {
         self.gradients[kind].is_some_and(|slope| agreement::is_misled(&slope))
     }
+
+    /// Regions that are off by certainly more than `most`, where the others together are not.
+    pub(super) fn places(&self, map: &BiasMap, most: f64) -> Option<Apart> {
+        map.apart(most).filter(|apart| !apart.rest.is_to_be_mended(most))
+    }
+
+    /// What rays say is certainly wrong with each of the kinds that are cached ([`Kind::FINAL`]), in those places or everywhere.
+    pub(super) fn wrong(&self, map: &BiasMap, most: f64) -> [Option<Deviation>; 4] {
+        let is_off = |found: &Deviation| found.is_to_be_mended(most);
+        let to_blame = |kind: Kind| self.of(kind).filter(is_off);
+        let none_alone = Kind::FINAL.into_iter().all(|kind| to_blame(kind).is_none());
+        let (together, places) = (Some(self.cached).filter(is_off), self.places(map, most));
+        // Blotches without a mean are off by the root of their mean square.
+        let blotched = self.squared.exceeds(most).then(|| Deviation { bias: self.squared.root(), error: 0.0 });
+        let is_blotched = |number: usize| self.squared_parts[number] > BLAMED * self.squared.mean;
+        core::array::from_fn(|number| {
+            let found = match places {
+                Some(Apart { worst, parts, .. }) => Some(worst).filter(|_| parts[number].abs() > BLAMED),
+                None if none_alone => together.or(blotched.filter(|_| is_blotched(number))),
+                None => to_blame(Kind::FINAL[number]),
+            };
+            found.filter(|_| self.parts[Kind::FINAL[number]].is_some())
+        })
+    }
 }
 
 /// Sums over groups of rays.
@@ -299,15 +333,24 @@ impl Default for Compared {
 pub struct Audit<'c, 's, F> {
     caches: &'c RadianceCaches<'s>,
     ray: F,
+    /// The first job that counts, and where they end.
+    first: u32,
     jobs: u32,
     taken: u32,
+    /// What a second look would be for.
+    most: Option<f64>,
+    sums: Sums,
+    regions: RegionSums,
+    gradients: ByKind<Option<Deviation>>,
+}
+
+#[derive(Debug, Clone, Copy, Default)]
+struct Sums {
     rays: u32,
     truth: [f64; 2],
     all: Moments,
     cached: Moments,
     parts: [Moments; 4],
-    regions: RegionSums,
-    gradients: ByKind<Option<Deviation>>,
 }
 
 impl<'c, 's, F: Fn([f32; 2]) -> Ray> Audit<'c, 's, F> {
@@ -321,15 +364,41 @@ impl<'c, 's, F: Fn([f32; 2]) -> Ray> Audit<'c, 's, F> {
         Self {
             caches,
             ray,
+            first: 0,
             jobs,
             taken: 0,
-            rays: 0,
-            truth: [0.0; 2],
-            all: Moments::default(),
-            cached: Moments::default(),
-            parts: [Moments::default(); 4],
+            most: None,
+            sums: Sums::default(),
             regions: RegionSums::new(jobs * GROUP),
             gradients,
+        }
+    }
+
+    /// Where the rays say that records are wrong by so much that [`RadianceCaches::drop_wrong`] would drop them for `error`, looks again, along three times as many others; what they find is all
+    /// that counts then. For who drops records by an audit: a verdict by chance costs more than the second look.
+    ///
+    /// ```
+    /// # #[cfg(feature = "alloc")] {
+    /// # use fogbow::{cache::{Audit, Compared, RadianceCaches, Settings}, host::Empty, math::{Ray, Vec3}, work::finish, world::World};
+    /// # let world = World { medium: &Empty, scene: &Empty, lights: (&[]).into() };
+    /// let caches = RadianceCaches::new(Settings::default());
+    /// let mut audit = Audit::new(&caches, |_| Ray::new(Vec3::ZERO, Vec3::Z), 64).held_to(0.02);
+    /// finish(&mut audit, &world, &mut Compared::default());
+    /// assert_eq!(audit.findings().rays, 64); // nothing is wrong
+    /// # }
+    /// ```
+    #[must_use]
+    pub fn held_to(self, error: f32) -> Self {
+        Self { most: Some(f64::from(error)), ..self }
+    }
+
+    /// After a first look that says that records are wrong, a second; after that none.
+    fn look_again(&mut self) {
+        let Some(most) = self.most.take() else { return };
+        if self.findings().wrong(&self.map(), most).iter().any(Option::is_some) {
+            let jobs = self.jobs.saturating_mul(AGAIN);
+            (self.first, self.jobs) = (self.jobs, self.jobs.saturating_add(jobs));
+            (self.sums, self.regions) = (Sums::default(), RegionSums::new(jobs.saturating_mul(GROUP)));
         }
     }
 
@@ -342,15 +411,16 @@ impl<'c, 's, F: Fn([f32; 2]) -> Ray> Audit<'c, 's, F> {
     /// What was found so far.
     #[must_use]
     pub fn findings(&self) -> Findings {
-        let ([t, tt], groups) = (self.truth, f64::from(self.taken));
+        let Sums { rays, truth: [t, tt], all, cached, parts: of_kinds } = self.sums;
+        let groups = f64::from(self.taken - self.first);
         let mut parts = ByKind([None; Kind::COUNT]);
-        for (kind, moments) in Kind::FINAL.into_iter().zip(&self.parts) {
+        for (kind, moments) in Kind::FINAL.into_iter().zip(&of_kinds) {
             let is_cached = self.caches.settings.effort(kind).is_some();
             parts[kind] = is_cached.then(|| moments.deviation(t, tt, groups));
         }
-        let [all, cached] = [self.all, self.cached].map(|moments| moments.deviation(t, tt, groups));
+        let [all, cached] = [all, cached].map(|moments| moments.deviation(t, tt, groups));
         let (squared, squared_parts) = self.regions.squared();
-        Findings { rays: self.rays, all, cached, squared, squared_parts, gradients: self.gradients, parts }
+        Findings { rays, all, cached, squared, squared_parts, gradients: self.gradients, parts }
     }
 }
 
@@ -424,18 +494,67 @@ where
             return;
         }
         self.taken += 1;
-        self.rays += output.rays;
-        self.truth[0] += output.truth;
-        self.truth[1] += output.truth * output.truth;
-        self.all.add(output.all, output.truth);
-        self.cached.add(output.parts.iter().sum(), output.truth);
-        for (moments, part) in self.parts.iter_mut().zip(output.parts) {
+        let sums = &mut self.sums;
+        sums.rays += output.rays;
+        sums.truth[0] += output.truth;
+        sums.truth[1] += output.truth * output.truth;
+        sums.all.add(output.all, output.truth);
+        sums.cached.add(output.parts.iter().sum(), output.truth);
+        for (moments, part) in sums.parts.iter_mut().zip(output.parts) {
             moments.add(part, output.truth);
         }
         self.regions.add_group(&output.samples[..output.rays as usize]);
+        if self.taken == self.jobs {
+            self.look_again();
+        }
     }
 
     fn stage(&self) -> &'static str {
         "audit"
+    }
+}
+
+#[cfg(all(test, feature = "alloc"))]
+mod tests {
+    use super::*;
+    use crate::cache::Settings;
+    use crate::host::Empty;
+    use crate::light::Light;
+    use crate::math::{Bounds, Vec3};
+    use crate::medium::{Homogeneous, Placed, Region};
+    use crate::phase::Phase;
+    use crate::work::step;
+    use crate::world::Outline;
+
+    /// Only what a second look finds counts: a fifth too bright in the first by chance, and right in all that follows.
+    #[test]
+    fn a_verdict_by_chance_is_not_upheld() {
+        let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::splat(0.5), Phase::ISOTROPIC).unwrap();
+        let ball = Placed::new(fog, Region::sphere(Vec3::ZERO, 1.0).unwrap());
+        let sky = [Light::Constant(Spectrum::ONE)];
+        let world = World { medium: &ball, scene: &Empty, lights: (&sky).into() };
+        let outline = Outline::of(&world, Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE });
+        // Without records every point has an estimate of its own.
+        let caches = RadianceCaches::new(Settings::for_outline(&outline, 0.02).with_walks(16));
+        let ray = |at: [f32; 2]| Ray::new(3.0 * Vec3::Z, Vec3::new(at[0] - 0.5, at[1] - 0.5, -2.0).normalize());
+        for (held, is_off, jobs) in [(true, true, 64), (false, true, 16), (true, false, 16)] {
+            let audit = Audit::new(&caches, ray, 16 * GROUP);
+            let mut audit = if held { audit.held_to(0.02) } else { audit };
+            let mut output = Compared::default();
+            for _ in 0..15 {
+                step(&mut audit, &world, &mut output);
+            }
+            let [t, tt] = audit.sums.truth;
+            if is_off {
+                audit.sums.cached = Moments { d: 0.2 * t, dd: 0.04 * tt, dt: 0.2 * tt };
+            }
+            while step(&mut audit, &world, &mut output) {}
+            let found = audit.findings();
+            assert_eq!(audit.taken, jobs);
+            assert_eq!(found.rays, if jobs == 64 { 48 * GROUP } else { 16 * GROUP });
+            assert_eq!(found.cached.exceeds(0.02), is_off && !held, "{found:?}");
+            let in_regions: u32 = audit.map().regions().iter().map(|region| region.rays).sum();
+            assert_eq!(in_regions, found.rays);
+        }
     }
 }

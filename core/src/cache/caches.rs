@@ -2,11 +2,11 @@
 
 use super::asked::Asked;
 use super::audit::{Deviation, Findings};
-use super::bias_map::{Apart, BiasMap};
+use super::bias_map::BiasMap;
 use super::eye::{CachedRadiance, Caches, Reader, radiance, radiance_beyond, straight};
 use super::kind::Kind;
 use super::photons::{PhotonEffort, PhotonGrid};
-use super::presets::{BLAMED, MENDED, finer_by};
+use super::presets::{MENDED, finer_by};
 use super::record::Record;
 use super::room::{chunks_of, stride_of};
 use super::settings::Settings;
@@ -312,25 +312,11 @@ impl RadianceCaches<'_> {
         world: &World<'_, M, S>,
     ) -> bool {
         let most = f64::from(error);
-        // In the whole picture what is certain is mended before it is all of the error.
-        let is_off = |found: &Deviation| found.exceeds(most) || found.exceeds(0.0) && found.bias.abs() > MENDED * most;
-        let to_blame = |kind: Kind| findings.of(kind).filter(is_off);
-        let none_alone = Kind::FINAL.into_iter().all(|kind| to_blame(kind).is_none());
-        let together = Some(findings.cached).filter(is_off);
-        let places = map.apart(most).filter(|apart| !is_off(&apart.rest));
-        // Blotches without a mean are off by the root of their mean square.
-        let blotched = findings.squared.exceeds(most).then(|| Deviation { bias: findings.squared.root(), error: 0.0 });
-        let is_blotched = |number: usize| findings.squared_parts[number] > BLAMED * findings.squared.mean;
-        let found_of = |(kind, number): (Kind, usize)| match places {
-            Some(Apart { worst, parts, .. }) => Some(worst).filter(|_| parts[number].abs() > BLAMED),
-            None if none_alone => together.or(blotched.filter(|_| is_blotched(number))),
-            None => to_blame(kind),
-        };
-        let is_cached = |kind: Kind| self.settings.effort(kind).is_some();
+        let (places, by_rays) = (findings.places(map, most), findings.wrong(map, most));
         let wrong: [Option<Deviation>; 4] = core::array::from_fn(|number| {
             let kind = Kind::FINAL[number];
             let is_misled = findings.is_misled(kind).then_some(Deviation { bias: most, error: 0.0 });
-            found_of((kind, number)).or(is_misled).filter(|_| is_cached(kind))
+            by_rays[number].or(is_misled).filter(|_| self.settings.effort(kind).is_some())
         });
         let wrong = || Kind::FINAL.into_iter().zip(wrong).filter_map(|(kind, found)| Some((kind, found?)));
         // Gradients that lead the wrong way do so everywhere.

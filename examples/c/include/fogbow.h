@@ -939,7 +939,7 @@ fogbow_status fogbow_irradiance(const fogbow_caches *caches,
                                 size_t *missing);
 
 // Work that compares the caches with path tracing along about `rays` eye rays of a view (0 for 16384; four times as many halve the
-// error of what is found).
+// error of what is found; where they say that records are wrong, it looks again along three times as many others, which alone count then).
 // Meanwhile the caches can be read, but not filled.
 fogbow_status fogbow_audit(const fogbow_caches *caches,
                            const fogbow_world *world,

@@ -74,7 +74,7 @@ const USUAL_RAYS: u32 = 16384;
 const MOST_RAYS: u32 = 1 << 24;
 
 /// Work that compares the caches with path tracing along about `rays` eye rays of a view (0 for 16384; four times as many halve the
-/// error of what is found).
+/// error of what is found; where they say that records are wrong, it looks again along three times as many others, which alone count then).
 /// Meanwhile the caches can be read, but not filled.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn fogbow_audit(
@@ -93,7 +93,8 @@ pub unsafe extern "C" fn fogbow_audit(
         // dropped after it.
         let borrowed: &'static RadianceCaches<'static> = unsafe { &*Arc::as_ptr(&shared) };
         let rays = if rays == 0 { USUAL_RAYS } else { rays.min(MOST_RAYS) };
-        let of = Borrowing { audit: Audit::new(borrowed, eye.rays(), rays), _caches: shared };
+        let audit = Audit::new(borrowed, eye.rays(), rays).held_to(borrowed.settings().error);
+        let of = Borrowing { audit, _caches: shared };
         let audit = AuditWork { of: RwLock::new(Some(of)), caches, eye };
         work.set(Work::put(Kind::Audit(Box::new(audit)), world)?);
         Ok(())

@@ -435,15 +435,13 @@ impl<M: Medium + Sync> Stages<'_, '_, M> {
         ran.ending
     }
 
-    /// Compares caches with path tracing, along so many rays if time allows; `None` if that was stopped.
+    /// Runs an audit, as far as time allows; `None` if it was stopped.
     fn audit(
         &self,
-        caches: &RadianceCaches<'static>,
-        rays: u32,
+        mut audit: Audit<'_, '_, impl Fn([f32; 2]) -> Ray + Sync>,
         time: Option<Duration>,
         spent: &mut Spent,
     ) -> Option<(Findings, Box<BiasMap>)> {
-        let mut audit = Audit::new(caches, self.rays(), rays);
         let tell = |_: &Audit<'_, '_, _>| (self.job.tell)("audit", 0.0);
         let ran = threads::run(&mut audit, &self.world(), &self.pool, self.job.control, time, tell);
         add_times(&mut spent.filled, ran.stages);
@@ -464,7 +462,8 @@ impl<M: Medium + Sync> Stages<'_, '_, M> {
             if ending != Ending::Done || audit_rays == 0 || job.paths.max_scatterings == 0 {
                 return Filled::new(caches, (ending, measured), None);
             }
-            let Some((findings, map)) = self.audit(&caches, audit_rays, None, spent) else {
+            let audit = Audit::new(&caches, self.rays(), audit_rays).held_to(error);
+            let Some((findings, map)) = self.audit(audit, None, spent) else {
                 return Filled::new(caches, (Ending::Cancelled, measured), None);
             };
             let (ray, is_over) = (self.rays(), repaired.len() as u32 >= cache::MOST_REPAIRS);
@@ -483,7 +482,8 @@ impl<M: Medium + Sync> Stages<'_, '_, M> {
         if job.is_part || measured.audit_rays == 0 || job.paths.max_scatterings == 0 {
             return Ok(Filled::new(caches, (Ending::Done, measured), None));
         }
-        let found = self.audit(&caches, measured.audit_rays, None, spent);
+        let audit = Audit::new(&caches, self.rays(), measured.audit_rays).held_to(error);
+        let found = self.audit(audit, None, spent);
         let audited = found.map(|(findings, map)| Audited { error, findings, map, repaired: Vec::new() });
         Ok(Filled::new(caches, (Ending::Done, measured), audited))
     }

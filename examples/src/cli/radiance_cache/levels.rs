@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use fogbow::cache::{self, CachedRadiance, Caches, LevelPicture, RadianceCaches, Refinement};
+use fogbow::cache::{self, Audit, CachedRadiance, Caches, LevelPicture, RadianceCaches, Refinement};
 use fogbow::host::Medium;
 use fogbow::spectrum::Spectrum;
 use fogbow_std::film::{Film, Image};
@@ -230,7 +230,9 @@ impl<M: Medium + Sync> Stages<'_, '_, M> {
         let caches = filling.finish();
         let is_audited = !job.control.is_cancelled() && measured.audit_rays > 0 && job.paths.max_scatterings > 0;
         let time = Refinement::audit_time(took_in_all).min(left());
-        let found = is_audited.then(|| self.audit(&caches, measured.audit_rays, Some(time), spent)).flatten();
+        // Time is limited, and nothing is dropped: one look is enough.
+        let audit = || Audit::new(&caches, self.rays(), measured.audit_rays);
+        let found = is_audited.then(|| self.audit(audit(), Some(time), spent)).flatten();
         let audited = found.map(|(findings, map)| Audited { error, findings, map, repaired: Vec::new() });
         let filled = Filled::new(caches, (Ending::Done, measured), audited);
         // Nothing is as good a use of the rest as less noise; down to the error asked for, if that is what caches are filled for.
