@@ -21,7 +21,7 @@
 //! | 0.17 | 0.30 | the same |
 //! | 0.18 | 0.30 | the same |
 //! | 0.19 | 0.32 | the same |
-//! | 0.20 | 0.33 | nothing to cross, after `cargo update -p glam@0.34.2 --precise 0.33.12`: this crate takes 0.33.11 to 0.34 |
+//! | 0.20 | 0.33 | nothing to cross, after `cargo update -p glam@0.34.3 --precise 0.33.12`: this crate takes 0.33.11 to 0.34 |
 //!
 //! `tests/bevy` compiles and runs this with the last three.
 
