@@ -316,14 +316,16 @@ def pictures(folder):
     import matplotlib.pyplot as plt
 
     for name, points in curves.items():
-        plt.loglog(*zip(*points), "o-", label=name)
+        plt.semilogx(*zip(*points), "o-", label=name)
     plt.xlabel("probes along a side")
     plt.ylabel("error of 8 x 8 blocks (% of the mean)")
     plt.xticks([16, 32, 64, 128], ["16", "32", "64", "128"])
+    plt.minorticks_off()
+    plt.ylim(bottom=0)
     plt.grid(True, which="both", alpha=0.3)
     plt.legend()
     plot = pathlib.Path(os.environ.get("FOLDER", ".")) / "error-over-resolution.png"
-    plt.savefig(plot, dpi=120)
+    plt.savefig(plot, dpi=120, bbox_inches="tight")
     print(f"to be looked at: {plot}")
     return held
 
