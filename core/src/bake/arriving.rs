@@ -1,12 +1,12 @@
 //! The light that arrives at a probe.
 
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 
 use super::basis::{AXES, MOST_COEFFICIENTS, Parts, ProbeBasis, Projection, Quantity};
 use super::settings::BakeSettings;
 use crate::cache::{Basis, Kind, RadianceCaches, Reader, VolumeCache};
 use crate::host::{Medium, Scene};
-use crate::light::{Light, Lights};
+use crate::light::Lights;
 use crate::math::Ray;
 use crate::math::float::{PI, floor, sqrt};
 use crate::path;
@@ -16,16 +16,9 @@ use crate::single_scatter::lattice;
 use crate::spectrum::Spectrum;
 use crate::world::World;
 
-/// Points of every light with extent that a pass connects to, spread evenly: next to a lamp, which fills half of what a probe sees, there is as much light as in
+/// Points of every light with extent that a pass connects to, spread evenly; of many lights as many connections to all together: next to a lamp, which fills half of what a probe sees, there is as much light as in
 /// a thousand probes elsewhere, and photons serve all until the grid as a whole is good. More: shadow rays for less and less noise; fewer: bakes wait for such probes.
 const CONNECTIONS: u32 = 16;
-
-/// Lights without extent, all connected to: one connection is as good as many.
-fn is_even(lights: &Lights<'_>) -> bool {
-    let has_extent =
-        |light: &Light<'_>| !matches!(light, Light::Point(_) | Light::Phong(_) | Light::Spot(_) | Light::Sun(_));
-    lights.len() <= path::FEW && !lights.iter().any(has_extent)
-}
 
 /// What knows the light of a probe.
 pub(super) struct Sampler<'a, 'c> {
@@ -73,15 +66,27 @@ impl Sampler<'_, '_> {
             due.medium = due.medium && !self.read(Kind::Multiple, point, held);
         }
         let mut add = |to_light: Vec3, irradiance: Spectrum| projection.add(to_light, irradiance, held);
-        let mut connect = |lights: Lights<'_>, rng: &mut Generator| {
-            let connections = if is_even(&lights) { 1 } else { CONNECTIONS };
+        let mut even = |lights: Lights<'_>, connections: u32, (first, shift): (f32, Vec2), rng: &mut Generator| {
             let (share, world) = (1.0 / connections as f32, World { lights, ..*world });
-            let (first, shift) = (uniform(rng), uniform2(rng));
             for j in 0..connections {
                 // Which light goes by another sequence than where on it.
                 let chosen = first + 0.754_877_7 * j as f32;
                 let random = (chosen - floor(chosen), lattice(j, connections, shift));
-                path::arriving(&world, point, random, rng, |to_light, light| add(to_light, light * share));
+                let (to_light, light) = path::arriving(&world, point, random, rng);
+                if !light.is_black() {
+                    add(to_light, light * share);
+                }
+            }
+        };
+        let mut connect = |lights: Lights<'_>, rng: &mut Generator| {
+            let random = (uniform(rng), uniform2(rng));
+            if lights.len() > path::FEW {
+                even(lights, CONNECTIONS, random, rng);
+                return;
+            }
+            for light in lights.iter() {
+                let connections = if light.is_delta() { 1 } else { CONNECTIONS };
+                even(core::slice::from_ref(light).into(), connections, random, rng);
             }
         };
         if due.lights {

@@ -4,7 +4,7 @@ use glam::{Vec2, Vec3};
 
 use super::estimate::Estimator;
 use crate::host::{Medium, Scene};
-use crate::light::{Light, Question};
+use crate::light::Question;
 use crate::math::Ray;
 use crate::phase::{Phase, deflection};
 use crate::sampling::discrete::Choice;
@@ -69,12 +69,8 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
         rng: &mut Generator,
     ) -> Spectrum {
         let Some(chosen) = self.world.lights.pick(weight, random.0) else { return Spectrum::ZERO };
-        // No direction meets a light without extent.
-        let is_wide = !matches!(
-            self.world.lights[chosen.index],
-            Light::Sun(_) | Light::Point(_) | Light::Phong(_) | Light::Spot(_) | Light::Projector(_)
-        );
-        let is_peaked = is_wide && phase.mean_cosine().map(f32::abs).max_element() > PEAKED;
+        let may_meet = !self.world.lights[chosen.index].is_delta();
+        let is_peaked = may_meet && phase.mean_cosine().map(f32::abs).max_element() > PEAKED;
         let value = |to_light: Vec3, pdf: f32| {
             let deflection = deflection(to_light, to_eye);
             let value = phase.value(deflection);

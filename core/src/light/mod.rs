@@ -304,6 +304,15 @@ impl Light<'_> {
         }
     }
 
+    /// Whether it comes to a point from one direction: no direction that is drawn meets it, and one connection is as good as many.
+    pub(crate) fn is_delta(&self) -> bool {
+        match self {
+            Self::Point(_) | Self::Phong(_) | Self::Spot(_) | Self::Projector(_) | Self::Sun(_) => true,
+            Self::Quad(_) | Self::Sphere(_) | Self::Mesh(_) | Self::Picture(_) => false,
+            Self::Constant(_) | Self::Environment(_) => false,
+        }
+    }
+
     /// Whether it shines evenly from everywhere around the world, so that directions which know nothing of it
     /// meet it well. Caches keep the light of such a sky, as that of surfaces infinitely far: a
     /// connection to it from every place would be noise wherever walls hide most of it.

@@ -50,31 +50,21 @@ fn connected<M: Medium + ?Sized, S: Scene + ?Sized>(
     world.lights.iter().map(of).sum()
 }
 
-/// What the lights alone send to `point`: calls `visit(to_light, irradiance across the light)` (W·m⁻²) for a connection to each, or to one
-/// of them where there are more than a few. `random` chooses among these and on the light; the sums over the calls are unbiased.
+/// What one of the lights sends to `point`, over the probability of its choice: its direction, and irradiance across the light (W·m⁻²); unbiased. `random` chooses among the lights and on the
+/// one chosen.
 pub(crate) fn arriving<M: Medium + ?Sized, S: Scene + ?Sized>(
     world: &World<'_, M, S>,
     point: Vec3,
     random: (f32, Vec2),
     rng: &mut Generator,
-    mut visit: impl FnMut(Vec3, Spectrum),
-) {
-    let mut connect = |lights| {
-        let direction = Cell::new(Vec3::ZERO);
-        let noted = |to_light: Vec3| {
-            direction.set(to_light);
-            (Spectrum::ONE, 0.0)
-        };
-        let light = connect::next_event(&World { lights, ..*world }, point, false, |_| point, noted, random, rng);
-        if !light.is_black() {
-            visit(direction.get(), light);
-        }
+) -> (Vec3, Spectrum) {
+    let direction = Cell::new(Vec3::ZERO);
+    let noted = |to_light: Vec3| {
+        direction.set(to_light);
+        (Spectrum::ONE, 0.0)
     };
-    if world.lights.len() > FEW {
-        connect(world.lights);
-    } else {
-        world.lights.iter().for_each(|light| connect(core::slice::from_ref(light).into()));
-    }
+    let light = connect::next_event(world, point, false, |_| point, noted, random, rng);
+    (direction.get(), light)
 }
 
 /// Radiance `∫ p L dω` (W·m⁻²·sr⁻¹) scattered at `point` towards `to_eye` (unit), *without* `σₛ`: an unbiased

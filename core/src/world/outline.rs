@@ -51,18 +51,10 @@ impl LightCounts {
     pub fn of(lights: &[Light<'_>]) -> Self {
         Self {
             all: lights.len(),
-            delta: lights.iter().filter(|light| is_delta(light)).count(),
+            delta: lights.iter().filter(|light| light.is_delta()).count(),
             distant: lights.iter().filter(|light| is_distant(light)).count(),
             skies: lights.iter().filter(|light| light.is_sky()).count(),
         }
-    }
-}
-
-fn is_delta(light: &Light<'_>) -> bool {
-    match light {
-        Light::Point(_) | Light::Phong(_) | Light::Spot(_) | Light::Projector(_) | Light::Sun(_) => true,
-        Light::Quad(_) | Light::Sphere(_) | Light::Mesh(_) | Light::Picture(_) => false,
-        Light::Constant(_) | Light::Environment(_) => false,
     }
 }
 
