@@ -13,7 +13,7 @@ linker=$(rustc --print sysroot)/lib/rustlib/$(rustc --print host-tuple)/bin/rust
 # Functions are inlined where they are very short, those that ask for it where they are short: smaller by a quarter, and what must be inlined says so.
 # Loops are unrolled where that leaves no loop and little code, and not otherwise; none of them is worth the vectors that a compiler sees in it. Panics have no words,
 # nobody prints with `{:?}`, and the library's own sorting is the small one, whose results are the same. What the core has made of a generic function is not made again.
-flags="-Cllvm-args=-inlinehint-threshold=50 -Cllvm-args=-unroll-threshold=40 -Cllvm-args=-unroll-runtime=0 -Cllvm-args=-unroll-allow-partial=0 -Cno-vectorize-loops
+flags="-Cllvm-args=-unroll-threshold=40 -Cllvm-args=-unroll-runtime=0 -Cllvm-args=-unroll-allow-partial=0 -Cno-vectorize-loops
     -Zshare-generics=y -Zunstable-options -Cpanic=immediate-abort -Zfmt-debug=none -Zlocation-detail=none"
 # module NAME OPT-LEVEL-OF-THE-CORE FLAGS
 module() {
@@ -28,10 +28,10 @@ module() {
 rm -rf "$out"
 mkdir -p "$out"
 # Most of either is one thread that optimises everything together.
-module plain '"s"' "-Cllvm-args=-inline-threshold=5" &
+module plain '"s"' "-Cllvm-args=-inline-threshold=5 -Cllvm-args=-inlinehint-threshold=50" &
 plain=$!
 # Instructions for vectors make shorter code: there is room to make it faster.
-module simd 2 "-Cllvm-args=-inline-threshold=10 -Ctarget-feature=+simd128"
+module simd 2 "-Cllvm-args=-inline-threshold=10 -Cllvm-args=-inlinehint-threshold=30 -Ctarget-feature=+simd128"
 wait $plain
 node scripts/pack.mjs "$out/package" "$out/plain.wasm" "$out/simd.wasm"
 node scripts/site.mjs "$out/page" "$out/package"

@@ -106,7 +106,7 @@ fn no_sample_of_light_along_a_ray_towards_a_lamp_is_an_outlier() {
         let settings = Settings { one_light: true, max_vertices: 1, ..Settings::new(STEPS) };
         let walk = Walk { world: World { medium: &medium, scene: &Empty, lights: lights.into() }, settings };
         let start = Start { ray, end: None, pdf: 1.0, collision: None };
-        let incoming = walk.along(&start, NO_SURFACE, |_, _, _| None, &mut Generator::new(seed));
+        let incoming = walk.along(&start, NO_SURFACE, &mut (), &mut Generator::new(seed));
         f64::from(incoming.irradiance[0])
     };
     let samples = |lights: &[Light<'_>]| (0..4000).map(|seed| along(lights, seed)).collect::<Vec<_>>();

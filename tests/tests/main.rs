@@ -28,6 +28,7 @@ mod sampling;
 mod scale;
 mod sh;
 mod shift;
+mod straight_on;
 mod surfaces;
 mod threads;
 mod vpl;

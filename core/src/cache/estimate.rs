@@ -7,13 +7,14 @@ use super::evidence::{Halves, Openings};
 use super::guide::{Guided, Looks};
 use super::lobe::{self, Lobe, coefficients_of};
 use super::lookup::Reading;
-use super::photons::{PhotonGrid, SHARPEST};
+use super::photons::PhotonGrid;
 use super::record::Facing;
+use super::resolved::SHARPEST;
 use super::store::SurfaceCache;
 use crate::host::{Hit, Medium, Properties, Rng, Scene};
 use crate::light::{FromPoint, Light};
 use crate::math::{Frame, Ray, float};
-use crate::multiple_scatter::{self, Cones, Incoming, Start, Walk};
+use crate::multiple_scatter::{self, Cones, Incoming, Known, Start, Walk};
 use crate::path;
 use crate::phase::{Phase, deflection};
 use crate::sampling::{Generator, mis, uniform, uniform2, warp};
@@ -48,6 +49,29 @@ const LEAST_BREADTH: f32 = 0.1;
 fn third(j: u32, shift: f32) -> f32 {
     let u = f64::from(j) * (core::f64::consts::SQRT_2 - 1.0) + f64::from(shift);
     ((u - libm::floor(u)) as f32).min(1.0 - 0.5 * f32::EPSILON)
+}
+
+/// Light in cells, at which a walk ends.
+struct Cells<'a> {
+    photons: Option<&'a PhotonGrid<'a>>,
+    /// How much is left of what cells do not resolve.
+    sharp: f32,
+}
+
+impl Known for Cells<'_> {
+    fn straight(&self, point: Vec3, properties: &Properties) -> f32 {
+        let of = |photons: &PhotonGrid<'_>| {
+            let ends = self.sharp * photons.unresolved(&properties.phase) <= SHARPEST && photons.knows(point);
+            if ends { photons.straight(&properties.phase) } else { 0.0 }
+        };
+        self.photons.map_or(0.0, of)
+    }
+
+    fn light(&mut self, point: Vec3, to_eye: Vec3, properties: &Properties) -> Option<(Contribution, Gradient)> {
+        let photons = self.photons?;
+        self.sharp *= photons.unresolved(&properties.phase);
+        if self.sharp > SHARPEST { None } else { photons.scattered(point, to_eye, properties) }
+    }
 }
 
 /// A mixture of densities of directions, each with an equal part of the samples: a given one, one towards
@@ -303,14 +327,8 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
     fn walked(&self, walk: &Walk<'_, M, S>, start: &Start, rng: &mut impl Rng) -> Incoming {
         let mut child = Generator::child(rng);
         let outgoing = |ray: &Ray, hit: &Hit| self.outgoing(ray, hit, &mut child);
-        // How much is left of what cells do not resolve.
-        let mut sharp = 1.0;
-        let known = |point: Vec3, to_eye: Vec3, properties: &Properties| {
-            let photons = self.photons?;
-            sharp *= photons.unresolved(&properties.phase);
-            if sharp > SHARPEST { None } else { photons.scattered(point, to_eye, properties) }
-        };
-        self.steadied(walk.along(start, outgoing, known, rng))
+        let mut cells = Cells { photons: self.photons, sharp: 1.0 };
+        self.steadied(walk.along(start, outgoing, &mut cells, rng))
     }
 
     /// An arrival whose gradient is no larger than [`Estimator::finest`] lets it be.

@@ -80,6 +80,7 @@ mod radius;
 mod readers;
 mod record;
 mod refine;
+mod resolved;
 mod room;
 mod set_bytes;
 mod settings;

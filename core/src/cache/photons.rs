@@ -6,7 +6,8 @@
 //!
 //! Where walks may end is decided by photons that are only counted (decision 56).
 
-use super::lookup::{TURNING_DEGREE, TurningBasis};
+use super::lookup::TurningBasis;
+use super::resolved::{self, MAX_DEGREE};
 use crate::host::{Medium, Properties, Scene};
 use crate::light::Light;
 use crate::math::{Bounds, Ray, Vec3};
@@ -21,9 +22,6 @@ use crate::spectrum::{Gradient, Spectrum};
 use crate::storage::{Full, List};
 use crate::world::World;
 
-/// Highest degree of a cell's expansion of radiance by direction.
-pub(super) const MAX_DEGREE: usize = TURNING_DEGREE;
-
 const MAX_COEFFICIENTS: usize = sh::coefficient_count(MAX_DEGREE);
 
 /// Counted photons that must have passed a cell for walks to end there. Fewer: their noise is seen; more: walks go on where light is well known.
@@ -36,13 +34,9 @@ const COUNTED: f64 = 0.25;
 /// Part of the lit cells that photons are to know well. More: all wait for the darkest corner; less: dark parts of a picture are noisy.
 const KNOWN: f64 = 0.9;
 
-/// How much of what cells do not resolve by direction may be left where walks end: each scattering blurs it. More: what is scattered
-/// sharply forward lands in the wrong place, by some 5 % of a picture at 0.5; less: memory for cells, and longer walks.
-pub(super) const SHARPEST: f32 = 0.3;
-
-/// The same up to which cells have higher degrees, as far as there are any: light that was scattered forward and goes on to the side or back is weak, and what an
-/// expansion leaves out is as large there. More: what is lit from behind, or from beside, is some per cent too bright (decision 74); less: memory for cells.
-const RESOLVED: f32 = 0.1;
+/// Cells for each of which a photon brings light to one of them, chosen by chance: those beside each other on its way learn the same from it. More: slopes between cells are noisy;
+/// fewer: time.
+const STRIDE: f32 = 2.0;
 
 /// Photons of the first round.
 const FIRST: u32 = 4096;
@@ -395,7 +389,7 @@ impl<'s> PhotonGrid<'s> {
                 if !(length > 0.0) {
                     return;
                 }
-                let count = (length / self.side) as u32 + 1;
+                let count = (length / (self.side * if is_counted { 1.0 } else { STRIDE })) as u32 + 1;
                 let step = length / count as f32;
                 for i in 0..count {
                     let at = reach.at(near + (i as f32 + uniform(&mut along)) * step);
@@ -488,11 +482,20 @@ impl<'s> PhotonGrid<'s> {
         self.moments.as_slice().get(number * stride..(number + 1) * stride).filter(|_| is_whole)
     }
 
-    /// All light but that straight from the lights walks connect to, scattered towards `to_eye` at `point`, with its gradients as the point
-    /// moves and as `to_eye` turns; `None` where cells do not know: outside, where few photons came, and where a surface cuts them.
+    fn brought(&self) -> u32 {
+        self.paths - self.counted
+    }
+
+    /// Whether walks may end at a point.
+    pub(super) fn knows(&self, point: Vec3) -> bool {
+        self.brought() > 0 && self.cell_of(point).and_then(|index| self.trusted(index)).is_some()
+    }
+
+    /// All light but that straight from the lights walks connect to, scattered towards `to_eye` at `point`, without the part `f` of it that counts as going
+    /// straight on, with its gradients as the point moves and as `to_eye` turns; `None` where cells do not know: outside, where few photons came, and where a surface cuts them.
     ///
     /// Radiance is an expansion in the direction of travel, a mean over the cell with the slope to its neighbours:
-    /// `Σ p_l L_lm Y_lm`, `L_lm = Σ power · length · Y_lm / (volume · paths)`.
+    /// `Σ (p_l − f) L_lm Y_lm`, `L_lm = Σ power · length · Y_lm / (volume · paths)`.
     ///
     /// ```
     /// # use fogbow::{cache::{PhotonEffort, PhotonGrid}, host::{Empty, Medium}, math::{Bounds, Vec3}, medium::Homogeneous};
@@ -511,12 +514,14 @@ impl<'s> PhotonGrid<'s> {
         let index = self.cell_of(point)?;
         let cell = self.trusted(index)?;
         let basis = TurningBasis::new(to_eye, self.degree);
-        let paths = self.paths - self.counted;
+        let paths = self.brought();
         if paths == 0 {
             return None;
         }
         let scale = 1.0 / (paths as f32 * self.side * self.side * self.side);
-        let moments: [Spectrum; MAX_DEGREE + 1] = core::array::from_fn(|l| properties.phase.moment(l) * scale);
+        let straight = Spectrum::splat(self.straight(&properties.phase));
+        let moments: [Spectrum; MAX_DEGREE + 1] =
+            core::array::from_fn(|l| (properties.phase.moment(l) - straight) * scale);
         let of_degree = |l: usize| l * l..(l + 1) * (l + 1);
         let light = |cell: &[Spectrum]| -> Spectrum {
             let of = |l: usize| of_degree(l).map(|k| cell[k] * basis.value(k)).sum::<Spectrum>() * moments[l];
@@ -547,34 +552,15 @@ impl<'s> PhotonGrid<'s> {
         Some((Contribution { radiance, gradient }, turned))
     }
 
-    /// What a scattering leaves of the least degree that cells do not resolve, in [0, 1].
+    /// Part of what is scattered that counts as going straight on: see [`resolved::straight`].
+    pub(super) fn straight(&self, phase: &Phase) -> f32 {
+        resolved::straight(phase, self.degree)
+    }
+
+    /// How much a scattering leaves of what cells do not resolve, in [0, 1].
     pub(super) fn unresolved(&self, phase: &Phase) -> f32 {
-        unresolved(phase, self.degree)
+        resolved::unresolved(phase, self.degree)
     }
-}
-
-/// What a scattering leaves of the least degree above `degree`, in [0, 1].
-fn unresolved(phase: &Phase, degree: usize) -> f32 {
-    phase.moment(degree + 1).map(f32::abs).max_element()
-}
-
-/// The least degree of cells at which light may be scattered unevenly at all.
-const LEAST_DEGREE: usize = 2;
-
-/// The highest degree of cells that is worth its memory and its photons: beyond, walks are scattered some more times instead (decision 81). Lower: noisier walks.
-const MOST_DEGREE: usize = 5;
-
-/// The least degree of cells that resolves nearly all that is scattered, and [`MOST_DEGREE`] if none does.
-pub(super) fn degree_for(phase: &Phase) -> usize {
-    if phase.is_isotropic() {
-        return 0;
-    }
-    (LEAST_DEGREE..MOST_DEGREE).find(|&degree| unresolved(phase, degree) <= RESOLVED).unwrap_or(MOST_DEGREE)
-}
-
-/// Variance of what such cells say, over that of their fluence: `Σ (2l + 1) p_l²` for light that comes from one direction.
-pub(super) fn spread(phase: &Phase, degree: usize) -> f32 {
-    (0..=degree).map(|l| (2 * l + 1) as f32 * phase.moment(l).map(|p| p * p).max_element()).sum()
 }
 
 fn sign(bit: usize) -> f32 {

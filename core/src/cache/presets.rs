@@ -2,8 +2,9 @@
 
 use super::kind::Kind;
 use super::lobe;
-use super::photons::{self, PhotonEffort};
+use super::photons::PhotonEffort;
 use super::radius::Limits;
+use super::resolved;
 use super::settings::{Effort, LEAST_RAYS, MOST_RAYS, Settings};
 use crate::math::float;
 use crate::multiple_scatter::{self, Lengths};
@@ -336,8 +337,8 @@ fn photons(outline: &Outline, scale: f32) -> PhotonEffort {
     let cells = ((CELLS_PER_FREE_PATH * thickness) as u32).clamp(CELLS[0], CELLS[1]);
     // Noise of cells is the same for all that looks at them, and photons are cheap: of rough pictures they are spared less than walks.
     let finer = f64::from(1.0 / (scale * scale.min(1.0)));
-    let degree = photons::degree_for(&outline.phase);
-    let sharper = f64::from(photons::spread(&outline.phase, degree) / EVEN).max(1.0);
+    let degree = resolved::degree_for(&outline.phase);
+    let sharper = f64::from(resolved::spread(&outline.phase, degree) / EVEN).max(1.0);
     PhotonEffort {
         bounds: outline.bounds,
         cells,

@@ -51,6 +51,8 @@ pub struct Flown {
     pub collision: Option<Collision>,
     /// Thickness of the whole segment, if asked for.
     pub whole: Option<Thickness>,
+    /// What light that gets through weighs: transmittance of the segment over the probability of that.
+    pub passed: Spectrum,
 }
 
 /// How a segment is flown along.
@@ -84,7 +86,7 @@ pub(super) fn fly(
                 thickness: drawn.thickness,
             }
         });
-        return Flown { collision, whole: marched.whole };
+        return Flown { collision, whole: marched.whole, passed: Spectrum::ONE };
     }
     let whole = to_end.then(|| optical_thickness_with_gradients(ray, medium, marching));
     let thickness = |distance| optical_thickness_with_gradients(&ray.with_length(distance), medium, marching);
@@ -95,7 +97,8 @@ pub(super) fn fly(
         if rate > 0.0 {
             let distance = exponential(u, rate);
             if !(distance < ray.length) {
-                return Flown { collision: None, whole };
+                let passed = thickness(ray.length).value.transmitted() / float::exp(-rate * ray.length);
+                return Flown { collision: None, whole, passed };
             }
             let pdf = rate * float::exp(-rate * distance);
             let thickness = thickness(distance);
@@ -103,7 +106,7 @@ pub(super) fn fly(
             let properties = medium.properties(ray.at(distance));
             let collision = Collision { distance, properties, factor, thickness };
             // Never: uniform numbers of 24 bits reach 17 free paths at most, where the density is 10⁻⁸ of the rate.
-            return Flown { collision: factor.is_finite().then_some(collision), whole };
+            return Flown { collision: factor.is_finite().then_some(collision), whole, passed: Spectrum::ZERO };
         }
     }
     let flown = tracking::flight(medium, ray, throughput, u, rng);
@@ -113,7 +116,7 @@ pub(super) fn fly(
         factor: flown.weight.ratio(properties.extinction()),
         thickness: thickness(flown.distance),
     });
-    Flown { collision, whole }
+    Flown { collision, whole, passed: flown.weight }
 }
 
 /// A generator of the walk's own: its length is unknown, and the host's sequence keeps its alignment.

@@ -19,7 +19,8 @@
 //!   What is left of `‖∇L‖` still diverges logarithmically, so the fall-off of lights without extent
 //!   may be held constant within a small distance ([`Settings::closest`]);
 //! - Eq. 34 takes norms of sums over walks that start in one of 24 cones, not of single walks;
-//! - a walk may end where its host knows the rest of the light ([`Walk::along`]);
+//! - a walk may end where its host knows the rest of the light, and what the host does not resolve of it may count as going straight
+//!   on ([`Known`]);
 //! - a part of the directions is drawn towards lamps without extent, which bounds samples that pass them;
 //! - the light of surfaces enters through the direction in which the walk goes on anyway.
 //!
@@ -43,5 +44,5 @@ mod weight;
 pub(crate) use estimate::Cones;
 pub use estimate::{sample, sample_directional};
 pub use flight::{Collision, Flown, Lengths};
-pub use walk::{Incoming, Settings, Start, Walk};
+pub use walk::{Incoming, Known, Settings, Start, Walk};
 pub use weight::{Shift, Weight};

@@ -12,9 +12,7 @@ use crate::phase::{Phase, deflection};
 use crate::sampling::{Generator, mis, uniform, uniform2, warp};
 use crate::single_scatter::{Arrival, Contribution};
 use crate::spectrum::{Gradient, Spectrum};
-use crate::transmittance::thickness::{
-    Marching, Steps, optical_thickness_with_gradients, transmittance_with_gradients, until_the_end,
-};
+use crate::transmittance::thickness::{Marching, Steps, optical_thickness_with_gradients, until_the_end};
 use crate::world::{NearLight, World, nearest_surface, shadow_ray};
 
 /// Beyond this many distances to the light an endless segment is not sampled equiangularly: 10⁻⁴ of
@@ -27,6 +25,9 @@ const SHARP: f32 = 0.5;
 
 /// Least probability of survival: below, the weights of the rare survivors show as fireflies.
 const MIN_SURVIVAL: f32 = 0.05;
+
+/// Greatest part of what is scattered that may count as going straight on. More: walks that fly on without an end; less: nothing, as any part is right.
+const MOST_STRAIGHT: f32 = 0.95;
 
 /// How to walk.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -89,6 +90,52 @@ pub struct Start {
     pub collision: Option<Collision>,
 }
 
+/// What is known of the light in a medium, so that a walk may end: see [`Walk::along`].
+pub trait Known {
+    /// Part of the light scattered at `point` that counts as going straight on, in [0, 1): what [`Known::light`] leaves out. 0 unless told otherwise, and where
+    /// nothing is known.
+    ///
+    /// ```
+    /// # use fogbow::{host::Properties, math::Vec3, multiple_scatter::Known, phase::Phase, spectrum::Spectrum};
+    /// # let [absorption, scattering] = [Spectrum::ZERO, Spectrum::ONE];
+    /// # let fog = Properties { absorption, scattering, emission: Spectrum::ZERO, phase: Phase::ISOTROPIC };
+    /// assert_eq!(().straight(Vec3::ZERO, &fog), 0.0);
+    /// ```
+    fn straight(&self, point: Vec3, properties: &Properties) -> f32 {
+        let _ = (point, properties);
+        0.0
+    }
+
+    /// Light that is scattered towards `to_eye` at `point` (W·m⁻²·sr⁻¹), without the lights that walks connect to and without
+    /// what goes straight on, with its gradients as the point moves and as `to_eye` turns. `None` where nothing is known.
+    ///
+    /// ```
+    /// # use fogbow::{host::Properties, math::Vec3, multiple_scatter::Known, phase::Phase, spectrum::{Gradient, Spectrum}};
+    /// # use fogbow::single_scatter::Contribution;
+    /// struct Even;   // light of radiance 1 from everywhere, half of which goes straight on
+    /// impl Known for Even {
+    ///     fn straight(&self, _: Vec3, _: &Properties) -> f32 {
+    ///         0.5
+    ///     }
+    ///     fn light(&mut self, _: Vec3, _: Vec3, _: &Properties) -> Option<(Contribution, Gradient)> {
+    ///         Some((Contribution { radiance: Spectrum::splat(0.5), gradient: Gradient::ZERO }, Gradient::ZERO))
+    ///     }
+    /// }
+    /// # let [absorption, scattering] = [Spectrum::ZERO, Spectrum::ONE];
+    /// # let fog = Properties { absorption, scattering, emission: Spectrum::ZERO, phase: Phase::ISOTROPIC };
+    /// let (light, _) = Even.light(Vec3::ZERO, Vec3::X, &fog).unwrap();
+    /// assert_eq!(light.radiance[0] + Even.straight(Vec3::ZERO, &fog), 1.0);
+    /// ```
+    fn light(&mut self, point: Vec3, to_eye: Vec3, properties: &Properties) -> Option<(Contribution, Gradient)>;
+}
+
+/// Nothing.
+impl Known for () {
+    fn light(&mut self, _: Vec3, _: Vec3, _: &Properties) -> Option<(Contribution, Gradient)> {
+        None
+    }
+}
+
 /// `D`, the reach of [`Shift`], over the distance of the nearest light of finite size.
 const REACH: f32 = 0.5;
 
@@ -134,7 +181,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Walk<'_, M, S> {
         let u = uniform(rng);
         let collision = self.first(&ray, end.as_ref(), u, false, rng).collision;
         let start = Start { ray, end, pdf: warp::uniform_sphere_pdf(), collision };
-        self.along(&start, outgoing, |_, _, _| None, rng)
+        self.along(&start, outgoing, &mut (), rng)
     }
 
     /// The flight on the first segment, on `ray` up to its `end`, decided by `u` in [0, 1); with the thickness of the
@@ -159,9 +206,15 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Walk<'_, M, S> {
     /// Light scattered on a path whose first segment is that of `start`, over the density of its direction: radiance at
     /// the ray's origin over `pdf`, and how it changes as the origin moves and the vertices with it ([`Shift`]).
     ///
-    /// `known(point, to_eye, properties)` may answer for all light but that straight from the lights walks
-    /// connect to (those that are no sky) that is scattered towards `to_eye` at a collision (W·m⁻²·sr⁻¹), with its gradients as the point moves
-    /// and as `to_eye` turns: then the path ends there. `outgoing` as for [`Walk::path`].
+    /// `known` may answer for all light but that straight from the lights walks connect to (those that are no sky): then the path ends
+    /// there. A part `f` of what is scattered may count as going straight on ([`Known::straight`]), so that the equation of transfer
+    /// becomes, with the same solution whatever `f` is at each point,
+    ///
+    /// ```text
+    /// dL/ds = −(σₜ − f σₛ) L + σₛ (∫ p L dω − f L)
+    /// ```
+    ///
+    /// and walks fly on from collisions that are none there. `outgoing` as for [`Walk::path`].
     ///
     /// A path ends where its weight is no number, and brings nothing at all if the light it has found is none: a lamp or a
     /// surface within rounding of a vertex may leave the range of `f32`. That darkens by what such paths would bring, which no
@@ -170,7 +223,13 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Walk<'_, M, S> {
     /// ```
     /// # use fogbow::{host::Empty, math::{Ray, Vec3}, medium::Homogeneous, phase::Phase, sampling::{Generator, warp}};
     /// # use fogbow::{single_scatter::Contribution, spectrum::{Gradient, Spectrum}, transmittance::thickness::Steps, world::World};
-    /// use fogbow::multiple_scatter::{Settings, Start, Walk};
+    /// use fogbow::{host::Properties, multiple_scatter::{Known, Settings, Start, Walk}};
+    /// struct Even;
+    /// impl Known for Even {
+    ///     fn light(&mut self, _: Vec3, _: Vec3, _: &Properties) -> Option<(Contribution, Gradient)> {
+    ///         Some((Contribution { radiance: Spectrum::ONE, gradient: Gradient::ZERO }, Gradient::ZERO))
+    ///     }
+    /// }
     /// // Endless fog that absorbs nothing, in which light of radiance 1 is scattered into every direction, everywhere.
     /// let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::ONE, Phase::ISOTROPIC)?;
     /// let world = World { medium: &fog, scene: &Empty, lights: (&[]).into() };
@@ -178,8 +237,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Walk<'_, M, S> {
     /// let (ray, rng) = (Ray::new(Vec3::ZERO, Vec3::X), &mut Generator::new(1));
     /// let collision = walk.first(&ray, None, 0.5, false, rng).collision;
     /// let start = Start { ray, end: None, pdf: warp::uniform_sphere_pdf(), collision };
-    /// let even = Contribution { radiance: Spectrum::ONE, gradient: Gradient::ZERO };
-    /// let incoming = walk.along(&start, |_, _| Spectrum::ZERO, |_, _, _| Some((even, Gradient::ZERO)), rng);
+    /// let incoming = walk.along(&start, |_, _| Spectrum::ZERO, &mut Even, rng);
     /// // Then it arrives as radiance 1, from wherever it is asked: over the density of directions, 4π.
     /// assert!((incoming.irradiance[0] - 4.0 * core::f32::consts::PI).abs() < 1e-4);
     /// # Ok::<(), fogbow::medium::MediumError>(())
@@ -188,10 +246,12 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Walk<'_, M, S> {
         &self,
         start: &Start,
         mut outgoing: impl FnMut(&Ray, &Hit) -> Spectrum,
-        mut known: impl FnMut(Vec3, Vec3, &Properties) -> Option<(Contribution, Gradient)>,
+        known: &mut impl Known,
         rng: &mut (impl Rng + ?Sized),
     ) -> Incoming {
         let rng = &mut own(rng);
+        // Asked at two places.
+        let outgoing: &mut dyn FnMut(&Ray, &Hit) -> Spectrum = &mut outgoing;
         let World { medium, scene, lights } = self.world;
         let mut total = Incoming {
             to_light: start.ray.direction,
@@ -199,18 +259,39 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Walk<'_, M, S> {
             gradient: Gradient::ZERO,
             turning: Spectrum::ZERO,
         };
-        let mut carried = Carried { weight: Weight::ONE, bend: None, kappa: Spectrum::splat(1.0 / start.pdf) };
-        let (mut ray, mut end, mut collision) = (start.ray, start.end, start.collision);
+        let pdf = start.pdf;
+        let mut carried = Carried { weight: Weight::ONE, last: None, pdf, kappa: Spectrum::splat(1.0 / pdf) };
+        let (mut leg, mut first) = (self.leg(start.ray, start.end), Some(start.collision));
         let has_surfaces = lights.have_surfaces();
         for vertex in 1..=self.settings.max_vertices {
-            let leg = self.leg(ray, end);
-            self.near_lights(&leg, &carried, &mut total, rng);
-            if vertex > 1 {
-                let (flying, u) = (self.flying(false, rng), uniform(rng));
-                collision = fly(&leg.ray, medium, &flying, carried.weight.value * carried.kappa, u, rng).collision;
-            }
-            let Some(here) = collision else { break };
+            let unscattered = carried.kappa;
+            let (mut collision, mut passed);
+            let straight = loop {
+                self.near_lights(&leg, &carried, &mut total, rng);
+                (collision, passed) = match first.take() {
+                    Some(given) => (given, Spectrum::ONE),
+                    None => self.next(&leg, &carried, rng),
+                };
+                let Some(here) = collision else { break 0.0 };
+                let (peak, straight) = leg.straight(&here, known);
+                if !(straight > 0.0 && uniform(rng) < straight) {
+                    break straight;
+                }
+                carried.kappa *= here.factor * here.properties.scattering * (peak / straight);
+                (leg.flown, leg.passes) = (here.distance, leg.passes + 1.0);
+            };
+            let Some(mut here) = collision else {
+                // What comes without going straight on somewhere has been added with the vertex before.
+                if leg.flown > 0.0 {
+                    let light = leg.end.map_or_else(|| lights.sky(leg.ray.direction), |hit| outgoing(&leg.ray, &hit));
+                    self.arrive(&leg, light * passed * carried.kappa.ratio(unscattered), &carried, &mut total, rng);
+                }
+                break;
+            };
             let (at, properties) = (leg.ray.at(here.distance), here.properties);
+            // What goes straight on dims nothing.
+            here.factor *= 1.0 / (1.0 - straight);
+            here.thickness = here.thickness.scaled(1.0 - straight);
             let step = carried.kappa * here.factor * properties.scattering;
             if step.is_black() || !step.is_finite() {
                 break;
@@ -226,8 +307,8 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Walk<'_, M, S> {
             let to_eye = -leg.ray.direction;
             let meets_lights = has_surfaces && is_sharp(&properties.phase);
             self.lights_at(at, &weight, (to_eye, &properties.phase), meets_lights, &mut total, rng);
-            let known = known(at, to_eye, &properties);
-            if let Some((light, turned)) = &known {
+            let light = known.light(at, to_eye, &properties);
+            if let Some((light, turned)) = &light {
                 add(&mut total, weight.turn, &weight.carry_turned(light, turned));
                 if !meets_lights {
                     break;
@@ -236,28 +317,21 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Walk<'_, M, S> {
 
             let extinction = properties.extinction().mean();
             let turn = lamps::turn((at, to_eye), &properties.phase, extinction, &lights, rng);
-            let bend = (!properties.phase.is_isotropic()).then_some((to_eye, properties.phase));
-            carried = Carried { weight, bend, kappa: turn.weight };
-            ray = Ray { origin: at, direction: turn.to_light, length: f32::INFINITY };
-            end = nearest_surface(&ray, scene);
-            ray.length = end.map_or(f32::INFINITY, |hit| hit.distance);
-            let mut radiance = match &end {
-                _ if known.is_some() => Spectrum::ZERO,
-                Some(hit) => outgoing(&ray, hit),
+            carried = Carried { weight, last: Some((to_eye, properties.phase)), pdf: turn.pdf, kappa: turn.weight };
+            let ray = Ray { origin: at, direction: turn.to_light, length: f32::INFINITY };
+            leg = self.leg(ray, nearest_surface(&ray, scene));
+            let mut radiance = match &leg.end {
+                _ if light.is_some() => Spectrum::ZERO,
+                Some(hit) => outgoing(&leg.ray, hit),
                 None => lights.sky(ray.direction),
             };
-            if meets_lights && let Some(hit) = &end {
-                radiance += self.met(&ray, hit, (to_eye, &properties.phase));
+            if meets_lights && let Some(hit) = &leg.end {
+                radiance += self.met(&leg.ray, hit, (to_eye, &properties.phase));
             }
-            if radiance.is_black() && end.is_none() && known.is_none() {
-                continue;
+            if !radiance.is_black() {
+                self.arrive(&leg, radiance, &carried, &mut total, rng);
             }
-            let marching = self.marching(rng);
-            let through = || transmittance_with_gradients(&ray, medium, marching);
-            if let Some(arrival) = Arrival::from_end(&ray, end.as_ref(), radiance, turn.pdf, through) {
-                add_scattered(&mut total, &weight, &arrival, (to_eye, &properties.phase));
-            }
-            if known.is_some() {
+            if light.is_some() {
                 break;
             }
         }
@@ -268,10 +342,49 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Walk<'_, M, S> {
         total
     }
 
+    /// The next collision on a segment, and what light that gets through weighs.
+    fn next(&self, leg: &Leg, carried: &Carried, rng: &mut Generator) -> (Option<Collision>, Spectrum) {
+        let (flying, u) = (self.flying(false, rng), uniform(rng));
+        let throughput = carried.weight.value * carried.kappa;
+        let flown = fly(&leg.rest(), self.world.medium, &flying, throughput, u, rng);
+        (flown.collision.map(|next| self.beyond(leg, next, rng)), flown.passed)
+    }
+
+    /// A point of the rest of a segment, as one of the whole.
+    fn beyond(&self, leg: &Leg, mut point: Collision, rng: &mut Generator) -> Collision {
+        if leg.flown > 0.0 {
+            point.distance += leg.flown;
+            let ray = leg.ray.with_length(point.distance);
+            point.thickness = optical_thickness_with_gradients(&ray, self.world.medium, self.marching(rng));
+        }
+        point
+    }
+
+    /// Light from the end of a segment; if it has gone straight on at collisions, `radiance` is weighed by chance, and transmittance is in its gradient alone.
+    fn arrive(&self, leg: &Leg, radiance: Spectrum, carried: &Carried, total: &mut Incoming, rng: &mut Generator) {
+        let whole = optical_thickness_with_gradients(&leg.ray, self.world.medium, self.marching(rng));
+        let mut through = whole.transmittance();
+        if leg.flown > 0.0 {
+            // Where light went straight on may lie anywhere on the segment: on one that is longer, at more places.
+            let shorter = leg.ray.direction * (leg.passes / leg.ray.length);
+            through.value = Spectrum::ONE;
+            through.gradient_fixed = whole.gradient_fixed * -1.0 - Gradient::outer(Spectrum::ONE, shorter);
+        }
+        let arrival = Arrival::from_end(&leg.ray, leg.end.as_ref(), radiance, carried.pdf, || through);
+        let Some(arrival) = arrival else { return };
+        if let Some((to_eye, phase)) = &carried.last {
+            add_scattered(total, &carried.weight, &arrival, (*to_eye, phase));
+        } else {
+            total.irradiance += arrival.irradiance;
+            total.gradient += arrival.gradient;
+            total.turning += arrival.turning;
+        }
+    }
+
     fn leg(&self, ray: Ray, end: Option<Hit>) -> Leg {
         let nearest2 = self.world.lights.nearest2(ray.origin);
         let ray = ray.with_length(end.map_or(f32::INFINITY, |hit| hit.distance));
-        Leg { ray, end, reach: REACH * float::sqrt(nearest2) }
+        Leg { ray, end, reach: REACH * float::sqrt(nearest2), flown: 0.0, passes: 0.0 }
     }
 
     #[inline]
@@ -336,7 +449,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Walk<'_, M, S> {
     /// Light scattered somewhere along a segment within a light's near field, carried to the start.
     fn near_lights(&self, leg: &Leg, carried: &Carried, total: &mut Incoming, rng: &mut Generator) {
         let World { medium, scene, .. } = self.world;
-        let ray = &leg.ray;
+        let ray = &leg.rest();
         let lit = until_the_end(ray, medium);
         let until = Some((ENDLESS, medium.resolution()));
         let question = FromRay { ray: lit, near: 0.0, far: lit.length, steep: true, until };
@@ -358,6 +471,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Walk<'_, M, S> {
             let thickness = optical_thickness_with_gradients(&ray.with_length(distance), medium, marching);
             let frozen = carried.kappa / (joint.pdf * share);
             let here = Collision { distance, properties, factor: thickness.value.transmitted(), thickness };
+            let here = self.beyond(leg, here, rng);
             let joined = carried.at(leg, &here, frozen, &medium.gradients(at).scattering);
             add_scattered(total, &joined, &arrival, (-ray.direction, &properties.phase));
             Some(())
@@ -401,14 +515,35 @@ struct Leg {
     end: Option<Hit>,
     /// The reach of [`Shift`] at its origin.
     reach: f32,
+    /// How far (m) light came that went straight on at a collision.
+    flown: f32,
+    /// At how many.
+    passes: f32,
+}
+
+impl Leg {
+    /// What is still to be flown.
+    fn rest(&self) -> Ray {
+        Ray { origin: self.ray.at(self.flown), direction: self.ray.direction, length: self.ray.length - self.flown }
+    }
+
+    /// Parts of what is scattered at a collision, and of its extinction, that count as going straight on.
+    fn straight(&self, here: &Collision, known: &impl Known) -> (f32, f32) {
+        let Properties { scattering, .. } = here.properties;
+        let peak = known.straight(self.ray.at(here.distance), &here.properties).min(MOST_STRAIGHT);
+        let extinction = here.properties.extinction().mean();
+        (peak, if peak > 0.0 && extinction > 0.0 { peak * scattering.mean() / extinction } else { 0.0 })
+    }
 }
 
 /// A path up to the start of a segment.
 struct Carried {
     weight: Weight,
-    /// The last vertex's direction to the eye and phase function, if that depends on directions.
-    bend: Option<(Vec3, Phase)>,
-    /// Phase function over the density of the segment's direction.
+    /// The last vertex's direction to the eye and phase function.
+    last: Option<(Vec3, Phase)>,
+    /// Density of the segment's direction (sr⁻¹).
+    pdf: f32,
+    /// Phase function over that density, and weights of what went straight on.
     kappa: Spectrum,
 }
 
@@ -425,7 +560,9 @@ impl Carried {
     #[inline]
     fn bent(&self, ray: &Ray, shift: &Shift) -> Weight {
         let weight = self.weight;
-        let Some((to_eye, phase)) = &self.bend else { return weight };
+        let Some((to_eye, phase)) = self.last.as_ref().filter(|(_, phase)| !phase.is_isotropic()) else {
+            return weight;
+        };
         let deflected = deflection(ray.direction, *to_eye);
         let cosine = to_eye.dot(ray.direction);
         let before = (*to_eye * cosine - ray.direction) * weight.last_turn;

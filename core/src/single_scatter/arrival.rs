@@ -169,18 +169,7 @@ impl Arrival {
         pdf: f32,
         through: impl FnOnce() -> Transmittance,
     ) -> Option<Self> {
-        if outgoing.is_black() || !(hit.distance > 0.0 && pdf > 0.0) {
-            return None;
-        }
-        let u = -ray.direction;
-        let signed = hit.normal.dot(u);
-        // The side that is seen.
-        let normal = if signed < 0.0 { -hit.normal } else { hit.normal };
-        let cosine = signed.abs();
-        let irradiance = outgoing / pdf;
-        let slope = (normal - u * (3.0 * cosine)) / cosine.max(MIN_HIT_COSINE) / hit.distance;
-        let slope = Gradient::outer(irradiance, slope);
-        Self::through(&ray.with_length(hit.distance), irradiance, slope, &through())
+        Self::from_end(ray, Some(hit), outgoing, pdf, through)
     }
 
     /// [`Arrival::from_surface_through`] for the `end` of a ray: a surface, or, without one, the sky
@@ -202,12 +191,23 @@ impl Arrival {
         pdf: f32,
         through: impl FnOnce() -> Transmittance,
     ) -> Option<Self> {
+        let is_apart = end.is_none_or(|hit| hit.distance > 0.0);
+        let arrives = is_apart && pdf > 0.0 && !outgoing.is_black();
+        arrives.then(|| Self::from_end_through(ray, end, outgoing / pdf, &through())).flatten()
+    }
+
+    fn from_end_through(ray: &Ray, end: Option<&Hit>, irradiance: Spectrum, through: &Transmittance) -> Option<Self> {
         let Some(hit) = end else {
-            let seen = !outgoing.is_black() && pdf > 0.0;
-            let ray = ray.with_length(f32::INFINITY);
-            return seen.then(|| Self::through(&ray, outgoing / pdf, Gradient::ZERO, &through())).flatten();
+            return Self::through(&ray.with_length(f32::INFINITY), irradiance, Gradient::ZERO, through);
         };
-        Self::from_surface_through(ray, hit, outgoing, pdf, through)
+        let u = -ray.direction;
+        let signed = hit.normal.dot(u);
+        // The side that is seen.
+        let normal = if signed < 0.0 { -hit.normal } else { hit.normal };
+        let cosine = signed.abs();
+        let slope = (normal - u * (3.0 * cosine)) / cosine.max(MIN_HIT_COSINE) / hit.distance;
+        let slope = Gradient::outer(irradiance, slope);
+        Self::through(&ray.with_length(hit.distance), irradiance, slope, through)
     }
 
     /// `None` where the light or its slope leaves the range of `f32`, within about 10⁻¹² m of a strong

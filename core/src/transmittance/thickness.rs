@@ -130,6 +130,15 @@ pub struct Transmittance {
 }
 
 impl Thickness {
+    /// That of a medium with `factor` times the extinction.
+    pub(crate) fn scaled(&self, factor: f32) -> Self {
+        Self {
+            value: self.value * factor,
+            gradient_fixed: self.gradient_fixed * factor,
+            gradient_joint: self.gradient_joint * factor,
+        }
+    }
+
     /// `T = e^{−τ}`, `∇T = −T ∇τ`; where `τ` exceeds [`OPAQUE`](crate::math::float::OPAQUE) all three are 0.
     ///
     /// ```
