@@ -34,10 +34,6 @@ const COUNTED: f64 = 0.25;
 /// Part of the lit cells that photons are to know well. More: all wait for the darkest corner; less: dark parts of a picture are noisy.
 const KNOWN: f64 = 0.9;
 
-/// Cells for each of which a photon brings light to one of them, chosen by chance: those beside each other on its way learn the same from it. More: slopes between cells are noisy;
-/// fewer: time.
-const STRIDE: f32 = 2.0;
-
 /// Photons of the first round.
 const FIRST: u32 = 4096;
 
@@ -389,7 +385,7 @@ impl<'s> PhotonGrid<'s> {
                 if !(length > 0.0) {
                     return;
                 }
-                let count = (length / (self.side * if is_counted { 1.0 } else { STRIDE })) as u32 + 1;
+                let count = (length / self.side) as u32 + 1;
                 let step = length / count as f32;
                 for i in 0..count {
                     let at = reach.at(near + (i as f32 + uniform(&mut along)) * step);

@@ -328,7 +328,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Walk<'_, M, S> {
             if meets_lights && let Some(hit) = &leg.end {
                 radiance += self.met(&leg.ray, hit, (to_eye, &properties.phase));
             }
-            if !radiance.is_black() {
+            if leg.end.is_some() || !radiance.is_black() {
                 self.arrive(&leg, radiance, &carried, &mut total, rng);
             }
             if light.is_some() {
@@ -362,7 +362,11 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Walk<'_, M, S> {
 
     /// Light from the end of a segment; if it has gone straight on at collisions, `radiance` is weighed by chance, and transmittance is in its gradient alone.
     fn arrive(&self, leg: &Leg, radiance: Spectrum, carried: &Carried, total: &mut Incoming, rng: &mut Generator) {
-        let whole = optical_thickness_with_gradients(&leg.ray, self.world.medium, self.marching(rng));
+        let marching = self.marching(rng);
+        if radiance.is_black() {
+            return;
+        }
+        let whole = optical_thickness_with_gradients(&leg.ray, self.world.medium, marching);
         let mut through = whole.transmittance();
         if leg.flown > 0.0 {
             // Where light went straight on may lie anywhere on the segment: on one that is longer, at more places.
