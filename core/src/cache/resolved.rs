@@ -8,6 +8,7 @@
 //! ```
 
 use super::lookup::TURNING_DEGREE;
+use crate::multiple_scatter::MOST_STRAIGHT;
 use crate::phase::Phase;
 use crate::spectrum::Spectrum;
 
@@ -43,7 +44,7 @@ pub(super) fn unresolved(phase: &Phase, degree: usize) -> f32 {
 pub(super) fn straight(phase: &Phase, degree: usize) -> f32 {
     let above = |by| phase.moment(degree + by).mean();
     let (first, second) = (above(1), above(2));
-    first.min(2.0 * second).max(0.0)
+    first.min(2.0 * second).clamp(0.0, MOST_STRAIGHT)
 }
 
 /// The least degree of cells at which light may be scattered unevenly at all.
@@ -88,6 +89,8 @@ mod tests {
             assert_eq!(straight(&fog(-0.9), degree), 0.0);
             near(left_out(&fog(-0.9), degree), 0.9_f32.powi(degree as i32 + 1));
         }
+        // As much as walks take for it.
+        assert_eq!(straight(&fog(0.999), 5), MOST_STRAIGHT);
         assert_eq!((straight(&Phase::ISOTROPIC, 0), degree_for(&Phase::ISOTROPIC)), (0.0, 0));
     }
 

@@ -27,7 +27,7 @@ const SHARP: f32 = 0.5;
 const MIN_SURVIVAL: f32 = 0.05;
 
 /// Greatest part of what is scattered that may count as going straight on. More: walks that fly on without an end; less: nothing, as any part is right.
-const MOST_STRAIGHT: f32 = 0.95;
+pub(crate) const MOST_STRAIGHT: f32 = 0.95;
 
 /// How to walk.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -92,8 +92,8 @@ pub struct Start {
 
 /// What is known of the light in a medium, so that a walk may end: see [`Walk::along`].
 pub trait Known {
-    /// Part of the light scattered at `point` that counts as going straight on, in [0, 1): what [`Known::light`] leaves out. 0 unless told otherwise, and where
-    /// nothing is known.
+    /// Part of the light scattered at `point` that counts as going straight on, in [0, 0.95]: what [`Known::light`] leaves out. 0 unless told otherwise, and where
+    /// nothing is known; of more, 0.95 is taken.
     ///
     /// ```
     /// # use fogbow::{host::Properties, math::Vec3, multiple_scatter::Known, phase::Phase, spectrum::Spectrum};
