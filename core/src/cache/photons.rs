@@ -56,7 +56,7 @@ pub struct PhotonEffort {
     pub bounds: Bounds,
     /// Cells along its longest side.
     pub cells: u32,
-    /// Degree of a cell's expansion of radiance by direction, at most [`TURNING_DEGREE`]: memory goes by the square.
+    /// Degree of a cell's expansion of radiance by direction, at most [`TURNING_DEGREE`](super::TURNING_DEGREE): memory goes by the square.
     pub degree: usize,
     /// Paths of photons at most.
     pub paths: u32,
