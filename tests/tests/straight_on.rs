@@ -38,7 +38,7 @@ impl Known for Furnace {
     }
 }
 
-/// What comes of it along one ray from `origin`: without what comes straight from the end, `1 − T`.
+/// What comes of it along one ray: without what comes straight from the end, `1 − T`.
 fn furnace(walk: &Walk<'_, Filled<Analytic>, impl Scene>, ray: Ray, most: f32, seed: u64) -> Spectrum {
     let rng = &mut Generator::new(seed);
     let end = nearest_surface(&ray, walk.world.scene);

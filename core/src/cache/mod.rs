@@ -26,6 +26,7 @@
 //! | `shares` | what part of a picture each kind brings, and how coarse it may be for that |
 //! | `noise` | [`Glance`]: how much noise of records a picture would show, and how often it makes kinds be estimated anew |
 //! | `photons` | [`PhotonEffort`]: light in cells, brought by photons, at which walks end |
+//! | `resolved` | what such cells resolve by direction, and what goes straight on instead |
 //! | `slot` | a cache of either sort, as filling needs it |
 //! | `smooth` | irradiance averaged over neighbouring records |
 //! | `readers` | probes, fluence, irradiance, in-scattered light; many at a time |

@@ -491,7 +491,8 @@ impl<'s> PhotonGrid<'s> {
     /// straight on, with its gradients as the point moves and as `to_eye` turns; `None` where cells do not know: outside, where few photons came, and where a surface cuts them.
     ///
     /// Radiance is an expansion in the direction of travel, a mean over the cell with the slope to its neighbours:
-    /// `Σ (p_l − f) L_lm Y_lm`, `L_lm = Σ power · length · Y_lm / (volume · paths)`.
+    /// `Σ (p_l − f) L_lm Y_lm`, `L_lm = Σ power · length · Y_lm / (volume · paths)`, where `f = p_{L+1}` of a phase function with a forward peak, and 0 of one
+    /// without: what degrees above that of the cells leave out of the peak (decision 92). It is exact but for `p_l − f` of these degrees.
     ///
     /// ```
     /// # use fogbow::{cache::{PhotonEffort, PhotonGrid}, host::{Empty, Medium}, math::{Bounds, Vec3}, medium::Homogeneous};

@@ -25,7 +25,7 @@ const RESOLVED: f32 = 0.1;
 
 /// How much of what counts as going straight on is taken to land in the wrong place (decision 92). More: longer walks; less: lamps in sharp fog have too bright a glow, and
 /// what faces away from them is too bright.
-const SPREAD: f32 = 0.45;
+const MISPLACED: f32 = 0.45;
 
 /// What a scattering leaves of the least degrees above `degree`, but for what goes straight on, in [0, 1].
 fn left_out(phase: &Phase, degree: usize) -> f32 {
@@ -36,7 +36,7 @@ fn left_out(phase: &Phase, degree: usize) -> f32 {
 
 /// How much a scattering leaves of what cells of `degree` do not resolve, in [0, 1].
 pub(super) fn unresolved(phase: &Phase, degree: usize) -> f32 {
-    left_out(phase, degree) + SPREAD * straight(phase, degree)
+    left_out(phase, degree) + MISPLACED * straight(phase, degree)
 }
 
 /// Part of what is scattered that counts as going straight on where degrees above `degree` are not resolved: that of the first of these, if the second
@@ -53,13 +53,14 @@ const LEAST_DEGREE: usize = 2;
 /// The degree of cells where none resolves enough: walks are scattered some more times instead (decision 81). Lower: noisier walks; higher: memory, and photons.
 const ELSE_DEGREE: usize = 5;
 
-/// The least degree of cells at which walks may end at once, and [`ELSE_DEGREE`] where there is none.
+/// The least degree of cells at which walks may end at once, beyond [`ELSE_DEGREE`] only if they may not end there; and that degree where there is none.
 pub(super) fn degree_for(phase: &Phase) -> usize {
     if phase.is_isotropic() {
         return 0;
     }
-    let resolves = |&degree: &usize| left_out(phase, degree) <= RESOLVED && unresolved(phase, degree) <= SHARPEST;
-    (LEAST_DEGREE..=MAX_DEGREE).find(resolves).unwrap_or(ELSE_DEGREE)
+    let ends = |degree| unresolved(phase, degree) <= SHARPEST;
+    let mut degrees = if ends(ELSE_DEGREE) { LEAST_DEGREE..ELSE_DEGREE } else { ELSE_DEGREE + 1..MAX_DEGREE + 1 };
+    degrees.find(|&degree| ends(degree) && left_out(phase, degree) <= RESOLVED).unwrap_or(ELSE_DEGREE)
 }
 
 /// Variance of what such cells say, over that of their fluence: `Σ (2l + 1) (p_l − f)²/(1 − f)²` for light that comes from one direction, where `f` of it goes
@@ -97,8 +98,8 @@ mod tests {
     /// Cells resolve what walks ask for, up to where none does; then these are scattered once more.
     #[test]
     fn cells_are_as_sharp_as_walks_that_end_in_them() {
-        let cells = [0.1, 0.6, 0.8, 0.9, 0.93, -0.3, -0.6].map(|g| (g, degree_for(&fog(g))));
-        assert_eq!(cells, [(0.1, 2), (0.6, 2), (0.8, 3), (0.9, 5), (0.93, 7), (-0.3, 2), (-0.6, 4)]);
+        let cells = [0.1, 0.6, 0.8, 0.9, 0.93, -0.3, -0.6, -0.7].map(|g| (g, degree_for(&fog(g))));
+        assert_eq!(cells, [(0.1, 2), (0.6, 2), (0.8, 3), (0.9, 5), (0.93, 7), (-0.3, 2), (-0.6, 4), (-0.7, 5)]);
         assert!(cells.into_iter().all(|(g, degree)| unresolved(&fog(g), degree) <= SHARPEST));
         for g in [0.95, -0.9] {
             let (phase, degree) = (fog(g), degree_for(&fog(g)));

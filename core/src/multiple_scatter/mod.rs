@@ -32,7 +32,7 @@
 //! | `weight` | [`Weight`]: a path's weight and its gradient, in forward mode; [`Shift`]: how vertices move |
 //! | `flight` | the distance to the next collision: marched, by delta tracking, or by J's Eq. 29 |
 //! | `lamps` | directions towards lamps without extent |
-//! | `walk` | [`Walk`]: one path; [`Incoming`]: the light it brings |
+//! | `walk` | [`Walk`]: one path; [`Known`]: where it may end; [`Incoming`]: the light it brings |
 //! | `estimate` | [`sample`], [`sample_directional`]: sums over paths |
 
 mod estimate;

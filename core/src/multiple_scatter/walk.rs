@@ -92,8 +92,8 @@ pub struct Start {
 
 /// What is known of the light in a medium, so that a walk may end: see [`Walk::along`].
 pub trait Known {
-    /// Part of the light scattered at `point` that counts as going straight on, in [0, 0.95]: what [`Known::light`] leaves out. 0 unless told otherwise, and where
-    /// nothing is known; of more, 0.95 is taken.
+    /// Part of the light scattered at `point` that counts as going straight on, in [0, 0.95]: what [`Known::light`] leaves out. 0 unless told otherwise, and wherever
+    /// [`Known::light`] has no answer; of more, 0.95 is taken. Any part is right, and may be another at each point (decision 92).
     ///
     /// ```
     /// # use fogbow::{host::Properties, math::Vec3, multiple_scatter::Known, phase::Phase, spectrum::Spectrum};

@@ -196,6 +196,7 @@ impl Arrival {
         arrives.then(|| Self::from_end_through(ray, end, outgoing / pdf, &through())).flatten()
     }
 
+    /// [`Arrival::from_end`] of what does arrive: not generic, as it is most of it.
     fn from_end_through(ray: &Ray, end: Option<&Hit>, irradiance: Spectrum, through: &Transmittance) -> Option<Self> {
         let Some(hit) = end else {
             return Self::through(&ray.with_length(f32::INFINITY), irradiance, Gradient::ZERO, through);
