@@ -3,8 +3,9 @@
 use glam::{Vec2, Vec3};
 
 use crate::host::Scene;
-use crate::light::{FromPoint, Light, Lights};
+use crate::light::{FromPoint, Light, Lights, Question};
 use crate::math::{Frame, Ray, float};
+use crate::multiple_scatter::DARK;
 use crate::sampling::discrete::choose;
 use crate::sampling::warp;
 
@@ -25,6 +26,8 @@ const WIDEST: f32 = 0.9;
 pub(super) struct Aims {
     cones: heapless::Vec<Cone, MOST>,
     total: f32,
+    /// Whether all shine elsewhere.
+    is_dark: bool,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -45,8 +48,9 @@ impl Aims {
         scene: &(impl Scene + ?Sized),
         is_aim: impl Fn(&Light<'_>) -> bool,
     ) -> Self {
-        let mut cones = heapless::Vec::new();
-        let strong = lights.strong(&FromPoint { sky: false, ..FromPoint::all(point) });
+        let (mut cones, mut is_dark) = (heapless::Vec::new(), true);
+        let sent = FromPoint { sky: false, dark: true, ..FromPoint::all(point) };
+        let strong = lights.strong(&sent);
         for light in strong.lights(lights) {
             let Some(field) = light.near_field().filter(|_| is_aim(light)) else { continue };
             let offset = field.centre() - point;
@@ -57,15 +61,18 @@ impl Aims {
                 (Light::Sphere(_), Some(r)) => r,
                 (_, Some(r)) => BALL * r,
             };
-            let (weight, sine) = (light.importance(point), radius / distance);
+            let (weight, sine) = (sent.light(light), radius / distance);
             // Written so that NaN fails, too.
             if !(weight > 0.0 && weight < f32::INFINITY && sine < WIDEST) {
                 continue;
             }
+            let is_lit = light.importance(point) > 0.0;
+            let weight = if is_lit { weight } else { DARK * weight };
             let axis = offset / distance;
             if scene.is_blocked(&Ray { origin: point, direction: axis, length: distance - radius }) {
                 continue;
             }
+            is_dark &= !is_lit;
             let cosine = float::safe_sqrt(1.0 - sine * sine);
             let steep = field.radius().is_none().then(|| libm::atan2f(sine, cosine));
             let cone = Cone { axis, height: 1.0 - cosine, steep, weight };
@@ -77,7 +84,12 @@ impl Aims {
             }
         }
         let total = cones.iter().map(|cone| cone.weight).sum();
-        Self { cones, total }
+        Self { cones, total, is_dark }
+    }
+
+    /// Of so many samples, how many are for these directions.
+    pub(super) fn of(&self, samples: u32) -> u32 {
+        if self.is_dark { (samples as f32 * DARK) as u32 } else { samples }
     }
 
     pub(super) fn is_empty(&self) -> bool {

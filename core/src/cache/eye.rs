@@ -522,7 +522,10 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Gather<'_, M, S> {
             let x = self.light[i] + STEPS[i] * k as f32;
             (x - libm::floorf(x)).min(1.0 - f32::EPSILON)
         });
-        let (to, phase) = (FromPoint { point, except: Except::Steep, sky: !self.settings.indirect }, &properties.phase);
+        let (to, phase) = (
+            FromPoint { except: Except::Steep, sky: !self.settings.indirect, ..FromPoint::all(point) },
+            &properties.phase,
+        );
         let weight = scattered(to, to_eye, phase);
         self.estimator.scattered((&weight, point), to_eye, phase, (choice, Vec2::new(u, v)), &mut self.rng)
     }

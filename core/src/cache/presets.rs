@@ -85,6 +85,12 @@ const LIGHT_SAMPLES: [u32; 2] = [128, 16];
 /// Steps of marching over the resolution of the medium. Longer: rays see less of what varies, and transmittance is slightly too bright; shorter: time.
 const STEP: f32 = 3.0;
 
+/// From this error on steps are longer by the root of it, up to twice as long. Larger: first pictures are late; smaller: dense smoke lets too much light in where that shows.
+const LONG_STEPS: f32 = 0.04;
+
+/// Greatest [`roughness`]. Larger: what a corner reflects comes from beyond the wall that makes it.
+const ROUGHEST: f32 = 3.0;
+
 /// Share of the energy of an expansion that may be left out. Larger: scattering looks more even than it is; smaller: degrees that no eye sees.
 const LEFT_OUT: f32 = 2.5e-4;
 
@@ -116,6 +122,11 @@ pub(super) const MOST_ROUNDS: u32 = 8;
 
 /// Part of the noise of a picture by which it falls at least, over the part by which work grows. Less: long fills for little; more: noise.
 pub(super) const PAYS: f64 = 0.5;
+
+/// How many times as far the light of corners may be carried as in a picture of the usual error, where only other records see it.
+pub(super) fn roughness(error: f32) -> f32 {
+    float::sqrt(error / USUAL_ERROR).clamp(1.0, ROUGHEST)
+}
 
 /// Part of the error asked for that noise of records may have in a picture.
 const NOISE: f64 = 0.8;
@@ -230,6 +241,7 @@ impl Settings {
         // Noise of rough pictures hides small things: the least radius and what counts as noise of samples grow without a bound.
         let rougher = float::sqrt(scale).max(1.0);
         let walks = (f64::from(WALKS) / f64::from(scale * scale)) as u32;
+        let step = STEP * float::sqrt(error / LONG_STEPS).clamp(1.0, 2.0);
         let size = outline.bounds.size().max_element();
         let phase = &outline.phase;
         let free_paths = |kind| match kind {
@@ -256,7 +268,7 @@ impl Settings {
                 one_light: outline.lights.all > 1,
                 lengths: Lengths::Marched,
                 max_vertices: VERTICES,
-                ..multiple_scatter::Settings::new(Steps::Length(STEP * outline.resolution))
+                ..multiple_scatter::Settings::new(Steps::Length(step * outline.resolution))
             },
             pixels: Self::default().pixels.map(|pixels| pixels * rougher),
             light_samples: (LIGHT_SAMPLES[0] / outline.lights.all.max(1) as u32).clamp(1, LIGHT_SAMPLES[1]),

@@ -5,6 +5,7 @@ use super::eye::RaySettings;
 use super::kind::Kind;
 use super::lookup::Reading;
 use super::photons::PhotonEffort;
+use super::presets;
 use super::radius::Limits;
 use crate::math::float;
 use crate::multiple_scatter;
@@ -33,9 +34,10 @@ pub struct Effort {
 }
 
 impl Effort {
-    /// For records that serve the making of others: tolerance times a factor, samples divided by a number.
-    fn coarser(self, tolerance: f32, fewer: u32) -> Self {
-        Self { tolerance: tolerance * self.tolerance, samples: (self.samples / fewer).max(16), ..self }
+    /// For records that serve the making of others: tolerance and reach towards surfaces times a factor each, samples divided by a number.
+    fn coarser(self, [tolerance, clearance]: [f32; 2], fewer: u32) -> Self {
+        let samples = (self.samples / fewer).max(16);
+        Self { tolerance: tolerance * self.tolerance, clearance: clearance * self.clearance, samples, ..self }
     }
 
     /// For records that may be off by `factor` times as much: noise falls with the root of samples, what extrapolation gets wrong with the square of radii.
@@ -158,7 +160,7 @@ impl Settings {
             Kind::Multiple => self.multiple,
             Kind::Irradiance => self.irradiance,
             // What it gets wrong is what all else brings along, in a mean over many surfaces.
-            Kind::CoarseIrradiance => self.irradiance.map(|e| e.coarser(3.0, 8)),
+            Kind::CoarseIrradiance => self.irradiance.map(|e| e.coarser([3.0, presets::roughness(self.error)], 8)),
         }
     }
 

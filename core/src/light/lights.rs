@@ -421,7 +421,7 @@ mod tests {
 
     fn questions(rng: &mut Generator) -> ([FromPoint; 3], [FromRay; 2]) {
         let point = at(rng);
-        let of = |except, sky| FromPoint { point, except, sky };
+        let of = |except, sky| FromPoint { point, except, sky, dark: false };
         let ray = Ray::new(point, warp::uniform_sphere(uniform2(rng)));
         let part = FromRay { ray, near: 0.1, far: 1.0, steep: false, until: None };
         let all = [of(Except::Nothing, true), of(Except::Near, true), of(Except::Steep, false)];

@@ -76,11 +76,13 @@ pub(crate) struct FromPoint {
     pub except: Except,
     /// Whether a sky counts.
     pub sky: bool,
+    /// Whether lamps without extent that shine elsewhere count as if they shone here.
+    pub dark: bool,
 }
 
 impl FromPoint {
     pub(crate) fn all(point: Vec3) -> Self {
-        Self { point, except: Except::Nothing, sky: true }
+        Self { point, except: Except::Nothing, sky: true, dark: false }
     }
 }
 
@@ -101,7 +103,17 @@ impl Question for FromPoint {
             Except::Near => within(light.near_field()),
             Except::Steep => within(light.steep_field()),
         };
-        if left_out || (!self.sky && light.is_sky()) { 0.0 } else { light.importance(self.point).min(1e30) }
+        if left_out || (!self.sky && light.is_sky()) {
+            return 0.0;
+        }
+        let mut sent = light.importance(self.point);
+        if self.dark
+            && sent <= 0.0
+            && let Some(field) = light.near_field().filter(|field| field.radius().is_none())
+        {
+            sent = light.intensity() / field.centre().distance_squared(self.point).max(1e-30);
+        }
+        sent.min(1e30)
     }
 
     #[inline]
@@ -122,7 +134,7 @@ impl Question for FromPoint {
         }
         let offset = self.point - node.centre;
         let (distance2, radius2) = (offset.length_squared(), node.radius2);
-        if !node.shines_to(offset, distance2) {
+        if !self.dark && !node.shines_to(offset, distance2) {
             return Guess::default();
         }
         // Lamps on one another have no radius.

@@ -17,6 +17,10 @@ use crate::sampling::{Generator, uniform, uniform2};
 /// so from where fog hides the lamps next to none goes there.
 const SHARE: f32 = 0.25;
 
+/// Part of what a lamp has of directions that it has where it shines elsewhere: rays that pass it closely see it from before, all others do not. Larger:
+/// samples for what is rarely lit; smaller: the bound of what is.
+pub(crate) const DARK: f32 = 0.25;
+
 /// Half angle of the cone around a lamp (rad). Farther from it nothing is steep.
 const WIDEST: f32 = 0.5;
 
@@ -29,6 +33,13 @@ struct Glare {
     point: Vec3,
 }
 
+impl Glare {
+    /// Lamps that shine past the point count, too: what passes them closely sees them from before.
+    fn sent(&self) -> FromPoint {
+        FromPoint { dark: true, ..FromPoint::all(self.point) }
+    }
+}
+
 impl Question for Glare {
     fn asks(&self, kind: Kind) -> bool {
         kind == Kind::Lamp
@@ -36,11 +47,11 @@ impl Question for Glare {
 
     fn light(&self, light: &Light<'_>) -> f32 {
         let Some(field) = light.near_field().filter(|field| field.radius().is_none()) else { return 0.0 };
-        (light.importance(self.point) * field.centre().distance(self.point)).min(1e30)
+        (self.sent().light(light) * field.centre().distance(self.point)).min(1e30)
     }
 
     fn node(&self, node: &LightNode) -> Guess {
-        FromPoint::all(self.point).node(node) * node.away(self.point)
+        self.sent().node(node) * node.away(self.point)
     }
 
     fn limit(&self) -> usize {
@@ -54,7 +65,7 @@ struct Aim {
     axis: Vec3,
     /// In proportion to `I/r`, what rays about it collect together without fog.
     weight: f32,
-    /// `e^{−σₜ r}`, as if the medium were the same all the way.
+    /// `e^{−σₜ r}`, as if the medium were the same all the way; of lamps that shine elsewhere [`DARK`] of it.
     clear: f32,
 }
 
@@ -68,8 +79,11 @@ fn aims<'a>(
         let field = light.steep_field().filter(|field| field.radius().is_none())?;
         let offset = field.centre() - point;
         let distance = offset.length();
-        let weight = light.importance(point) * distance;
-        let clear = float::exp(-extinction * distance);
+        let weight = Glare { point }.light(light);
+        let mut clear = float::exp(-extinction * distance);
+        if light.importance(point) <= 0.0 {
+            clear *= DARK;
+        }
         // Written so that NaN fails, too.
         let is_valid = weight > 0.0 && weight < f32::INFINITY && distance > 0.0 && clear > 0.0;
         is_valid.then(|| Aim { axis: offset / distance, weight, clear })
@@ -118,7 +132,7 @@ pub(super) fn turn(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::light::{Light, PointLight, Sun};
+    use crate::light::{Light, PointLight, SpotLight, Sun};
     use crate::phase::Lobe;
     use crate::spectrum::Spectrum;
 
@@ -130,9 +144,16 @@ mod tests {
     /// means are what they are without lamps.
     #[test]
     fn light_collected_past_a_lamp_has_a_bound_and_no_bias() {
-        for lobe in [Lobe::Isotropic, Lobe::HenyeyGreenstein { g: 0.8 }, Lobe::HenyeyGreenstein { g: -0.6 }] {
+        // What shines the other way is lit where rays pass it closely, too, but gets fewer directions.
+        let away = SpotLight::new(Vec3::Z, Vec3::Z, 0.2, 0.5, Spectrum::ONE).unwrap();
+        assert_eq!(Light::Spot(away).importance(Vec3::ZERO), 0.0);
+        let behind = Light::Spot(away);
+        let lobes = [Lobe::Isotropic, Lobe::HenyeyGreenstein { g: 0.8 }, Lobe::HenyeyGreenstein { g: -0.6 }];
+        let lit = lobes.map(|lobe| (lobe, lamp(Vec3::Z), 40.0));
+        let dark = lobes.map(|lobe| (lobe, behind, 40.0 / DARK));
+        for (lobe, first, bound) in lit.into_iter().chain(dark) {
             let phase = Phase::from(lobe);
-            let lights = [lamp(Vec3::Z), lamp(Vec3::new(0.5, -1.0, 0.2))];
+            let lights = [first, lamp(Vec3::new(0.5, -1.0, 0.2))];
             let (rng, to_eye, count) = (&mut Generator::new(5), Vec3::new(0.6, 0.0, -0.8), 200_000);
             let (mut most, mut sum, mut squares) = (0.0_f32, [0.0_f64; 2], [0.0_f64; 2]);
             for _ in 0..count {
@@ -151,7 +172,7 @@ mod tests {
                     squares[i] += value * value;
                 }
             }
-            assert!(most < 40.0, "{lobe:?}: {most}");
+            assert!(most < bound, "{lobe:?}: {most}");
             let expected = [1.0, -f64::from(phase.mean_cosine()[0])];
             for i in 0..2 {
                 let n = f64::from(count);

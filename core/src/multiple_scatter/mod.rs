@@ -44,6 +44,7 @@ mod weight;
 pub(crate) use estimate::Cones;
 pub use estimate::{sample, sample_directional};
 pub use flight::{Collision, Flown, Lengths};
+pub(crate) use lamps::DARK;
 pub(crate) use walk::MOST_STRAIGHT;
 pub use walk::{Incoming, Known, Settings, Start, Walk};
 pub use weight::{Shift, Weight};

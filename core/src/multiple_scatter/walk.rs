@@ -504,7 +504,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Walk<'_, M, S> {
 
 /// What lights but those around which it lies send to a vertex, which scatters it on.
 fn at_vertex<'p>(point: Vec3, (to_eye, phase): (Vec3, &'p Phase)) -> impl Question + use<'p> {
-    scattered(FromPoint { point, except: Except::Steep, sky: false }, to_eye, phase)
+    scattered(FromPoint { except: Except::Steep, sky: false, ..FromPoint::all(point) }, to_eye, phase)
 }
 
 /// Whether walks may meet lights as they are scattered by a phase function: elsewhere connections do better, and spare a ray.

@@ -15,7 +15,7 @@ use crate::world::{NearLight, World, short_of_end};
 /// field is left to [`along`].
 #[inline]
 fn importance(point: Vec3, in_medium: bool) -> FromPoint {
-    FromPoint { point, except: if in_medium { Except::Near } else { Except::Nothing }, sky: true }
+    FromPoint { except: if in_medium { Except::Near } else { Except::Nothing }, ..FromPoint::all(point) }
 }
 
 #[inline]

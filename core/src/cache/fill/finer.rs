@@ -117,7 +117,9 @@ impl<'s, F: Fn([f32; 2]) -> Ray> Filling<'s, F> {
             }
             self.take_over(kind, old);
             let ratio = |before: f32, after: f32| if before < f32::INFINITY { after / before } else { 1.0 };
-            let factor = ratio(old.tolerance, new.tolerance).min(ratio(old.free_paths, new.free_paths));
+            let factor = ratio(old.tolerance, new.tolerance)
+                .min(ratio(old.free_paths, new.free_paths))
+                .min(ratio(old.clearance, new.clearance));
             self.held[kind].tighter = Some(Tighter { factor, limits: old.limits, pixels: before.pixels, eye });
         }
         self.caches.views.clear();
