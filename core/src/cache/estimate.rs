@@ -96,7 +96,7 @@ impl Mixture<'_> {
     }
 
     /// Direction `j` with the density (sr⁻¹) of the mixture.
-    fn direction(&self, j: u32, sample: impl Fn(Vec2) -> Vec3, pdf: impl Fn(Vec3) -> f32) -> (Vec3, f32) {
+    fn direction(&self, j: u32, sample: &dyn Fn(Vec2) -> Vec3, pdf: &dyn Fn(Vec3) -> f32) -> (Vec3, f32) {
         let (has_aims, parts) = (!self.aims.is_empty(), self.parts());
         let of_part = |part: u32| (self.count + parts - 1 - part) / parts;
         let (to_aims, to_eye) = (1, 1 + u32::from(has_aims));
@@ -246,7 +246,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
         self.expanded(phase, higher, to_eye.map(|eye| (eye, SURFACE_POWER)), |into, seen| {
             let (mut sums, mut openings) = (Sums::default(), Openings::default());
             for j in 0..count {
-                let (direction, pdf) = mixture.direction(j, warp::uniform_sphere, |_| warp::uniform_sphere_pdf());
+                let (direction, pdf) = mixture.direction(j, &warp::uniform_sphere, &|_| warp::uniform_sphere_pdf());
                 let ray = Ray::new(point, direction);
                 let marching = Marching { steps: self.walk.steps, offset: uniform(rng) };
                 let end = nearest_surface(&ray, scene);
@@ -291,7 +291,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
             let (mut cones, mut halves) = (Cones::default(), Halves::default());
             let mut seen = Cones::default();
             for j in 0..count {
-                let (to_light, pdf) = mixture.direction(j, warp::uniform_sphere, |_| warp::uniform_sphere_pdf());
+                let (to_light, pdf) = mixture.direction(j, &warp::uniform_sphere, &|_| warp::uniform_sphere_pdf());
                 let ray = Ray::new(point, to_light);
                 let end = nearest_surface(&ray, self.world.scene);
                 let collision = walk.first(&ray, end.as_ref(), third(j, offset), false, rng).collision;
@@ -377,7 +377,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
         for j in 0..count {
             let upwards = |u| frame.to_world(warp::cosine_hemisphere(u));
             let cosine_pdf = |direction| warp::cosine_hemisphere_pdf(normal.dot(direction).max(0.0));
-            let (to_light, pdf) = mixture.direction(j, upwards, cosine_pdf);
+            let (to_light, pdf) = mixture.direction(j, &upwards, &cosine_pdf);
             let cosine = normal.dot(to_light);
             if cosine <= 0.0 {
                 if let Some(learnt) = &mut learnt {
@@ -672,7 +672,7 @@ mod tests {
                 let mixture = Mixture { aims, eye: None, guide: None, count: 51, shift };
                 let mut mean = 0.0;
                 for j in 0..mixture.count {
-                    let (direction, pdf) = mixture.direction(j, warp::uniform_sphere, |_| warp::uniform_sphere_pdf());
+                    let (direction, pdf) = mixture.direction(j, &warp::uniform_sphere, &|_| warp::uniform_sphere_pdf());
                     // Rays that go the other way do not pass it.
                     if direction.z > 0.0 {
                         let across = Vec3::Z.cross(direction).length().max(f32::MIN_POSITIVE);
