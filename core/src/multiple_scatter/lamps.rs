@@ -63,10 +63,12 @@ impl Question for Glare {
 struct Aim {
     /// Unit direction to it.
     axis: Vec3,
-    /// In proportion to `I/r`, what rays about it collect together without fog.
+    /// In proportion to `I/r`, what rays about it collect together without fog; of lamps that shine elsewhere [`DARK`] of it.
     weight: f32,
-    /// `e^{−σₜ r}`, as if the medium were the same all the way; of lamps that shine elsewhere [`DARK`] of it.
+    /// `e^{−σₜ r}`, as if the medium were the same all the way.
     clear: f32,
+    /// Whether it shines there.
+    is_lit: bool,
 }
 
 fn aims<'a>(
@@ -79,14 +81,12 @@ fn aims<'a>(
         let field = light.steep_field().filter(|field| field.radius().is_none())?;
         let offset = field.centre() - point;
         let distance = offset.length();
-        let weight = Glare { point }.light(light);
-        let mut clear = float::exp(-extinction * distance);
-        if light.importance(point) <= 0.0 {
-            clear *= DARK;
-        }
+        let is_lit = light.importance(point) > 0.0;
+        let weight = Glare { point }.light(light) * if is_lit { 1.0 } else { DARK };
+        let clear = float::exp(-extinction * distance);
         // Written so that NaN fails, too.
         let is_valid = weight > 0.0 && weight < f32::INFINITY && distance > 0.0 && clear > 0.0;
-        is_valid.then(|| Aim { axis: offset / distance, weight, clear })
+        is_valid.then(|| Aim { axis: offset / distance, weight, clear, is_lit })
     })
 }
 
@@ -102,15 +102,18 @@ pub(super) fn turn(
     let mut turn = phase.sample(to_eye, uniform2(rng));
     let strong = lights.strong(&Glare { point });
     let aims = || aims(point, &strong, lights, extinction);
-    let (mut all, mut seen) = (strong.others, 0.0);
+    let (mut all, mut seen, mut most) = (strong.others, 0.0, DARK);
     for aim in aims() {
         all += aim.weight;
         seen += aim.weight * aim.clear;
+        if aim.is_lit {
+            most = 1.0;
+        }
     }
     if !(seen > 0.0 && all < f32::INFINITY) {
         return turn;
     }
-    let share = SHARE * (seen / all);
+    let share = SHARE * most * (seen / all);
     let (aimed, choice, on_cone) = (uniform(rng), uniform(rng), uniform2(rng));
     let to_lamps = aims().map(|aim| (aim.weight * aim.clear, aim.axis));
     if aimed < share
