@@ -39,23 +39,11 @@ def cpu(statistics, of=("fill", "render")):
     return sum(time["cpu"] or 0.0 for phase, time in statistics["seconds"].items() if phase.startswith(tuple(of)))
 
 
-def peer_run(scene, samples, seed, size=128):
-    """The peer's image and CPU seconds, at any size."""
+def peer_run(scene, samples, seed):
+    """The peer's image and CPU seconds."""
     import peer
-    if size == 128:
-        image, _, seconds = peer.run(scene, samples, "llvm_ad_rgb", seed=seed)
-        return image, seconds
-    import re
-    with open(path_of(scene)) as file:
-        text = re.sub(r'(name="(?:width|height)" value=)"128"', rf'\1"{size}"', file.read())
-    text = re.sub(r'(name="filename" value=)"([^"]*)"', lambda m: f'{m[1]}"{os.path.join(PUBLIC, m[2])}"', text)
-    with tempfile.TemporaryDirectory() as folder:
-        name = os.path.join(folder, "scene.xml")
-        with open(name, "w") as file:
-            file.write(text)
-        # An absolute path wins over the folder that the peer would join it to.
-        image, _, seconds = peer.run(name[:-4], samples, "llvm_ad_rgb", seed=seed)
-        return image, seconds
+    image, _, seconds = peer.run(scene, samples, "llvm_ad_rgb", seed=seed)
+    return image, seconds
 
 
 class Stored:

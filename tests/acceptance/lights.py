@@ -9,6 +9,7 @@ fill and of a sample of the picture, the noise of a sample (from two pictures of
 --seconds bounds each run. --scene takes a scene instead.
 """
 import argparse, json, math, os, random, subprocess, tempfile
+from plot import plot
 
 HEAD = """<scene version="3.0.0">
   <medium type="homogeneous" id="fog"><float name="sigma_t" value="1"/><rgb name="albedo" value="0.9 0.9 0.9"/><float name="scale" value="1"/><phase type="isotropic"/></medium>
@@ -97,28 +98,6 @@ def measure(program, file, method, seconds, size, folder):
     return fill, render / samples, math.sqrt(noise2 * samples), mean
 
 
-def plot(rows, path):
-    """Seconds to 2 % over the number of lamps, both logarithmic."""
-    series = {}
-    for name, count, seconds in rows:
-        series.setdefault(name, []).append((math.log10(count), math.log10(max(seconds, 1e-3))))
-    xs, ys = [x for s in series.values() for x, _ in s], [y for s in series.values() for _, y in s]
-    low, high = math.floor(min(ys)), math.ceil(max(ys)) or 1
-    at = lambda x, y: (60 + 400 * (x - min(xs)) / (max(xs) - min(xs) or 1), 320 - 280 * (y - low) / (high - low or 1))
-    out = '<svg xmlns="http://www.w3.org/2000/svg" width="700" height="360" font-family="sans-serif" font-size="12">\n'
-    for decade in range(low, high + 1):
-        x, y = at(min(xs), decade)
-        out += f'<line x1="{x}" y1="{y}" x2="{x + 400}" y2="{y}" stroke="#ddd"/><text x="8" y="{y + 4}">{10.0 ** decade:g} s</text>\n'
-    for i, (name, points) in enumerate(series.items()):
-        colour = ["#1b6", "#e63", "#36c", "#939", "#c90", "#0aa", "#777", "#c36"][i % 8]
-        line = " ".join(f"{x:.1f},{y:.1f}" for x, y in (at(*p) for p in points))
-        out += f'<polyline points="{line}" fill="none" stroke="{colour}" stroke-width="2"/><text x="480" y="{40 + 18 * i}" fill="{colour}">{name}</text>\n'
-    for x in sorted(set(xs)):
-        out += f'<text x="{at(x, low)[0] - 12}" y="345">{10 ** x:.0f}</text>\n'
-    with open(path, "w") as file:
-        file.write(out + "</svg>\n")
-
-
 def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("programs", nargs="+")
@@ -149,7 +128,10 @@ def main():
                         rows.append((f"{kind}, {method}, {program}", count or 1, seconds))
                         print(f"{os.path.basename(file)[:-4]:>14} {method:>6} {program[-10:]:>10}  {fill:7.2f}s {sample:8.4f}s {100 * noise:7.1f}% {seconds:8.2f}s  {mean:.5f}", flush=True)
     if arguments.plot:
-        plot(rows, arguments.plot)
+        series = {}
+        for name, count, seconds in rows:
+            series.setdefault(name, []).append((count, seconds))
+        plot(series, arguments.plot, "s")
 
 
 if __name__ == "__main__":

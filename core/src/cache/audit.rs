@@ -68,6 +68,10 @@ pub(super) fn rays_for(walks: u64) -> u32 {
 /// one is chance: to make records anew by it takes longer than all else. More: time where the first was right; fewer: chance decides.
 const AGAIN: u32 = 3;
 
+/// Share of standard errors by which a second look is in doubt that does not bear the first out: with twice as many rays two standard errors become
+/// three. More: wild records stay that few rays meet; less: time for chance.
+const DOUBT: f64 = 2.0 / 3.0;
+
 /// Standard errors beyond which a difference is no chance.
 pub(super) const SURE: f64 = 3.0;
 
@@ -230,6 +234,14 @@ impl Findings {
         self.gradients[kind].is_some_and(|slope| agreement::is_misled(&slope))
     }
 
+    /// Whether the picture, or what its error comes from, may be found wrong by twice as many rays.
+    fn is_in_doubt(&self, most: f64) -> bool {
+        let Squared { mean, error } = self.squared;
+        let nearly = |found: Deviation| Deviation { error: DOUBT * found.error, ..found }.is_to_be_mended(most);
+        let of_kinds = || Kind::FINAL.into_iter().filter_map(|kind| self.of(kind)).any(nearly);
+        nearly(self.cached) || of_kinds() || Squared { mean, error: DOUBT * error }.exceeds(most)
+    }
+
     /// Regions that are off by certainly more than `most`, where the others together are not.
     pub(super) fn places(&self, map: &BiasMap, most: f64) -> Option<Apart> {
         map.apart(most).filter(|apart| !apart.rest.is_to_be_mended(most))
@@ -374,8 +386,8 @@ impl<'c, 's, F: Fn([f32; 2]) -> Ray> Audit<'c, 's, F> {
         }
     }
 
-    /// Where the rays say that records are wrong by so much that [`RadianceCaches::drop_wrong`] would drop them for `error`, looks again, along three times as many others; what they find is all
-    /// that counts then. For who drops records by an audit: a verdict by chance costs more than the second look.
+    /// Where the rays say that records are wrong by so much that [`RadianceCaches::drop_wrong`] would drop them for `error`, looks again, along three times as many others,
+    /// or six times where these do not settle it; what they find is all that counts then. For who drops records by an audit: a verdict by chance costs more than the second look.
     ///
     /// ```
     /// # #[cfg(feature = "alloc")] {
@@ -392,13 +404,20 @@ impl<'c, 's, F: Fn([f32; 2]) -> Ray> Audit<'c, 's, F> {
         Self { most: Some(f64::from(error)), ..self }
     }
 
-    /// After a first look that says that records are wrong, a second; after that none.
+    /// After a first look that says that records are wrong, a second, which is twice as long where it is in doubt; after that none.
     fn look_again(&mut self) {
-        let Some(most) = self.most.take() else { return };
-        if self.findings().wrong(&self.map(), most).iter().any(Option::is_some) {
+        let Some(most) = self.most else { return };
+        let (findings, is_first) = (self.findings(), self.first == 0);
+        let is_wrong = findings.wrong(&self.map(), most).iter().any(Option::is_some);
+        if is_first && is_wrong {
             let jobs = self.jobs.saturating_mul(AGAIN);
             (self.first, self.jobs) = (self.jobs, self.jobs.saturating_add(jobs));
             (self.sums, self.regions) = (Sums::default(), RegionSums::new(jobs.saturating_mul(GROUP)));
+            return;
+        }
+        self.most = None;
+        if !is_first && !is_wrong && findings.is_in_doubt(most) {
+            self.jobs = self.jobs.saturating_add(self.jobs - self.first);
         }
     }
 
@@ -526,7 +545,8 @@ mod tests {
     use crate::work::step;
     use crate::world::Outline;
 
-    /// Only what a second look finds counts: a fifth too bright in the first by chance, and right in all that follows.
+    /// Only what a second look finds counts: a fifth too bright in the first by chance, and right in all that follows, or so little known of it that
+    /// it is prolonged.
     #[test]
     fn a_verdict_by_chance_is_not_upheld() {
         let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::splat(0.5), Phase::ISOTROPIC).unwrap();
@@ -537,7 +557,10 @@ mod tests {
         // Without records every point has an estimate of its own.
         let caches = RadianceCaches::new(Settings::for_outline(&outline, 0.02).with_walks(16));
         let ray = |at: [f32; 2]| Ray::new(3.0 * Vec3::Z, Vec3::new(at[0] - 0.5, at[1] - 0.5, -2.0).normalize());
-        for (held, is_off, jobs) in [(true, true, 64), (false, true, 16), (true, false, 16)] {
+        let none = (true, false, 16);
+        for ((held, is_off, jobs), doubt) in
+            [((true, true, 64), 0.0), ((true, true, 112), 2.5), ((false, true, 16), 0.0), (none, 0.0)]
+        {
             let audit = Audit::new(&caches, ray, 16 * GROUP);
             let mut audit = if held { audit.held_to(0.02) } else { audit };
             let mut output = Compared::default();
@@ -548,10 +571,22 @@ mod tests {
             if is_off {
                 audit.sums.cached = Moments { d: 0.2 * t, dd: 0.04 * tt, dt: 0.2 * tt };
             }
+            while doubt > 0.0 && audit.taken < 63 {
+                step(&mut audit, &world, &mut output);
+            }
+            if doubt > 0.0 {
+                // A bias of so many standard errors.
+                let (d, groups) = (0.2 * audit.sums.truth[0], 47.0);
+                audit.sums.cached = Moments {
+                    d,
+                    dd: d * d * (1.0 / groups + 1.0 / (doubt * doubt)),
+                    dt: d * audit.sums.truth[0] / groups,
+                };
+            }
             while step(&mut audit, &world, &mut output) {}
             let found = audit.findings();
             assert_eq!(audit.taken, jobs);
-            assert_eq!(found.rays, if jobs == 64 { 48 * GROUP } else { 16 * GROUP });
+            assert_eq!(found.rays, (if jobs > 16 { jobs - 16 } else { 16 }) * GROUP);
             assert_eq!(found.cached.exceeds(0.02), is_off && !held, "{found:?}");
             let in_regions: u32 = audit.map().regions().iter().map(|region| region.rays).sum();
             assert_eq!(in_regions, found.rays);

@@ -294,8 +294,8 @@ impl<'s, F> Filling<'s, F> {
     }
 
     /// The noise that a picture of so many pixels may have (`picture::Goal::noise`) where `error` is asked for, noise of records
-    /// included: as much, or down to half of it where the picture then takes less than a quarter of the work of this fill. Small
-    /// pictures gain most by samples, large ones by records.
+    /// included: as much, or the less the more work this fill was over what the picture will be. Small pictures gain most by samples, large ones by
+    /// records.
     #[must_use]
     pub fn noise_goal(&self, error: f32, pixels: u32) -> f32 {
         noise_goal(error, pixels, self.walks())

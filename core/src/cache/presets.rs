@@ -55,15 +55,12 @@ const PHOTONS: u32 = 1 << 22;
 /// See [`PHOTONS`].
 const FLIGHTS: f64 = 3e7;
 
-/// Photons that know the light of a cell: 7 % of noise, of which a walk meets a mean over many cells.
-const ENOUGH: u32 = 192;
+/// Photons that know the light of a cell where scattering is even, 10 % of noise, of which a walk meets a mean over many cells: as many times as many where what cells
+/// say of one direction varies more. More: time; fewer: clouds of noise, which all records of a place share.
+const ENOUGH: u32 = 96;
 
 /// The same at least, of rough pictures. Fewer: few cells are known, and walks, which then go on, take longer than the photons; more: time.
 const FEWEST: f64 = 24.0;
-
-/// Photons are as many times as many as what cells say of one direction varies more than their fluence does, over this. Less: time; more:
-/// clouds of noise where scattering is sharp, which all records of a place share.
-const EVEN: f32 = 2.0;
 
 /// Most vertices of a walk. More: nothing, as roulette ends walks long before; fewer: dense fog that hardly absorbs turns out too dark.
 const VERTICES: u32 = 4096;
@@ -186,17 +183,17 @@ impl PhotonEffort {
 /// Samples of a pixel at which most pictures have [`USUAL_ERROR`] of noise, each of which takes as long as so many walks of records.
 const PIXEL: [f64; 2] = [16.0, 4.0];
 
-/// Work of a picture over that of its records up to which less noise is asked for, and how much less at most. More: time that large records make
-/// useless; less: small pictures are noisy for no gain.
-const PICTURE: [f64; 2] = [0.25, 0.5];
+/// Noise over what is left for it, and how much less it is where records take longer than the picture. More: grain; less: time for samples.
+const PICTURE: [f64; 2] = [1.5, 3.0];
 
-/// See [`Filling::noise_goal`](super::Filling::noise_goal): noise falls with the root of samples.
+/// See [`Filling::noise_goal`](super::Filling::noise_goal). Noise `n` of pixels and the error `r` of records have the least time `w/r² + 1/n²` for their
+/// `r² + n²` where `(r/n)² = √w`.
 pub(super) fn noise_goal(error: f32, pixels: u32, walks: u64) -> f32 {
     let scale = f64::from(error / USUAL_ERROR);
     let work = f64::from(pixels) * PIXEL[0] / (scale * scale) * PIXEL[1];
-    let share = libm::sqrt(work / (PICTURE[0] * walks as f64));
-    // Without records NaN or infinite: written so that the first means all.
-    if share < 1.0 { error * share.max(PICTURE[1]) as f32 } else { error }
+    // Without pixels NaN or infinite: written so that these mean all.
+    let share = PICTURE[0] / libm::sqrt(1.0 + PICTURE[1] * libm::sqrt(walks as f64 / work));
+    if share > 0.0 { error * share.min(1.0) as f32 } else { error }
 }
 
 /// The most samples per pixel for that. More: time at edges between black and a lamp, where noise falls no faster; fewer: jagged edges.
@@ -350,7 +347,7 @@ fn photons(outline: &Outline, scale: f32) -> PhotonEffort {
     // Noise of cells is the same for all that looks at them, and photons are cheap: of rough pictures they are spared less than walks.
     let finer = f64::from(1.0 / (scale * scale.min(1.0)));
     let degree = resolved::degree_for(&outline.phase);
-    let sharper = f64::from(resolved::spread(&outline.phase, degree) / EVEN).max(1.0);
+    let sharper = f64::from(resolved::spread(&outline.phase, degree)).max(1.0);
     PhotonEffort {
         bounds: outline.bounds,
         cells,
@@ -384,4 +381,22 @@ fn degree_for(phase: &Phase, power: u32, fall_off: f32, left_out: f32) -> usize 
         }
     }
     sh::MAX_DEGREE
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pictures_that_take_longer_than_records_may_have_all_noise_and_others_less() {
+        let goal = |pixels, walks| noise_goal(0.02, pixels, walks);
+        assert_eq!([goal(1 << 20, 0), goal(0, 0), goal(0, 1 << 40), goal(1 << 20, 1 << 20)], [0.02; 4]);
+        // The work of walks over that of 2¹⁴ pixels: 1, 16, 64.
+        let [even, more, most] = [1 << 20, 16 << 20, 64 << 20].map(|walks| goal(1 << 14, walks) / 0.02);
+        for (share, expected) in [(even, 1.5 / 2.0), (more, 1.5 / libm::sqrt(13.0)), (most, 1.5 / 5.0)] {
+            assert!((f64::from(share) - expected).abs() < 1e-6, "{share} in place of {expected}");
+        }
+        // A rougher picture needs fewer samples, and its records take less in proportion.
+        assert!((noise_goal(0.04, 1 << 14, 4 << 20) / 0.04 - more).abs() < 1e-6);
+    }
 }
