@@ -68,7 +68,7 @@ pub(super) fn rays_for(walks: u64) -> u32 {
 /// one is chance: to make records anew by it takes longer than all else. More: time where the first was right; fewer: chance decides.
 const AGAIN: u32 = 3;
 
-/// Share of standard errors by which a second look is in doubt that does not bear the first out: with twice as many rays two standard errors become
+/// Share of standard errors from which on a look that finds nothing wrong is in doubt: with twice as many rays two standard errors become
 /// three. More: wild records stay that few rays meet; less: time for chance.
 const DOUBT: f64 = 2.0 / 3.0;
 
@@ -351,6 +351,8 @@ pub struct Audit<'c, 's, F> {
     taken: u32,
     /// What a second look would be for.
     most: Option<f64>,
+    /// Whether this look has been prolonged.
+    is_doubled: bool,
     sums: Sums,
     regions: RegionSums,
     gradients: ByKind<Option<Deviation>>,
@@ -380,14 +382,15 @@ impl<'c, 's, F: Fn([f32; 2]) -> Ray> Audit<'c, 's, F> {
             jobs,
             taken: 0,
             most: None,
+            is_doubled: false,
             sums: Sums::default(),
             regions: RegionSums::new(jobs * GROUP),
             gradients,
         }
     }
 
-    /// Where the rays say that records are wrong by so much that [`RadianceCaches::drop_wrong`] would drop them for `error`, looks again, along three times as many others,
-    /// or six times where these do not settle it; what they find is all that counts then. For who drops records by an audit: a verdict by chance costs more than the second look.
+    /// Where the rays say that records are wrong by so much that [`RadianceCaches::drop_wrong`] would drop them for `error`, looks again, along three times as many others; what
+    /// they find is all that counts then. Either look takes twice as many rays where it is in doubt. For who drops records by an audit: a verdict by chance costs more than the second look.
     ///
     /// ```
     /// # #[cfg(feature = "alloc")] {
@@ -404,21 +407,24 @@ impl<'c, 's, F: Fn([f32; 2]) -> Ray> Audit<'c, 's, F> {
         Self { most: Some(f64::from(error)), ..self }
     }
 
-    /// After a first look that says that records are wrong, a second, which is twice as long where it is in doubt; after that none.
+    /// After a first look that says that records are wrong, a second; after that none. Either is doubled once where it is in doubt.
     fn look_again(&mut self) {
         let Some(most) = self.most else { return };
         let (findings, is_first) = (self.findings(), self.first == 0);
-        let is_wrong = findings.wrong(&self.map(), most).iter().any(Option::is_some);
-        if is_first && is_wrong {
-            let jobs = self.jobs.saturating_mul(AGAIN);
-            (self.first, self.jobs) = (self.jobs, self.jobs.saturating_add(jobs));
-            (self.sums, self.regions) = (Sums::default(), RegionSums::new(jobs.saturating_mul(GROUP)));
+        if findings.wrong(&self.map(), most).iter().any(Option::is_some) {
+            if is_first {
+                let jobs = self.jobs.saturating_mul(AGAIN);
+                (self.first, self.jobs) = (self.jobs, self.jobs.saturating_add(jobs));
+                (self.sums, self.regions) = (Sums::default(), RegionSums::new(jobs.saturating_mul(GROUP)));
+                self.is_doubled = false;
+                return;
+            }
+        } else if !self.is_doubled && findings.is_in_doubt(most) {
+            self.jobs = self.jobs.saturating_add(self.jobs - self.first);
+            self.is_doubled = true;
             return;
         }
         self.most = None;
-        if !is_first && !is_wrong && findings.is_in_doubt(most) {
-            self.jobs = self.jobs.saturating_add(self.jobs - self.first);
-        }
     }
 
     /// What was found so far, by region of the picture.
