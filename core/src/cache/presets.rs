@@ -55,12 +55,15 @@ const PHOTONS: u32 = 1 << 22;
 /// See [`PHOTONS`].
 const FLIGHTS: f64 = 3e7;
 
-/// Photons that know the light of a cell where scattering is even, 10 % of noise, of which a walk meets a mean over many cells: as many times as many where what cells
-/// say of one direction varies more. More: time; fewer: clouds of noise, which all records of a place share.
-const ENOUGH: u32 = 96;
+/// Photons that know the light of a cell: 7 % of noise, of which a walk meets a mean over many cells. More: time; fewer: clouds of noise, which all records of a place share.
+const ENOUGH: u32 = 192;
 
 /// The same at least, of rough pictures. Fewer: few cells are known, and walks, which then go on, take longer than the photons; more: time.
 const FEWEST: f64 = 24.0;
+
+/// Photons are as many times as many as what cells say of one direction varies more than their fluence does, over this. Less: time; more:
+/// clouds of noise where scattering is sharp, which all records of a place share.
+const EVEN: f32 = 2.0;
 
 /// Most vertices of a walk. More: nothing, as roulette ends walks long before; fewer: dense fog that hardly absorbs turns out too dark.
 const VERTICES: u32 = 4096;
@@ -183,7 +186,7 @@ impl PhotonEffort {
 /// Samples of a pixel at which most pictures have [`USUAL_ERROR`] of noise, each of which takes as long as so many walks of records.
 const PIXEL: [f64; 2] = [16.0, 4.0];
 
-/// Noise over what is left for it, and how much less it is where records take longer than the picture. More: grain; less: time for samples.
+/// Noise over what is left for it, more in rough pictures, and how much less it is where records take longer than the picture. More: grain; less: time for samples.
 const PICTURE: [f64; 2] = [1.5, 3.0];
 
 /// See [`Filling::noise_goal`](super::Filling::noise_goal). Noise `n` of pixels and the error `r` of records have the least time `w/r² + 1/n²` for their
@@ -192,7 +195,8 @@ pub(super) fn noise_goal(error: f32, pixels: u32, walks: u64) -> f32 {
     let scale = f64::from(error / USUAL_ERROR);
     let work = f64::from(pixels) * PIXEL[0] / (scale * scale) * PIXEL[1];
     // Without pixels NaN or infinite: written so that these mean all.
-    let share = PICTURE[0] / libm::sqrt(1.0 + PICTURE[1] * libm::sqrt(walks as f64 / work));
+    let share =
+        PICTURE[0] * libm::sqrt(scale.max(1.0)) / libm::sqrt(1.0 + PICTURE[1] * libm::sqrt(walks as f64 / work));
     if share > 0.0 { error * share.min(1.0) as f32 } else { error }
 }
 
@@ -347,7 +351,7 @@ fn photons(outline: &Outline, scale: f32) -> PhotonEffort {
     // Noise of cells is the same for all that looks at them, and photons are cheap: of rough pictures they are spared less than walks.
     let finer = f64::from(1.0 / (scale * scale.min(1.0)));
     let degree = resolved::degree_for(&outline.phase);
-    let sharper = f64::from(resolved::spread(&outline.phase, degree)).max(1.0);
+    let sharper = f64::from(resolved::spread(&outline.phase, degree) / EVEN).max(1.0);
     PhotonEffort {
         bounds: outline.bounds,
         cells,
@@ -396,7 +400,7 @@ mod tests {
         for (share, expected) in [(even, 1.5 / 2.0), (more, 1.5 / libm::sqrt(13.0)), (most, 1.5 / 5.0)] {
             assert!((f64::from(share) - expected).abs() < 1e-6, "{share} in place of {expected}");
         }
-        // A rougher picture needs fewer samples, and its records take less in proportion.
-        assert!((noise_goal(0.04, 1 << 14, 4 << 20) / 0.04 - more).abs() < 1e-6);
+        // A rougher picture needs fewer samples, its records take less in proportion, and it may have more noise of both.
+        assert!((noise_goal(0.08, 1 << 14, 1 << 20) / 0.08 - 2.0 * more).abs() < 1e-6);
     }
 }
