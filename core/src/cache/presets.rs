@@ -186,11 +186,18 @@ impl PhotonEffort {
 /// Samples of a pixel at which most pictures have [`USUAL_ERROR`] of noise, each of which takes as long as so many walks of records.
 const PIXEL: [f64; 2] = [16.0, 4.0];
 
-/// Noise over what is left for it, more in rough pictures, and how much less it is where records take longer than the picture. More: grain; less: time for samples.
+/// Noise of pixels over the error asked for where the records take hardly any work, and how fast it falls with `√w`. Larger first, or smaller second: grain; the
+/// other way: time for samples.
 const PICTURE: [f64; 2] = [1.5, 3.0];
 
-/// See [`Filling::noise_goal`](super::Filling::noise_goal). Noise `n` of pixels and the error `r` of records have the least time `w/r² + 1/n²` for their
-/// `r² + n²` where `(r/n)² = √w`.
+/// See [`Filling::noise_goal`](super::Filling::noise_goal): noise `n` of pixels for an `error` (both relative), by the work `w` of `walks` over that of the samples.
+///
+/// ```text
+/// n = error min(1, 1.5 √max(1, error/0.02)/√(1 + 3 √w))
+/// ```
+///
+/// Noise `n` and the error `r` of records have the least time `w/r² + 1/n²` for their `r² + n²` where `(r/n)² = √w`: `n` is `1/√(1 + √w)` of the whole. The numbers are by
+/// trial (decision 22). Rough pictures are better than asked for anyway.
 pub(super) fn noise_goal(error: f32, pixels: u32, walks: u64) -> f32 {
     let scale = f64::from(error / USUAL_ERROR);
     let work = f64::from(pixels) * PIXEL[0] / (scale * scale) * PIXEL[1];
