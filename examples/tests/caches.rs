@@ -127,7 +127,10 @@ fn caches_of_anything_else_are_refused() {
             with("a.caches", &["--max-depth", "1"]),
             &["a.caches: was made for another scene, or with another --max-depth"],
         ),
-        (with("a.caches", &["--tolerance-of", "multiple=0.5"]), &["a.caches: ", "\"multiple\"", "tolerance 2; 0.5"]),
+        (
+            with("a.caches", &["--tolerance-of", "irradiance=0.5"]),
+            &["a.caches: ", "\"irradiance\"", "tolerance 2; 0.5"],
+        ),
         (with("a.caches", &["--uncached", "surface"]), &["a.caches: ", "\"surface\"", "not asked for"]),
         (with("a.caches", &["--cache-out", "none/b"]), &["none/b: cannot be written"]),
         (with("a.caches", &["--cache-out", "."]), &[".: cannot be written"]),

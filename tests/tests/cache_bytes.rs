@@ -405,6 +405,26 @@ fn files_for_something_else_are_refused() {
 }
 
 #[test]
+fn reaches_that_were_shrunk_stay_so() {
+    let reaching = |share: f32| {
+        let mut settings = settings();
+        let effort = settings.multiple.as_mut().unwrap();
+        effort.limits.max *= share;
+        (effort.clearance, effort.free_paths) = (share * effort.clearance, share * effort.free_paths);
+        settings
+    };
+    // Of the file and of what is asked for, the nearer; not below the least radius, whatever a file says.
+    for (written, asked, due) in [(0.8, 1.0, 0.8), (1.0, 0.8, 0.8)] {
+        let bytes = RadianceCaches::new(reaching(written)).to_bytes(TAG);
+        assert_eq!(*decode(&bytes, reaching(asked), TAG).unwrap().settings(), reaching(due));
+    }
+    let bytes = RadianceCaches::new(reaching(f32::NAN)).to_bytes(TAG);
+    assert_eq!(*decode(&bytes, settings(), TAG).unwrap().settings(), settings());
+    let bytes = RadianceCaches::new(reaching(-1.0)).to_bytes(TAG);
+    assert_eq!(decode(&bytes, settings(), TAG).unwrap().settings().multiple.unwrap().limits.max, 1.0);
+}
+
+#[test]
 fn what_is_no_file_is_refused() {
     let folder = Folder::new("none");
     assert!(refusal(&folder.0, settings(), TAG).contains("is not a file"));

@@ -18,23 +18,10 @@ use crate::world::{World, nearest_surface, shadow_ray};
 const PEAKED: f32 = 0.7;
 
 impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
-    /// Light of one of the lights, chosen by `weight`, times `value(to_light, pdf)` with the density (sr⁻¹) of that choice, 0 for
-    /// lights without extent. Transmittance is marched: what ratio tracking adds in noise would rule pictures whose other
-    /// parts have none.
-    pub(super) fn connected(
-        &self,
-        (weight, point): (&impl Question, Vec3),
-        origin: &dyn Fn(Vec3) -> Vec3,
-        value: &dyn Fn(Vec3, f32) -> Spectrum,
-        random: (f32, Vec2),
-        rng: &mut Generator,
-    ) -> Spectrum {
-        let chosen = self.world.lights.pick(weight, random.0);
-        chosen.map_or(Spectrum::ZERO, |chosen| self.connected_to((chosen, random.1), point, origin, value, rng))
-    }
-
-    /// [`Estimator::connected`] with a light that was chosen, and a point in the unit square for that on it.
-    fn connected_to(
+    /// Light of a light that was chosen, from a point in the unit square for that on it, times `value(to_light, pdf)` with the density
+    /// (sr⁻¹) of that choice, 0 for lights without extent. Transmittance is marched: what ratio tracking adds in noise would rule
+    /// pictures whose other parts have none.
+    pub(super) fn connected_to(
         &self,
         (chosen, on_light): (Choice, Vec2),
         point: Vec3,

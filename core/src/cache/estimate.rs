@@ -472,7 +472,8 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
         let origin = |to_light: Vec3| leave(point, hit.normal, to_light, hit.distance);
         let cosine = |to_light: Vec3, _| Spectrum::splat(if hit.faces(to_light) { hit.cosine(to_light) } else { 0.0 });
         let weight = FromPoint { sky: with_sky, ..FromPoint::all(point) };
-        self.connected((&weight, point), &origin, &cosine, random, rng)
+        let chosen = self.world.lights.pick(&weight, random.0);
+        chosen.map_or(Spectrum::ZERO, |chosen| self.connected_to((chosen, random.1), point, &origin, &cosine, rng))
     }
 
     /// Irradiance (W·m⁻²) that is not straight from the lights but from a sky, by one path.
@@ -510,7 +511,8 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
             }
             value * mis::power(pdf, hit.pdf(to_eye, to_light))
         };
-        self.connected((&FromPoint::all(point), point), &origin, &value, random, rng)
+        let chosen = self.world.lights.pick(&FromPoint::all(point), random.0);
+        chosen.map_or(Spectrum::ZERO, |chosen| self.connected_to((chosen, random.1), point, &origin, &value, rng))
     }
 
     /// Light of all lights but a sky, scattered once at `point` towards `to_eye`: one sample of each, or of those that stand

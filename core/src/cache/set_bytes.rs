@@ -180,8 +180,8 @@ impl RadianceCaches<'_> {
     }
 
     /// Reads what [`RadianceCaches::write`] wrote with the same `tag` in place of what is there. [`RadianceCaches::settings`] must ask for
-    /// the same kinds and degrees. Tolerances that are smaller and samples that are more than asked for are taken over, larger and fewer
-    /// are errors; the rest may differ.
+    /// the same kinds and degrees. Tolerances and reaches that are smaller and samples that are more than asked for are taken over, larger tolerances and
+    /// fewer samples are errors; the rest may differ.
     ///
     /// ```
     /// # #[cfg(feature = "alloc")] {
@@ -231,7 +231,9 @@ impl RadianceCaches<'_> {
         }
         for (kind, row) in Kind::FINAL.into_iter().filter_map(|kind| Some((kind, rows[kind as usize].as_ref()?))) {
             if let Some(effort) = self.settings.effort_mut(kind) {
-                (effort.tolerance, effort.samples) = (row.effort.tolerance, row.effort.samples);
+                // Pilots and repairs have made records reach less far: those that are missing shall not reach farther again.
+                let (min, finer) = (effort.limits.min, effort.or_finer(&row.effort));
+                *effort = Effort { limits: Limits { min, max: finer.limits.max.max(min) }, ..finer };
             }
         }
         self.views.clear();

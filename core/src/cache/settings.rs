@@ -40,6 +40,19 @@ impl Effort {
         Self { tolerance: tolerance * self.tolerance, clearance: clearance * self.clearance, samples, ..self }
     }
 
+    /// The finer of both in every respect. Expansions keep their degree.
+    #[inline(never)]
+    pub(super) fn or_finer(self, other: &Self) -> Self {
+        Self {
+            tolerance: self.tolerance.min(other.tolerance),
+            samples: self.samples.max(other.samples),
+            degree: self.degree,
+            limits: Limits { min: self.limits.min.min(other.limits.min), max: self.limits.max.min(other.limits.max) },
+            clearance: self.clearance.min(other.clearance),
+            free_paths: self.free_paths.min(other.free_paths),
+        }
+    }
+
     /// For records that may be off by `factor` times as much: noise falls with the root of samples, what extrapolation gets wrong with the square of radii.
     fn rougher(self, factor: f32) -> Self {
         if factor > 1.0 {

@@ -6,6 +6,7 @@ use crate::cache::guide::{Guide, Guided, Looks};
 use crate::cache::kind::{Kind, Pass, Step};
 use crate::cache::memory::{Estimate, FilledRecords, FillingMemory};
 use crate::cache::noise::regions_in;
+use crate::cache::radius::Limits;
 use crate::cache::slot::learnt_near;
 use crate::cache::{Effort, Record};
 use crate::host::{Medium, Scene};
@@ -35,6 +36,10 @@ const LEAST_SAMPLES: u32 = 16;
 /// Share of the samples of a surface record that is hardly seen at all. Less: it is too noisy to tell how far it reaches.
 const LEAST_SEEN: f32 = 0.0625;
 
+/// Brightness (over that of usual records) from which on least radii on the screen no longer shrink. Less: light of ledges two pixels wide lies
+/// half a pixel off; more: records that no pixel resolves.
+const BRIGHTEST: f32 = 3.0;
+
 /// Records that reach less far than usual take a share of the samples down to this.
 const LEAST_SHARE: f32 = 0.25;
 
@@ -54,8 +59,20 @@ pub(super) fn usual_radius(records: &[Record]) -> f32 {
     squares / sum
 }
 
+/// Bounds of the radius of a record so many times as bright as usual, in a world whose own least radius is `least` (m): on the screen
+/// it may reach as many times less far, because what a small bright thing has wrong is seen as far more than what a dark corner has wrong.
+#[inline(never)]
+pub(super) fn where_bright(limits: Limits, least: f32, brightness: f32) -> Limits {
+    // NaN, of black records alone, is not bright.
+    if brightness > 1.0 {
+        Limits { min: (limits.min / brightness.min(BRIGHTEST)).max(least), ..limits }
+    } else {
+        limits
+    }
+}
+
 /// The mean value that a picture is made of, about: `Σ R² L/Σ R²`.
-fn usual_value(records: &[Record]) -> f32 {
+pub(super) fn usual_value(records: &[Record]) -> f32 {
     let add = |(sum, weight): (f32, f32), record: &Record| {
         let area = record.radius * record.radius;
         (sum + area * record.value.mean(), weight + area)
@@ -250,5 +267,24 @@ impl<F> Filling<'_, F> {
             _ => estimator.multiple(point, &phase, looks, higher, rng),
         };
         true
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_bright_may_reach_less_far_and_what_is_dark_no_farther() {
+        let limits = Limits { min: 0.3, max: 2.0 };
+        let least = |least, brightness| {
+            let limits = where_bright(limits, least, brightness);
+            assert_eq!(limits.max, 2.0);
+            limits.min
+        };
+        assert_eq!([0.0, 0.2, 1.0, f32::NAN].map(|brightness| least(0.01, brightness)), [0.3; 4]);
+        assert_eq!([2.0, 3.0, 75.0, f32::INFINITY].map(|brightness| least(0.01, brightness)), [0.15, 0.1, 0.1, 0.1]);
+        // The world's bound wins.
+        assert_eq!(least(0.2, 75.0), 0.2);
     }
 }

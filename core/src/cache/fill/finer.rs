@@ -1,5 +1,6 @@
 //! Levels: a fill that is done goes on for a smaller error, with the records that are there.
 
+use super::estimates::{usual_value, where_bright};
 use super::{Filling, RAYS_PER_JOB, Round};
 use crate::cache::asked::Asked;
 use crate::cache::guide::Guide;
@@ -42,20 +43,6 @@ impl Held {
     /// What earlier samples of record `number` count, over `samples` new ones; `None` of a record of this level.
     pub(super) fn over(&self, number: usize, samples: u32) -> Option<f32> {
         (number < self.count).then(|| COARSER * self.samples / samples.max(1) as f32)
-    }
-}
-
-impl Effort {
-    /// The finer of both in every respect. Expansions keep their degree.
-    fn or_finer(self, other: &Self) -> Self {
-        Self {
-            tolerance: self.tolerance.min(other.tolerance),
-            samples: self.samples.max(other.samples),
-            degree: self.degree,
-            limits: Limits { min: self.limits.min.min(other.limits.min), max: self.limits.max.min(other.limits.max) },
-            clearance: self.clearance.min(other.clearance),
-            free_paths: self.free_paths.min(other.free_paths),
-        }
     }
 }
 
@@ -163,15 +150,18 @@ impl<F> Filling<'_, F> {
     pub(super) fn tighten(&mut self, (Step { kind, .. }, effort): (Step, Effort)) {
         let Some(Tighter { factor, limits, pixels, eye }) = self.held[kind].tighter.take() else { return };
         let (now, coarser) = (self.settings().pixels, float::sqrt(self.settings().coarser[kind as usize]));
-        let on_screen = |limits: Limits, pixels: [f32; 2], point: Vec3| match eye {
-            Some((eye, pixel)) => {
-                limits.on_screen(pixels[0] * coarser, pixels[1] * coarser, pixel, eye.distance(point))
-            }
-            None => limits,
-        };
+        let bright = usual_value(self.caches.slots[kind].records());
         let is_room = self.caches.slots[kind].shrink(|record| {
-            let [before, after] = [(limits, pixels), (effort.limits, now)]
-                .map(|(limits, pixels)| on_screen(limits, pixels, record.position));
+            let brightness = record.value.mean() / bright;
+            let on_screen = |limits: Limits, pixels: [f32; 2]| match eye {
+                Some((eye, pixel)) => {
+                    let distance = eye.distance(record.position);
+                    let seen = limits.on_screen(pixels[0] * coarser, pixels[1] * coarser, pixel, distance);
+                    where_bright(seen, limits.min, brightness)
+                }
+                None => limits,
+            };
+            let (before, after) = (on_screen(limits, pixels), on_screen(effort.limits, now));
             // What was widened to the least radius has none of its own.
             let radius = if record.radius <= before.min { after.min } else { record.radius * factor };
             after.clamp(Some(radius))

@@ -1,6 +1,6 @@
 //! Steps of a fill: batches of places, rounds of new records for those that have none, and what becomes of their estimates.
 
-use super::estimates::usual_radius;
+use super::estimates::{usual_radius, usual_value, where_bright};
 use super::{Filling, PLACES_PER_JOB, Round};
 use crate::cache::Record;
 use crate::cache::asked::Wanted;
@@ -153,13 +153,14 @@ impl<F> Filling<'_, F> {
         let FillingMemory { wanted, chosen, estimates, higher, guides, .. } = &mut self.memory;
         let (wanted, chosen) = (wanted.as_slice(), chosen.as_slice());
         let slot = &mut self.caches.slots[step.kind];
-        let stride = slot.stride();
+        let (stride, bright) = (slot.stride(), usual_value(slot.records()));
         let mut added = 0;
         for (i, estimate) in estimates.as_slice().iter().enumerate() {
             self.computed += 1;
             self.all_computed[step.kind] += 1;
             let Estimate { place, sums, limits, .. } = estimate;
-            let Some(record) = Record::new(place.point, sums, effort.tolerance, *limits) else { continue };
+            let limits = where_bright(*limits, effort.limits.min, sums.value.mean() / bright);
+            let Some(record) = Record::new(place.point, sums, effort.tolerance, limits) else { continue };
             if slot.covers(place, &reading) {
                 continue;
             }
