@@ -104,7 +104,7 @@ pub struct Settings {
     pub rays: u32,
     /// Share of every radius that spheres overlap by.
     pub margin: f32,
-    /// Least and greatest radius in pixels.
+    /// Least and greatest radius in pixels. Records brighter than usual may reach less far, down to a third.
     pub pixels: [f32; 2],
     /// Records computed per round at most. Part of the result: larger rounds know less of each other.
     pub round: u32,
