@@ -72,6 +72,7 @@ mod kind;
 mod lobe;
 mod lookup;
 mod memory;
+mod mixture;
 mod noise;
 mod output_bytes;
 mod photons;
