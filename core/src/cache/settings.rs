@@ -41,7 +41,6 @@ impl Effort {
     }
 
     /// The finer of both in every respect. Expansions keep their degree.
-    #[inline(never)]
     pub(super) fn or_finer(self, other: &Self) -> Self {
         Self {
             tolerance: self.tolerance.min(other.tolerance),

@@ -61,9 +61,8 @@ pub(super) fn usual_radius(records: &[Record]) -> f32 {
 
 /// Bounds of the radius of a record so many times as bright as usual, in a world whose own least radius is `least` (m): on the screen
 /// it may reach as many times less far, because what a small bright thing has wrong is seen as far more than what a dark corner has wrong.
-#[inline(never)]
 pub(super) fn where_bright(limits: Limits, least: f32, brightness: f32) -> Limits {
-    // NaN, of black records alone, is not bright.
+    // NaN, where there are no records yet or only black ones, is not bright.
     if brightness > 1.0 {
         Limits { min: (limits.min / brightness.min(BRIGHTEST)).max(least), ..limits }
     } else {
