@@ -42,7 +42,7 @@ mod weigh;
 
 pub(super) use estimates::MOST_PARTS;
 
-use finer::Held;
+use finer::Tighter;
 
 /// Eye rays of one job. More: jobs take longer than some milliseconds in dense worlds.
 pub(super) const RAYS_PER_JOB: u32 = 16;
@@ -156,10 +156,8 @@ pub struct Filling<'s, F> {
     again: u32,
     /// How often [`Filling::refine`] was called, and what records there were then.
     level: u32,
-    held: ByKind<Held>,
-    /// How often records of each kind have been estimated anew since, in the mean, and the part of them in the round at hand.
-    estimated: ByKind<f32>,
-    part: f32,
+    /// What is done to radii of a coarser level before new records are made.
+    tighter: ByKind<Option<Tighter>>,
     /// From these records on nothing is final.
     before: ByKind<usize>,
     /// All records computed, by kind.
@@ -243,9 +241,7 @@ impl<'s> RadianceCaches<'s> {
             left: None,
             again: 0,
             level: 0,
-            held: ByKind([Held::NONE; Kind::COUNT]),
-            estimated: ByKind([0.0; Kind::COUNT]),
-            part: 1.0,
+            tighter: ByKind([None; Kind::COUNT]),
             film,
             before,
             all_computed: ByKind([0; Kind::COUNT]),
@@ -472,9 +468,7 @@ impl<'s, F> Filling<'s, F> {
             }
             Round::Again { from } => {
                 self.blend(from as usize);
-                self.count_estimates();
-                let next = if self.take_round() { self.step } else { self.step + 1 };
-                self.begin(next);
+                self.begin(if self.again > 0 { self.step } else { self.step + 1 });
             }
             Round::Smooth { from } => {
                 self.take_means(from);
@@ -491,7 +485,6 @@ impl<'s, F> Filling<'s, F> {
     /// Everything was done. A view whose memory was too small may miss something, and is filled again when it is asked for.
     fn complete(&mut self) {
         self.is_cut |= !self.is_cut && self.caches.views.push(self.view).is_err();
-        self.hold();
         for kind in Kind::ALL {
             self.caches.settled[kind] = self.caches.slots[kind].len();
         }

@@ -2,6 +2,7 @@
 
 use glam::{Vec2, Vec3};
 
+use super::kind::FIRST;
 use crate::math::float::{self, PI};
 use crate::sent::packed;
 
@@ -32,6 +33,8 @@ pub struct Guide {
     pub(super) to_eye: Option<Vec3>,
     /// What the record covers of the film: from, and to.
     pub(super) film: [f32; 4],
+    /// What the estimates in the record count, in usual ones.
+    pub(super) held: f32,
 }
 
 packed!(Guide {
@@ -42,6 +45,7 @@ packed!(Guide {
     seen: f32,
     to_eye: Option<Vec3>,
     film: [f32; 4],
+    held: f32,
 });
 
 /// Of a record of which it is not known where it is seen.
@@ -57,6 +61,7 @@ impl Default for Guide {
             seen: 1.0,
             to_eye: None,
             film: WHOLE_FILM,
+            held: FIRST,
         }
     }
 }

@@ -108,10 +108,9 @@ const TABLE: [Row; Kind::COUNT] = {
 pub(super) enum Pass {
     /// New records wherever they are missing.
     Make,
-    /// All records of this fill estimated anew, with their radii held and random numbers of `stream`; the new estimate
-    /// counts by `share`.
-    Again { stream: u64, share: f32 },
-    /// As [`Pass::Again`], as often as the noise of the picture asks for.
+    /// All records of this fill estimated anew, with their radii held and random numbers of `stream`.
+    Again { stream: u64 },
+    /// As [`Pass::Again`], as often as the noise of the picture asks for, and where estimates are in doubt.
     More { stream: u64 },
     /// All records of this fill, on surfaces, averaged with their neighbours.
     Smooth,
@@ -134,9 +133,9 @@ pub(super) struct Step {
     pub(super) pass: Pass,
 }
 
-/// Share of the second estimate in a final record. The first, from which the radius comes, had to draw its samples
-/// blindly: larger, and it is wasted; smaller, and its noise, which has a say in the radius, makes light too dark.
-pub(super) const SECOND: f32 = 0.67;
+/// What the first estimate of a record counts beside a usual one. From it the radius comes, and it had to draw its samples
+/// blindly: smaller, and it is wasted; larger, and its noise, which has a say in the radius, makes light too dark.
+pub(super) const FIRST: f32 = 0.5;
 
 /// Steps in their order: first coarse irradiance, by which surfaces light everything else, and once more, from what it was revised to;
 /// then the final kinds, none of which needs another. What is to be averaged comes last.
@@ -148,24 +147,24 @@ pub(super) const TURNS: [Turn; 16] = {
     const fn smooth(kind: Kind) -> Turn {
         Turn::Of(Step { kind, pass: Pass::Smooth })
     }
-    const fn again(kind: Kind, stream: u64, share: f32) -> Turn {
-        Turn::Of(Step { kind, pass: Pass::Again { stream, share } })
+    const fn again(kind: Kind, stream: u64) -> Turn {
+        Turn::Of(Step { kind, pass: Pass::Again { stream } })
     }
     const fn more(kind: Kind, stream: u64) -> Turn {
         Turn::Of(Step { kind, pass: Pass::More { stream } })
     }
     [
         make(CoarseIrradiance),
-        again(CoarseIrradiance, 0, 1.0),
+        again(CoarseIrradiance, 0),
         smooth(CoarseIrradiance),
         make(Surface),
         make(Single),
         make(Multiple),
         make(Irradiance),
         Turn::Glances { is_second: false },
-        again(Surface, 1, SECOND),
-        again(Multiple, 100, SECOND),
-        again(Irradiance, 101, SECOND),
+        again(Surface, 1),
+        again(Multiple, 100),
+        again(Irradiance, 101),
         Turn::Glances { is_second: true },
         more(Surface, 1000),
         more(Multiple, 2000),

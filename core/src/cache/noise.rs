@@ -6,7 +6,7 @@
 //! what is dark is seen by itself, and its records go on when those of what is bright are good enough.
 
 use super::eye::CachedRadiance;
-use super::kind::{Kind, SECOND};
+use super::kind::{FIRST, Kind};
 use super::presets;
 use crate::sent::packed;
 use crate::spectrum::Spectrum;
@@ -74,12 +74,14 @@ impl Left {
     /// Of records whose readings differ by so much in squares, before and after a second estimate of so many times the usual samples.
     ///
     /// ```text
-    /// M = (1 − s) B + s X,  s = 1 − (1 − s₁)/e:   V(M)/V(M − B) = ((1 − s)² v + s²)/(s² (v + 1)),  v = V(B)/V(X) = BLIND e
+    /// M = (f B + e X)/(f + e):   V(M)/V(M − B) = (f² v + e²)/(e² (v + 1)),  v = V(B)/V(X) = BLIND e
     /// ```
+    ///
+    /// where `f` is what first estimates count.
     fn between(squares: f64, effort: f64) -> Self {
-        let first = (1.0 - f64::from(SECOND)) / effort;
-        let (second, blind) = (1.0 - first, presets::BLIND * effort);
-        let share = (first * first * blind + second * second) / (second * second * (blind + 1.0));
+        let first = f64::from(FIRST) / effort;
+        let blind = presets::BLIND * effort;
+        let share = (first * first * blind + 1.0) / (blind + 1.0);
         Self { variance: share * squares, estimates: 1.0 + first }
     }
 
@@ -231,7 +233,7 @@ mod tests {
     fn a_mixed_estimate_has_the_variance_of_its_parts() {
         for effort in [1.0, 4.0] {
             // A second estimate with a variance of 1, a blind one with twice that for as many samples.
-            let (s, blind) = (1.0 - (1.0 - f64::from(SECOND)) / effort, 2.0 * effort);
+            let (s, blind) = (effort / (effort + f64::from(FIRST)), 2.0 * effort);
             let (mixed, between) = ((1.0 - s) * (1.0 - s) * blind + s * s, s * s * (1.0 + blind));
             let left = Left::between(between, effort);
             assert!((left.variance - mixed).abs() < 1e-9, "{left:?}");

@@ -40,6 +40,10 @@ const LEAST_SEEN: f32 = 0.0625;
 /// half a pixel off; more: records that no pixel resolves.
 const BRIGHTEST: f32 = 3.0;
 
+/// Samples that an estimate would get by what is known now, over those that it has, from which on it is in doubt: a sample has been met that hardly any
+/// of the first ones had foretold. Less: time for chance; more: single records that a rare sample makes far too bright.
+const DOUBT: f32 = 2.0;
+
 /// Records that reach less far than usual take a share of the samples down to this.
 const LEAST_SHARE: f32 = 0.25;
 
@@ -145,37 +149,37 @@ impl<F> Filling<'_, F> {
         Some((around, more, count as u32))
     }
 
-    /// How often a record is to be estimated once more: as often as the region asks for it that asks for most.
-    fn rounds_of(&self, kind: Kind, offset: usize) -> u32 {
-        let (rounds, guides) = (&self.more[kind], self.memory.guides[kind].as_slice());
-        let film = guides.get(offset).map_or(Guide::default().film, |guide| guide.film);
-        regions_in(film).map(|region| rounds[region]).max().unwrap_or(0)
+    /// Whether a record is to be estimated once more: as often as the region asks for it that asks for most, and where samples around it have come to
+    /// vary by much more than they did when their number was chosen.
+    fn is_due(&self, kind: Kind, offset: usize, effort: f32) -> bool {
+        let default = Guide::default();
+        let guide = self.memory.guides[kind].as_slice().get(offset).unwrap_or(&default);
+        let asked = regions_in(guide.film).map(|region| self.more[kind][region]).max().unwrap_or(0);
+        asked >= self.again || effort > DOUBT * guide.held
     }
 
-    /// Begins a round in which records from a number on are estimated anew, those with many samples by several jobs.
-    pub(super) fn begin_again(&mut self, (step, effort): (Step, Effort), from: usize) {
+    /// Begins a round in which records from a number on are estimated anew, those with many samples by several jobs; whether there are any.
+    pub(super) fn begin_again(&mut self, (step, effort): (Step, Effort), from: usize) -> bool {
         let records = self.caches.slots[step.kind].records();
         // Half as far again as usual reach those that most pixels see: they alone get all samples.
         self.usual = 1.5 * usual_radius(records);
         self.bright = usual_value(records);
-        let (count, is_more) = (records.len() - from, matches!(step.pass, Pass::More { .. }));
+        let is_more = matches!(step.pass, Pass::More { .. });
         self.memory.estimates.clear();
         self.memory.higher.clear();
         self.memory.open.clear();
-        let mut taken = 0;
-        for offset in 0..count {
-            if is_more && self.rounds_of(step.kind, offset) < self.again {
+        for offset in 0..records.len() - from {
+            let Some((_, more, samples)) = self.anew((step, effort), from + offset, offset) else { continue };
+            if is_more && !self.is_due(step.kind, offset, more) {
                 continue;
             }
-            taken += 1;
-            let samples = self.anew((step, effort), from + offset, offset).map_or(0, |(.., samples)| samples);
             for _ in 0..samples.div_ceil(effort.samples.max(1)).max(1) {
                 self.is_cut |= self.memory.open.push(offset as u32).is_err();
             }
         }
-        self.part = taken as f32 / count as f32;
         let jobs = self.memory.open.len() as u32;
         self.enter(Round::Again { from: from as u32 }, jobs);
+        jobs > 0
     }
 
     pub(super) fn again<M: Medium + ?Sized, S: Scene + ?Sized>(
@@ -285,5 +289,59 @@ mod tests {
         assert_eq!([2.0, 3.0, 75.0, f32::INFINITY].map(|brightness| least(0.01, brightness)), [0.15, 0.1, 0.1, 0.1]);
         // The world's bound wins.
         assert_eq!(least(0.2, 75.0), 0.2);
+    }
+}
+
+#[cfg(all(test, feature = "alloc"))]
+mod doubted {
+    use super::*;
+    use crate::cache::kind::{TURNS, Turn};
+    use crate::cache::{RadianceCaches, Settings};
+    use crate::host::Empty;
+    use crate::light::Light;
+    use crate::math::Bounds;
+    use crate::medium::{Homogeneous, Placed, Region};
+    use crate::phase::Phase;
+    use crate::spectrum::Spectrum;
+    use crate::work;
+    use crate::world::Outline;
+
+    /// An estimate forty times too bright by one of its samples, which no other has foretold, keeps its part of what is estimated anew there, and around it.
+    #[test]
+    fn what_a_rare_sample_made_bright_is_estimated_once_more() {
+        const BRIGHT: f32 = 40.0;
+        const SAMPLES: u32 = 64;
+        let fog = Homogeneous::new(Spectrum::splat(0.2), Spectrum::splat(1.8), Phase::ISOTROPIC).unwrap();
+        let ball = Placed::new(fog, Region::sphere(Vec3::ZERO, 1.0).unwrap());
+        let sky = [Light::Constant(Spectrum::ONE)];
+        let world = World { medium: &ball, scene: &Empty, lights: (&sky).into() };
+        let bounds = Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE };
+        let settings = Settings::for_outline(&Outline::of(&world, bounds), 0.02).with_walks(SAMPLES);
+        let is_again = |turn: &Turn| matches!(turn, Turn::Of(Step { kind: Kind::Multiple, pass: Pass::Again { .. } }));
+        let again = TURNS.iter().position(is_again).unwrap();
+        let mut found = [(0.0, 0, 0); 2];
+        for (found, is_spoiled) in found.iter_mut().zip([false, true]) {
+            let settings = Settings { rays: 256, error: 0.0, ..settings };
+            let mut filling = RadianceCaches::new(settings).fill(Asked::anywhere_in(bounds));
+            let mut output = FilledRecords::default();
+            while filling.step < again || filling.taken + 1 < filling.jobs {
+                assert!(work::step(&mut filling, &world, &mut output));
+            }
+            if is_spoiled {
+                let first = &mut filling.memory.estimates.as_mut_slice()[0];
+                let value = first.sums.value.mean() * BRIGHT * SAMPLES as f32;
+                first.sums.value *= BRIGHT;
+                first.learnt.add(Vec3::Z, value, 1.0, SAMPLES);
+            }
+            work::finish(&mut filling, &world, &mut output);
+            let (computed, caches) = (filling.computed(Kind::Multiple), filling.finish());
+            let records = caches.records(Kind::Multiple);
+            *found = (records[0].value.mean(), computed, records.len() as u64);
+        }
+        let [(right, usual, records), (bright, computed, _)] = found;
+        let once_more = computed - usual;
+        assert!(once_more > 0 && once_more < records / 2, "{once_more} of {records}");
+        // Without: 1/(1 + FIRST) of it.
+        assert!(bright > 2.0 * right && bright < 0.25 * BRIGHT * right, "{bright} {right}");
     }
 }

@@ -4,7 +4,7 @@ use super::estimates::{usual_value, where_bright};
 use super::{Filling, RAYS_PER_JOB, Round};
 use crate::cache::asked::Asked;
 use crate::cache::guide::Guide;
-use crate::cache::kind::{Kind, Pass, Step};
+use crate::cache::kind::{Kind, Step};
 use crate::cache::noise::{Noise, REGIONS};
 use crate::cache::radius::Limits;
 use crate::cache::settings::{Effort, Settings};
@@ -15,35 +15,15 @@ use crate::math::{Ray, Vec3, float};
 /// that were known less well. More: what those had wrong stays for longer; less: samples are thrown away.
 const COARSER: f32 = 0.5;
 
-/// What a finer level knows of the records that it was begun with.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Held {
-    /// How many they are.
-    count: usize,
-    /// Samples of a usual one, those of coarser levels by what they count.
-    samples: f32,
-    /// What is done to their radii before new ones are made.
-    tighter: Option<Tighter>,
-}
-
 /// Smaller radii.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Tighter {
+pub(super) struct Tighter {
     factor: f32,
     /// Bounds of radii in the world, and least and greatest ones in pixels, before.
     limits: Limits,
     pixels: [f32; 2],
     /// Where eye rays come from, and the angular width of a pixel (rad).
     eye: Option<(Vec3, f32)>,
-}
-
-impl Held {
-    pub(super) const NONE: Self = Self { count: 0, samples: 0.0, tighter: None };
-
-    /// What earlier samples of record `number` count, over `samples` new ones; `None` of a record of this level.
-    pub(super) fn over(&self, number: usize, samples: u32) -> Option<f32> {
-        (number < self.count).then(|| COARSER * self.samples / samples.max(1) as f32)
-    }
 }
 
 impl<'s, F: Fn([f32; 2]) -> Ray> Filling<'s, F> {
@@ -99,15 +79,17 @@ impl<'s, F: Fn([f32; 2]) -> Ray> Filling<'s, F> {
             if kind == Kind::Single {
                 self.caches.slots[kind].clear();
                 self.memory.guides[kind].clear();
-                (self.before[kind], self.held[kind]) = (0, Held::NONE);
+                self.before[kind] = 0;
                 continue;
             }
-            self.take_over(kind, old);
+            self.take_over(kind);
+            let fewer = COARSER * old.samples as f32 / new.samples.max(1) as f32;
+            self.memory.guides[kind].as_mut_slice().iter_mut().for_each(|guide| guide.held *= fewer);
             let ratio = |before: f32, after: f32| if before < f32::INFINITY { after / before } else { 1.0 };
             let factor = ratio(old.tolerance, new.tolerance)
                 .min(ratio(old.free_paths, new.free_paths))
                 .min(ratio(old.clearance, new.clearance));
-            self.held[kind].tighter = Some(Tighter { factor, limits: old.limits, pixels: before.pixels, eye });
+            self.tighter[kind] = Some(Tighter { factor, limits: old.limits, pixels: before.pixels, eye });
         }
         self.caches.views.clear();
         self.caches.settled = self.before;
@@ -115,15 +97,16 @@ impl<'s, F: Fn([f32; 2]) -> Ray> Filling<'s, F> {
     }
 
     /// Records that earlier fills have settled count as the others do.
-    fn take_over(&mut self, kind: Kind, effort: Effort) {
+    fn take_over(&mut self, kind: Kind) {
         if self.before[kind] == 0 {
             return;
         }
         let (guides, count) = (&mut self.memory.guides[kind], self.caches.slots[kind].len());
         guides.clear();
-        self.is_cut |= (0..count).any(|_| guides.push(Guide::default()).is_err());
+        let mut guide = Guide::default();
+        guide.held = 1.0;
+        self.is_cut |= (0..count).any(|_| guides.push(guide).is_err());
         self.before[kind] = 0;
-        self.held[kind] = Held { count, samples: effort.samples as f32, tighter: None };
     }
 
     fn begin_level(&mut self) {
@@ -133,7 +116,7 @@ impl<'s, F: Fn([f32; 2]) -> Ray> Filling<'s, F> {
         self.level += 1;
         self.view = self.asked.mark(&self.caches.settings);
         (self.noise, self.dark, self.left, self.again) = (Noise::default(), 0.0, None, 0);
-        (self.more, self.estimated) = (ByKind([[0; REGIONS]; Kind::COUNT]), ByKind([0.0; Kind::COUNT]));
+        self.more = ByKind([[0; REGIONS]; Kind::COUNT]);
         self.efforts = ByKind([[0.0; 2]; Kind::COUNT]);
         self.all_computed = ByKind([0; Kind::COUNT]);
         self.enter(Round::Search, self.settings().rays.div_ceil(RAYS_PER_JOB));
@@ -143,12 +126,12 @@ impl<'s, F: Fn([f32; 2]) -> Ray> Filling<'s, F> {
 impl<F> Filling<'_, F> {
     /// Whether radii of records are still those of a coarser level.
     pub(super) fn is_loose(&self) -> bool {
-        self.held.0.iter().any(|held| held.tighter.is_some())
+        self.tighter.0.iter().any(Option::is_some)
     }
 
     /// Shrinks the radii of a kind to what this level allows, just before what then is missing is made: caches can be read at any time.
     pub(super) fn tighten(&mut self, (Step { kind, .. }, effort): (Step, Effort)) {
-        let Some(Tighter { factor, limits, pixels, eye }) = self.held[kind].tighter.take() else { return };
+        let Some(Tighter { factor, limits, pixels, eye }) = self.tighter[kind].take() else { return };
         let (now, coarser) = (self.settings().pixels, float::sqrt(self.settings().coarser[kind as usize]));
         let bright = usual_value(self.caches.slots[kind].records());
         let is_room = self.caches.slots[kind].shrink(|record| {
@@ -167,24 +150,5 @@ impl<F> Filling<'_, F> {
             after.clamp(Some(radius))
         });
         self.is_cut |= !is_room;
-    }
-
-    /// Counts a round of estimates of the kind at hand, by the part of its records that were estimated.
-    pub(super) fn count_estimates(&mut self) {
-        if let Some((Step { kind, pass: Pass::Again { .. } | Pass::More { .. } }, _)) = self.at_hand() {
-            self.estimated[kind] += self.part;
-        }
-    }
-
-    /// Takes down what records have, for the level after this one.
-    pub(super) fn hold(&mut self) {
-        for kind in Kind::ALL {
-            let count = self.caches.slots[kind].len();
-            let Some(effort) = self.settings().effort(kind).filter(|_| count > 0) else { continue };
-            let held = self.held[kind];
-            let kept = COARSER * held.samples * held.count.min(count) as f32 / count as f32;
-            let samples = kept + self.estimated[kind] * effort.samples as f32;
-            self.held[kind] = Held { count, samples, ..held };
-        }
     }
 }

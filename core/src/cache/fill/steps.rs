@@ -4,7 +4,7 @@ use super::estimates::{usual_radius, usual_value, where_bright};
 use super::{Filling, PLACES_PER_JOB, Round};
 use crate::cache::Record;
 use crate::cache::asked::Wanted;
-use crate::cache::kind::{Kind, Pass, SECOND, Step, TURNS, Turn};
+use crate::cache::kind::{FIRST, Kind, Pass, TURNS, Turn};
 use crate::cache::memory::{Estimate, FillingMemory};
 use crate::cache::slot::{Attached, Inserted};
 use crate::sampling::uniform::mix;
@@ -43,14 +43,13 @@ impl<F> Filling<'_, F> {
                         return;
                     }
                 }
-                Pass::More { .. } if self.more[step.kind].iter().all(|rounds| *rounds == 0) => {}
                 Pass::Again { .. } | Pass::More { .. } => {
                     let from = self.before[step.kind].min(slot.len());
-                    if slot.len() > from {
-                        self.again += u32::from(matches!(step.pass, Pass::More { .. }));
-                        self.begin_again((step, effort), from);
+                    self.again += u32::from(matches!(step.pass, Pass::More { .. }));
+                    if self.begin_again((step, effort), from) {
                         return;
                     }
+                    self.again = 0;
                 }
                 Pass::Smooth => {
                     let from = self.before[step.kind].min(slot.len());
@@ -181,16 +180,6 @@ impl<F> Filling<'_, F> {
         added
     }
 
-    /// Counts a round of more estimates; whether others follow.
-    pub(super) fn take_round(&mut self) -> bool {
-        let Some((Step { kind, pass: Pass::More { .. } }, _)) = self.at_hand() else { return false };
-        let are_more = self.more[kind].iter().any(|rounds| *rounds > self.again);
-        if !are_more {
-            self.again = 0;
-        }
-        are_more
-    }
-
     /// Mixes the estimates of a round into the records from a number on, and adds to what was learnt.
     pub(super) fn blend(&mut self, from: usize) {
         let Some((step, effort)) = self.at_hand() else { return };
@@ -200,16 +189,15 @@ impl<F> Filling<'_, F> {
             self.all_computed[step.kind] += 1;
             // Where memory was too small some jobs have left none.
             let offset = estimate.number as usize;
-            // More of an estimate that took more samples; of one that takes no more than those before it, its part of all.
-            let held = self.held[step.kind].over(from + offset, effort.samples);
-            let share = match (step.pass, held) {
-                (Pass::Again { share, .. }, None) => 1.0 - (1.0 - share) / estimate.effort,
-                // Where nothing stays of a first estimate, nothing stays of a coarser one.
-                (Pass::Again { share: 1.0, .. }, _) => 1.0,
-                (Pass::Again { .. }, Some(before)) => 1.0 / (1.0 + before),
-                (_, None) => 1.0 / (self.again as f32 + 1.0 + (1.0 - SECOND) / estimate.effort),
-                (_, Some(before)) => 1.0 / (self.again as f32 + 1.0 + before),
-            };
+            // What photons had not lit when it was first estimated leaves nothing.
+            let guide = self.memory.guides[step.kind].as_mut_slice().get_mut(offset);
+            let held = guide.as_ref().map_or(FIRST, |guide| guide.held);
+            let held = if step.kind.row().is_ground { 0.0 } else { held };
+            let share = estimate.effort / (held + estimate.effort);
+            if let Some(guide) = guide {
+                guide.held = held + estimate.effort;
+                guide.merge(&estimate.learnt, 1.0);
+            }
             let attached = attached(step.kind, estimate, self.memory.higher.as_slice(), i, stride);
             if let Pass::Again { .. } = step.pass {
                 let effort = f64::from(estimate.effort);
@@ -217,9 +205,6 @@ impl<F> Filling<'_, F> {
                 (*sum, *count) = (*sum + effort, *count + 1.0);
             }
             slot.blend(from + offset, effort.tolerance, &estimate.sums, attached, share);
-            if let Some(guide) = self.memory.guides[step.kind].as_mut_slice().get_mut(offset) {
-                guide.merge(&estimate.learnt, 1.0);
-            }
         }
     }
 }
