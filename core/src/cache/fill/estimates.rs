@@ -150,12 +150,12 @@ impl<F> Filling<'_, F> {
     }
 
     /// Whether a record is to be estimated once more: as often as the region asks for it that asks for most, and where samples around it have come to
-    /// vary by much more than they did when their number was chosen.
+    /// vary by much more than they did when their number was chosen. Not where memory is too small: what cannot be kept would be in doubt for ever.
     fn is_due(&self, kind: Kind, offset: usize, effort: f32) -> bool {
         let default = Guide::default();
         let guide = self.memory.guides[kind].as_slice().get(offset).unwrap_or(&default);
         let asked = regions_in(guide.film).map(|region| self.more[kind][region]).max().unwrap_or(0);
-        asked >= self.again || effort > DOUBT * guide.held
+        asked >= self.again || !self.is_cut && effort > DOUBT * guide.held
     }
 
     /// Begins a round in which records from a number on are estimated anew, those with many samples by several jobs; whether there are any.
@@ -319,8 +319,8 @@ mod doubted {
         let settings = Settings::for_outline(&Outline::of(&world, bounds), 0.02).with_walks(SAMPLES);
         let is_again = |turn: &Turn| matches!(turn, Turn::Of(Step { kind: Kind::Multiple, pass: Pass::Again { .. } }));
         let again = TURNS.iter().position(is_again).unwrap();
-        let mut found = [(0.0, 0, 0); 2];
-        for (found, is_spoiled) in found.iter_mut().zip([false, true]) {
+        let mut found = [(0.0, 0, 0); 3];
+        for (found, (is_spoiled, is_cut)) in found.iter_mut().zip([(false, false), (true, false), (true, true)]) {
             let settings = Settings { rays: 256, error: 0.0, ..settings };
             let mut filling = RadianceCaches::new(settings).fill(Asked::anywhere_in(bounds));
             let mut output = FilledRecords::default();
@@ -333,14 +333,16 @@ mod doubted {
                 first.sums.value *= BRIGHT;
                 first.learnt.add(Vec3::Z, value, 1.0, SAMPLES);
             }
+            filling.is_cut |= is_cut;
             work::finish(&mut filling, &world, &mut output);
             let (computed, caches) = (filling.computed(Kind::Multiple), filling.finish());
             let records = caches.records(Kind::Multiple);
             *found = (records[0].value.mean(), computed, records.len() as u64);
         }
-        let [(right, usual, records), (bright, computed, _)] = found;
+        let [(right, usual, records), (bright, computed, _), (_, with_little_memory, _)] = found;
         let once_more = computed - usual;
         assert!(once_more > 0 && once_more < records / 2, "{once_more} of {records}");
+        assert_eq!(with_little_memory, usual);
         // Without: 1/(1 + FIRST) of it.
         assert!(bright > 2.0 * right && bright < 0.25 * BRIGHT * right, "{bright} {right}");
     }

@@ -189,9 +189,9 @@ impl<F> Filling<'_, F> {
             self.all_computed[step.kind] += 1;
             // Where memory was too small some jobs have left none.
             let offset = estimate.number as usize;
-            // What photons had not lit when it was first estimated leaves nothing.
             let guide = self.memory.guides[step.kind].as_mut_slice().get_mut(offset);
             let held = guide.as_ref().map_or(FIRST, |guide| guide.held);
+            // Nothing stays of what was lit by records that were not all there yet.
             let held = if step.kind.row().is_ground { 0.0 } else { held };
             let share = estimate.effort / (held + estimate.effort);
             if let Some(guide) = guide {
