@@ -148,7 +148,7 @@ fn options_out_of_range_are_errors() {
 #[test]
 fn every_picture_from_caches_says_how_far_it_is_off() {
     let folder = Folder::new("cache-audit");
-    std::fs::write(folder.0.join("scene.xml"), World::of(&[FOG, CONTAINER, WALLS, LAMP]).text()).unwrap();
+    std::fs::write(folder.0.join("scene.xml"), World::of(&[FOG, CONTAINER, WALLS, SPARK]).text()).unwrap();
     let render = |options: &[&str]| {
         let walks = ["--paths", if options.contains(&"--extrapolation") { "1" } else { "64" }];
         let common = ["render", "scene.xml", "--method", "radiance-cache", "--spp", "1", "-o", "a.pfm"];
@@ -174,7 +174,7 @@ fn every_picture_from_caches_says_how_far_it_is_off() {
     );
     let (_, again, same) = render(&["--threads", "3"]);
     assert!(again == audit && same == image);
-    // So coarse that walls are wrong, and somewhere more than elsewhere: that is mended.
+    // So coarse that light around the lamp and in corners is wrong, and somewhere more than elsewhere: that is mended.
     let coarse = ["--tolerance", "30", "--extrapolation", "constant", "--audit", "98304"];
     let (told, ..) = render(&[&coarse[..], &["--aov", "-o", "a.exr"]].concat());
     assert!(told.contains("repaired: bias was ") && told.contains("; in places, most in columns "), "{told}");
