@@ -154,7 +154,7 @@ pub struct Filling<'s, F> {
     left: Option<f32>,
     /// Rounds of more estimates so far.
     again: u32,
-    /// How often [`Filling::refine`] was called, and what records there were then.
+    /// How often [`Filling::refine`] was called.
     level: u32,
     /// What is done to radii of a coarser level before new records are made.
     tighter: ByKind<Option<Tighter>>,

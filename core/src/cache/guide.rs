@@ -2,7 +2,7 @@
 
 use glam::{Vec2, Vec3};
 
-use super::kind::FIRST;
+use super::kind::FIRST_COUNTS;
 use crate::math::float::{self, PI};
 use crate::sent::packed;
 
@@ -61,7 +61,7 @@ impl Default for Guide {
             seen: 1.0,
             to_eye: None,
             film: WHOLE_FILM,
-            held: FIRST,
+            held: FIRST_COUNTS,
         }
     }
 }

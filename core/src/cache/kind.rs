@@ -135,7 +135,7 @@ pub(super) struct Step {
 
 /// What the first estimate of a record counts beside a usual one. From it the radius comes, and it had to draw its samples
 /// blindly: smaller, and it is wasted; larger, and its noise, which has a say in the radius, makes light too dark.
-pub(super) const FIRST: f32 = 0.5;
+pub(super) const FIRST_COUNTS: f32 = 0.5;
 
 /// Steps in their order: first coarse irradiance, by which surfaces light everything else, and once more, from what it was revised to;
 /// then the final kinds, none of which needs another. What is to be averaged comes last.

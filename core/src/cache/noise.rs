@@ -6,7 +6,7 @@
 //! what is dark is seen by itself, and its records go on when those of what is bright are good enough.
 
 use super::eye::CachedRadiance;
-use super::kind::{FIRST, Kind};
+use super::kind::{FIRST_COUNTS, Kind};
 use super::presets;
 use crate::sent::packed;
 use crate::spectrum::Spectrum;
@@ -79,7 +79,7 @@ impl Left {
     ///
     /// where `f` is what first estimates count.
     fn between(squares: f64, effort: f64) -> Self {
-        let first = f64::from(FIRST) / effort;
+        let first = f64::from(FIRST_COUNTS) / effort;
         let blind = presets::BLIND * effort;
         let share = (first * first * blind + 1.0) / (blind + 1.0);
         Self { variance: share * squares, estimates: 1.0 + first }
@@ -233,7 +233,7 @@ mod tests {
     fn a_mixed_estimate_has_the_variance_of_its_parts() {
         for effort in [1.0, 4.0] {
             // A second estimate with a variance of 1, a blind one with twice that for as many samples.
-            let (s, blind) = (effort / (effort + f64::from(FIRST)), 2.0 * effort);
+            let (s, blind) = (effort / (effort + f64::from(FIRST_COUNTS)), 2.0 * effort);
             let (mixed, between) = ((1.0 - s) * (1.0 - s) * blind + s * s, s * s * (1.0 + blind));
             let left = Left::between(between, effort);
             assert!((left.variance - mixed).abs() < 1e-9, "{left:?}");

@@ -343,7 +343,7 @@ mod doubted {
         let once_more = computed - usual;
         assert!(once_more > 0 && once_more < records / 2, "{once_more} of {records}");
         assert_eq!(with_little_memory, usual);
-        // Without: 1/(1 + FIRST) of it.
+        // Without doubt it would have two thirds of it.
         assert!(bright > 2.0 * right && bright < 0.25 * BRIGHT * right, "{bright} {right}");
     }
 }

@@ -4,7 +4,7 @@ use super::estimates::{usual_radius, usual_value, where_bright};
 use super::{Filling, PLACES_PER_JOB, Round};
 use crate::cache::Record;
 use crate::cache::asked::Wanted;
-use crate::cache::kind::{FIRST, Kind, Pass, TURNS, Turn};
+use crate::cache::kind::{FIRST_COUNTS, Kind, Pass, TURNS, Turn};
 use crate::cache::memory::{Estimate, FillingMemory};
 use crate::cache::slot::{Attached, Inserted};
 use crate::sampling::uniform::mix;
@@ -190,7 +190,7 @@ impl<F> Filling<'_, F> {
             // Where memory was too small some jobs have left none.
             let offset = estimate.number as usize;
             let guide = self.memory.guides[step.kind].as_mut_slice().get_mut(offset);
-            let held = guide.as_ref().map_or(FIRST, |guide| guide.held);
+            let held = guide.as_ref().map_or(FIRST_COUNTS, |guide| guide.held);
             // Nothing stays of what was lit by records that were not all there yet.
             let held = if step.kind.row().is_ground { 0.0 } else { held };
             let share = estimate.effort / (held + estimate.effort);
