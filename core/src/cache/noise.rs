@@ -1,18 +1,24 @@
 //! Noise of caches in a picture: measured along eye rays, and the estimates that it asks for.
 //!
-//! The same eye rays read all caches before their records are estimated anew and after. The direct light of both readings has the same random
-//! numbers, so that what differs is the noise of records, mixed and carried as pictures have them, and nothing else. A kind whose noise
+//! The same eye rays read all caches before their records are estimated anew and after. Both readings have the same random
+//! numbers, so that what differs is the noise of records, mixed and carried as pictures have them, and nothing else. Where fog reaches far beyond its records, one
+//! ray meets few of them and a pixel many: so each ray is read twice, and what counts is the part of the difference that both
+//! readings have, for that of one alone is what samples of a pixel average, and what the spread of samples tells (decision 97). A kind whose noise
 //! weighs much, for its light or for how hard it is to find, is estimated anew more often; one that the picture hardly shows is not. So it is region by region:
 //! what is dark is seen by itself, and its records go on when those of what is bright are good enough.
 
 use super::eye::CachedRadiance;
 use super::kind::{FIRST_COUNTS, Kind};
 use super::presets;
+use super::settings::Settings;
 use crate::sent::packed;
 use crate::spectrum::Spectrum;
 
 /// Eye rays that are read. Fewer: single dark pixels decide; more: time.
 pub(super) const RAYS: u32 = 4096;
+
+/// Readings of each ray, each with random numbers of its own.
+pub(super) const READINGS: usize = 2;
 
 /// Regions along each side of a picture for which noise is told apart. Fewer: what is dark and noisy is lost in what is around it; more: few rays tell
 /// of each.
@@ -55,6 +61,11 @@ impl Glance {
     }
 }
 
+/// Readings of all rays, of which there are no more than of those that records are made for.
+pub(super) fn readings(settings: &Settings) -> u32 {
+    RAYS.min(settings.rays) * READINGS as u32
+}
+
 /// Light below which relative errors of a picture mean nothing.
 pub(super) fn dark(glances: &[Glance]) -> f64 {
     let sum: f64 = glances.iter().map(|glance| f64::from(glance.all)).sum();
@@ -91,7 +102,7 @@ impl Left {
     }
 }
 
-/// Squares of what differs from reading to reading, over those of the light of each ray.
+/// Squares of what pixels differ by, over those of the light of each ray.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 struct Sums {
     squares: [f64; KINDS],
@@ -125,17 +136,18 @@ impl Default for Noise {
 }
 
 impl Noise {
-    /// Adds a ray at a point of the film, read `before` and after, of a picture as dark as [`dark`] says.
-    pub(super) fn add(&mut self, at: [f32; 2], before: &Glance, after: &Glance, dark: f64) {
+    /// Adds a ray at a point of the film, read `before` and after, of a picture as dark as [`dark`] says. The products of what two readings differ by are in
+    /// the mean the squares of what a pixel differs by.
+    pub(super) fn add(&mut self, at: [f32; 2], before: &[Glance; READINGS], after: &[Glance; READINGS], dark: f64) {
         let sums = &mut self.regions[region_of(at)];
-        let all = f64::from(after.all);
+        let all = after.iter().map(|glance| f64::from(glance.all)).sum::<f64>() / READINGS as f64;
         let light = all * all + dark * dark;
         sums.rays += 1.0;
-        for ((sum, a), b) in sums.squares.iter_mut().zip(before.kinds).zip(after.kinds) {
-            let difference = f64::from(a - b);
+        for (k, sum) in sums.squares.iter_mut().enumerate() {
+            let product: f64 = before.iter().zip(after).map(|(b, a)| f64::from(b.kinds[k] - a.kinds[k])).product();
             // Written so that what is no number counts as nothing.
-            if light > 0.0 && difference.is_finite() {
-                *sum += difference * difference / light;
+            if light > 0.0 && product.is_finite() {
+                *sum += product / light;
             }
         }
     }
@@ -144,7 +156,8 @@ impl Noise {
     pub(super) fn left(&self, efforts: [f64; KINDS]) -> [[Left; KINDS]; REGIONS] {
         self.regions.map(|sums| {
             core::array::from_fn(|k| {
-                let between = if sums.rays > 0.0 { sums.squares[k] / sums.rays } else { 0.0 };
+                // Written so that no rays tell of no noise. Nor do products that sum to less than nothing.
+                let between = if sums.squares[k] > 0.0 { sums.squares[k] / sums.rays } else { 0.0 };
                 let left = Left::between(between, efforts[k].max(1.0));
                 let smoothed = if Kind::FINAL[k].is_on_surfaces() { presets::SMOOTHED } else { 1.0 };
                 Left { variance: smoothed * left.variance, ..left }
@@ -187,6 +200,7 @@ pub(super) fn rounds_for(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::sampling::{Generator, uniform};
 
     fn glance(multiple: f32, indirect: f32) -> Glance {
         let light = |value| Spectrum::splat(value);
@@ -204,7 +218,9 @@ mod tests {
         let before = [glance(1.0, 0.0), glance(8.0, 2.0)];
         assert!((dark(&before) - 0.275).abs() < 1e-6);
         let after = [glance(1.1, 0.0), glance(8.0, 3.0)];
-        before.iter().zip(&after).for_each(|(before, after)| noise.add([0.0; 2], before, after, 0.0));
+        for (before, after) in before.iter().zip(after) {
+            noise.add([0.0; 2], &[*before; READINGS], &[after; READINGS], 0.0);
+        }
         let left = noise.left([1.0; KINDS]);
         let [single, surface, multiple, irradiance] = left[0].map(|left| left.variance);
         assert_eq!((single, surface), (0.0, 0.0));
@@ -214,10 +230,30 @@ mod tests {
         assert!((irradiance / expected(1.0, 11.0) - 1.0).abs() < 1e-5, "{irradiance}");
         // Rays in the dark, and light that is no number, say nothing.
         let before = noise;
-        noise.add([0.0; 2], &glance(0.0, 0.0), &glance(f32::NAN, 0.0), 0.0);
+        noise.add([0.0; 2], &[glance(0.0, 0.0); READINGS], &[glance(f32::NAN, 0.0); READINGS], 0.0);
         assert_eq!(noise.regions[0].squares, before.regions[0].squares);
         // Nor do other regions.
         assert!(left[1..].iter().flatten().all(|left| left.variance == 0.0));
+    }
+
+    /// Records of a pixel that are too bright or too dark by 3 %, of which single readings find that and 20 % more that they share with no other.
+    #[test]
+    fn what_samples_of_a_pixel_average_is_no_noise_of_records() {
+        const RAYS: u32 = 400_000;
+        let (mut noise, mut rng) = (Noise::default(), Generator::new(7));
+        let mut sign = || if uniform(&mut rng) < 0.5 { -1.0 } else { 1.0 };
+        for _ in 0..RAYS {
+            let of_pixel = 0.03 * sign();
+            let after = [(); READINGS].map(|()| glance(1.0 + of_pixel + 0.2 * sign(), 9.0));
+            noise.add([0.0; 2], &[glance(1.0, 9.0); READINGS], &after, 0.0);
+        }
+        let found = noise.regions[0].squares[2] / f64::from(RAYS);
+        // The products vary by 0.02² / √RAYS, 7 % of what is expected.
+        assert!((found / 0.003_f64.powi(2) - 1.0).abs() < 0.25, "{found}");
+        // As much as chance has is not less than nothing.
+        let mut noise = Noise::default();
+        noise.add([0.0; 2], &[glance(1.0, 0.0); READINGS], &[glance(0.9, 0.0), glance(1.1, 0.0)], 0.0);
+        assert!(noise.left([1.0; KINDS]).iter().flatten().all(|left| left.variance == 0.0));
     }
 
     #[test]
@@ -298,7 +334,7 @@ mod measured {
         let world = World { medium: &ball, scene: &Shutter, lights: (&lights).into() };
         let bounds = Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE };
         let settings = Settings::for_outline(&Outline::of(&world, bounds), 0.02).with_walks(128);
-        let (mut told, mut seen) = (0.0, alloc::vec![[0.0; 4]; READ as usize]);
+        let (mut told, mut seen) = (0.0, alloc::vec![[0.0; 5]; READ as usize]);
         for seed in 0..SEEDS {
             let settings = Settings { seed, rays: 1024, error, ..settings };
             let mut filling = RadianceCaches::new(settings).fill(Asked::View { ray: eye, pixel: 0.02 });
@@ -307,15 +343,19 @@ mod measured {
             let caches = filling.finish();
             for (number, sums) in seen.iter_mut().enumerate() {
                 let ray = eye(Asked::at(9000 + number as u32));
-                let glance = Glance::new(&caches.radiance(&ray, &world, &mut Generator::new(number as u64)));
-                let [value, all] = [glance.kinds[1], glance.all].map(f64::from);
-                [1.0, value, value * value, all].into_iter().zip(sums).for_each(|(x, sum)| *sum += x);
+                let reading = |stream: u64| {
+                    let mut rng = Generator::new(stream << 32 | number as u64);
+                    let glance = Glance::new(&caches.radiance(&ray, &world, &mut rng));
+                    [glance.kinds[1], glance.all].map(f64::from)
+                };
+                let [[a, all], [b, _]] = [0, 1].map(reading);
+                [1.0, a, b, a * b, all].into_iter().zip(sums).for_each(|(x, sum)| *sum += x);
             }
         }
         let seeds = SEEDS as f64;
         let dark = DARK * seen.iter().map(|[.., all]| all / seeds).sum::<f64>() / f64::from(READ);
-        let relative = |&[n, sum, squares, all]: &[f64; 4]| {
-            let variance = (squares - sum * sum / n) / (n - 1.0);
+        let relative = |&[n, a, b, products, all]: &[f64; 5]| {
+            let variance = (products - a * b / n) / (n - 1.0);
             variance / ((all / n).powi(2) + dark * dark)
         };
         let seen = seen.iter().map(relative).sum::<f64>() / f64::from(READ);

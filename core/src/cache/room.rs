@@ -77,7 +77,7 @@ pub fn room_for(settings: &Settings, places: usize, records: usize) -> Room {
     room.estimates = room.chosen.max(records);
     room.higher = room.estimates * stride;
     if settings.error > 0.0 {
-        room.glances = noise::RAYS.min(settings.rays).next_multiple_of(RAYS_PER_JOB) as usize;
+        room.glances = noise::readings(settings).next_multiple_of(RAYS_PER_JOB) as usize;
     }
     room.of_job_wanted = places.min(PLACES_OF_JOB);
     room.of_job_open = places.min(PLACES_PER_JOB as usize);

@@ -5,7 +5,7 @@ use crate::cache::asked::Asked;
 use crate::cache::eye::radiance;
 use crate::cache::kind::Kind;
 use crate::cache::memory::FilledRecords;
-use crate::cache::noise::{self, Glance, rounds_for};
+use crate::cache::noise::{self, Glance, READINGS, rounds_for};
 use crate::cache::presets;
 use crate::host::{Medium, Scene};
 use crate::math::Ray;
@@ -27,7 +27,7 @@ impl<F> Filling<'_, F> {
         if !is_second {
             self.memory.glances.clear();
         }
-        let jobs = noise::RAYS.min(self.settings().rays).div_ceil(RAYS_PER_JOB);
+        let jobs = noise::readings(self.settings()).div_ceil(RAYS_PER_JOB);
         self.enter(Round::Glance { is_second }, jobs);
         true
     }
@@ -46,7 +46,7 @@ impl<F> Filling<'_, F> {
         let seed = mix(settings.seed ^ 0x9_1a_ce);
         for (i, glance) in output.glances.iter_mut().enumerate() {
             let number = job * RAYS_PER_JOB + i as u32;
-            let ray = ray(Asked::at(settings.rays.wrapping_add(number)));
+            let ray = ray(Asked::at(settings.rays.wrapping_add(number / READINGS as u32)));
             let mut rng = independent(seed, u64::from(number), 0);
             *glance = Glance::new(&radiance(&ray, &estimator, &self.caches.reader(), &settings.eye, &mut rng));
         }
@@ -57,7 +57,8 @@ impl<F> Filling<'_, F> {
         if is_second {
             let first = self.taken * RAYS_PER_JOB;
             let before = self.memory.glances.as_slice().get(first as usize..).unwrap_or(&[]);
-            for (number, (before, after)) in (first..).zip(before.iter().zip(glances)) {
+            let readings = before.as_chunks().0.iter().zip(glances.as_chunks().0);
+            for (number, (before, after)) in (first / READINGS as u32..).zip(readings) {
                 let at = Asked::at(self.caches.settings.rays.wrapping_add(number));
                 self.noise.add(at, before, after, self.dark);
             }
