@@ -298,7 +298,8 @@ impl<'s, F> Filling<'s, F> {
     }
 
     /// The relative noise that records leave in the picture, root of the mean of squares over its pixels, as eye rays have told it that read records
-    /// before and after they were estimated anew; `None` before that, and where no picture is asked for. What all records share, the noise of photons, is not in it.
+    /// before and after they were estimated anew; `None` before that, and where no picture is asked for. What all records share, the noise of photons, is not in it,
+    /// nor what samples of a pixel average, which their spread tells.
     #[must_use]
     pub fn record_noise(&self) -> Option<f32> {
         self.left

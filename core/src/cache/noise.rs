@@ -1,9 +1,9 @@
 //! Noise of caches in a picture: measured along eye rays, and the estimates that it asks for.
 //!
-//! The same eye rays read all caches before their records are estimated anew and after. Both readings have the same random
-//! numbers, so that what differs is the noise of records, mixed and carried as pictures have them, and nothing else. Where fog reaches far beyond its records, one
-//! ray meets few of them and a pixel many: so each ray is read twice, and what counts is the part of the difference that both
-//! readings have, for that of one alone is what samples of a pixel average, and what the spread of samples tells (decision 97). A kind whose noise
+//! The same eye rays read all caches before their records are estimated anew and after, with the same random numbers, so that what differs is the
+//! noise of records, mixed and carried as pictures have them, and nothing else. Where fog reaches far beyond its records, one sample of a pixel meets few of
+//! them, and all samples together many: so each ray is read twice, by random numbers of its own each time, before as well as after. What counts is the part of
+//! the difference that both readings share. The rest is averaged by the samples of a pixel, whose spread tells of it (decision 97). A kind whose noise
 //! weighs much, for its light or for how hard it is to find, is estimated anew more often; one that the picture hardly shows is not. So it is region by region:
 //! what is dark is seen by itself, and its records go on when those of what is bright are good enough.
 
@@ -17,7 +17,7 @@ use crate::spectrum::Spectrum;
 /// Eye rays that are read. Fewer: single dark pixels decide; more: time.
 pub(super) const RAYS: u32 = 4096;
 
-/// Readings of each ray, each with random numbers of its own.
+/// Readings of each ray, each with random numbers of its own: two, because the product of what they differ by is a square in the mean.
 pub(super) const READINGS: usize = 2;
 
 /// Regions along each side of a picture for which noise is told apart. Fewer: what is dark and noisy is lost in what is around it; more: few rays tell
@@ -136,8 +136,14 @@ impl Default for Noise {
 }
 
 impl Noise {
-    /// Adds a ray at a point of the film, read `before` and after, of a picture as dark as [`dark`] says. The products of what two readings differ by are in
-    /// the mean the squares of what a pixel differs by.
+    /// Adds a ray at a point of the film, read `before` and after, of a picture as dark as [`dark`] says.
+    ///
+    /// ```text
+    /// E[(M₁ − B₁)(M₂ − B₂) | records] = (E[M − B | records])²
+    /// ```
+    ///
+    /// `B` and `M` are what a reading finds before and after. Given the records, readings are independent: so this is the square of what the mean of many
+    /// samples differs by. It is divided by the light that both find, which makes it too large by a part of second order in their own noise.
     pub(super) fn add(&mut self, at: [f32; 2], before: &[Glance; READINGS], after: &[Glance; READINGS], dark: f64) {
         let sums = &mut self.regions[region_of(at)];
         let all = after.iter().map(|glance| f64::from(glance.all)).sum::<f64>() / READINGS as f64;
@@ -156,7 +162,7 @@ impl Noise {
     pub(super) fn left(&self, efforts: [f64; KINDS]) -> [[Left; KINDS]; REGIONS] {
         self.regions.map(|sums| {
             core::array::from_fn(|k| {
-                // Written so that no rays tell of no noise. Nor do products that sum to less than nothing.
+                // Neither no rays nor a sum that chance made negative tell of noise.
                 let between = if sums.squares[k] > 0.0 { sums.squares[k] / sums.rays } else { 0.0 };
                 let left = Left::between(between, efforts[k].max(1.0));
                 let smoothed = if Kind::FINAL[k].is_on_surfaces() { presets::SMOOTHED } else { 1.0 };
@@ -250,7 +256,7 @@ mod tests {
         let found = noise.regions[0].squares[2] / f64::from(RAYS);
         // The products vary by 0.02² / √RAYS, 7 % of what is expected.
         assert!((found / 0.003_f64.powi(2) - 1.0).abs() < 0.25, "{found}");
-        // As much as chance has is not less than nothing.
+        // Where chance makes the sum negative the variance is not.
         let mut noise = Noise::default();
         noise.add([0.0; 2], &[glance(1.0, 0.0); READINGS], &[glance(0.9, 0.0), glance(1.1, 0.0)], 0.0);
         assert!(noise.left([1.0; KINDS]).iter().flatten().all(|left| left.variance == 0.0));
