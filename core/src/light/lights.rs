@@ -533,6 +533,37 @@ mod tests {
         }
     }
 
+    #[test]
+    fn lamps_beside_a_ray_are_found_however_wide_the_nodes_they_are_in() {
+        // A street of lamps whose near fields are smaller than what is between them, and bright points that send something everywhere.
+        let lamp = |i: u16| {
+            let at = Vec3::new([-3.6, 3.6][usize::from(i % 2)], 6.0, -2.5 * f32::from(i));
+            Light::Sphere(SphereLight::new(at, 0.16, Spectrum::splat(75.0)).unwrap())
+        };
+        let point = |x| Light::Point(PointLight::new(Vec3::new(x, 1.0, -9.0), Spectrum::splat(40.0)).unwrap());
+        let all: Vec<_> = (0..200).map(lamp).chain([-2.0, 2.0].map(point)).collect();
+        let tree = LightTree::new(&all, Vec::new()).unwrap();
+        let (lights, rng) = (Lights::with_tree(&all, &tree), &mut Generator::new(6));
+        let mut worst = 0.0_f32;
+        for i in 0..200 {
+            // Past a lamp, by half a metre at most, and on for a metre.
+            let (eye, lamp) = (Vec3::new(0.0, 2.7, 3.0), all[i].near_field().unwrap().centre());
+            let across = warp::uniform_sphere(uniform2(rng)).cross(lamp - eye).normalize();
+            let ray = Ray::between(eye, lamp + (0.16 + 0.34 * uniform(rng)) * across);
+            let centres = all[..200].iter().map(|light| light.near_field().unwrap().centre());
+            if centres.into_iter().any(|centre| ray.direction.cross(centre - eye).length() < 0.16 - 1e-3) {
+                continue; // It ends at a lamp before.
+            }
+            let question = FromRay { ray, near: 0.0, far: ray.length + 1.0, steep: true, until: None };
+            let sent: Vec<f32> = all.iter().map(|light| question.light(light)).collect();
+            let total: f32 = sent.iter().sum();
+            for (i, sent) in sent.iter().enumerate().filter(|(_, sent)| **sent > 0.0) {
+                worst = worst.max(sent / total / lights.share(&question, i));
+            }
+        }
+        assert!(worst < 100.0, "a sample may be {worst} times as bright as all light");
+    }
+
     /// Counts the nodes and lights that are looked at.
     struct Counting<'a, Q>(&'a Q, &'a Cell<u32>);
 

@@ -289,21 +289,25 @@ impl Question for FromRay {
     fn node(&self, node: &LightNode) -> Guess {
         let (centre, radius2) = (node.centre, node.radius2);
         let closest = self.ray.direction.dot(centre - self.ray.origin);
-        let distance2 = self.ray.at(closest.max(self.near).min(self.far)).distance_squared(centre);
-        let mut strength = node.strength;
-        if node.reach.is_finite() {
-            if float::sqrt(distance2) > float::sqrt(radius2) + node.reach {
-                return Guess::default();
-            }
-            // Near fields are balls: of the lights in the box those count that lie about the ray.
-            strength *= (node.reach * node.reach / radius2.max(1e-30)).min(1.0);
-        }
         if node.spread < float::PI && !self.may_be_lit(node, centre, radius2) {
             return Guess::default();
         }
+        if node.reach.is_finite() {
+            let within = float::sqrt(radius2) + node.reach;
+            let half2 = within * within - self.ray.at(closest).distance_squared(centre);
+            let half = float::safe_sqrt(half2);
+            let chord = self.far.min(closest + half) - self.near.max(closest - half);
+            if !(half2 > 0.0 && chord > 0.0) {
+                return Guess::default();
+            }
+            if node.reach * node.reach < radius2 {
+                return self.far_apart(node, chord);
+            }
+        }
+        let distance2 = self.ray.at(closest.max(self.near).min(self.far)).distance_squared(centre);
         let height2 = self.ray.at(closest).distance_squared(centre).max(INSIDE * radius2).max(1e-12);
         Guess::new(
-            self.sent(strength, height2, closest, (self.near, self.far)),
+            self.sent(node.strength, height2, closest, (self.near, self.far)),
             radius2 / distance2.max(INSIDE * radius2).max(1e-12),
         )
     }
@@ -322,6 +326,20 @@ impl FromRay {
         };
         // Written so that NaN counts as little.
         (strength * (angle / height).max(1e-30)).clamp(f32::MIN_POSITIVE, 1e30)
+    }
+
+    /// Of lights with near fields smaller than what is between them, `Σ I` in all: those count whose field the ray crosses, from inside it, by `∫ dt/r² = 2 acos(h/reach)/h`. If all
+    /// did, they would send `4/reach Σ I`; in the mean, where they lie evenly in a ball of the node's radius through which runs a chord (m), this share of it:
+    ///
+    /// ```text
+    /// 1/V · chord · ∫₀^reach 2 acos(h/reach)/h 2πh dh = 4/reach · share      share = 3/4 · reach² chord/radius³
+    /// ```
+    ///
+    /// As it is all or nothing for each, the root of the mean square counts (`√share`), by which choices have the least variance.
+    fn far_apart(&self, node: &LightNode, chord: f32) -> Guess {
+        let most = 4.0 * node.strength / node.reach;
+        let share = 0.75 * (node.reach * node.reach) * chord / (node.radius2 * float::sqrt(node.radius2));
+        Guess { weight: (most * float::sqrt(share.min(1.0))).clamp(f32::MIN_POSITIVE, 1e30), doubt: most.min(1e30) }
     }
 
     /// Whether light of a node may come to any point of the part. Where it is dark behind lights is convex, so both ends tell.
@@ -347,4 +365,34 @@ fn quick_angle(y: f32, x: f32) -> f32 {
     let steep = z * (0.25 * float::PI + 0.273 * (1.0 - z));
     let angle = if y < x.abs() { steep } else { 0.5 * float::PI - steep };
     if x < 0.0 { float::PI - angle } else { angle }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::light::SphereLight;
+    use crate::sampling::{Generator, uniform, uniform2, warp};
+    use crate::spectrum::Spectrum;
+
+    #[test]
+    fn lamps_that_are_far_apart_send_what_a_ball_of_them_does_in_the_mean() {
+        let (radius, rng) = (2.0, &mut Generator::new(3));
+        let lamp = |centre| Light::Sphere(SphereLight::new(centre, 0.01, Spectrum::ONE).unwrap());
+        let (reach, strength) =
+            (lamp(Vec3::ZERO).steep_field().unwrap().radius().unwrap(), lamp(Vec3::ZERO).intensity());
+        let node = LightNode { radius2: radius * radius, strength, reach, ..LightNode::EMPTY };
+        let ray = Ray::between(Vec3::new(-5.0, 0.3, 0.2), Vec3::new(5.0, 0.1, -0.4));
+        let question = FromRay { ray, near: 0.0, far: ray.length, steep: true, until: None };
+        // Of lamps, not of where their fields are: the chord of the ball itself.
+        let height2 = ray.direction.cross(ray.origin).length_squared();
+        let Guess { weight, doubt } = question.far_apart(&node, 2.0 * float::sqrt(radius * radius - height2));
+        const LAMPS: u32 = 2_000_000;
+        let mut sum = 0.0;
+        for _ in 0..LAMPS {
+            let at = radius * libm::cbrtf(uniform(rng)) * warp::uniform_sphere(uniform2(rng));
+            sum += f64::from(Question::light(&question, &lamp(at)));
+        }
+        let (mean, told) = (sum / f64::from(LAMPS), f64::from(weight * weight / doubt));
+        assert!((told / mean - 1.0).abs() < 0.05, "{told} instead of {mean}");
+    }
 }
