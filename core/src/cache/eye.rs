@@ -20,6 +20,9 @@ use crate::world::{Joint, MAX_INTERFACES, NearLight, NearLights, World, beyond, 
 /// Mirrors and panes of glass an eye ray follows: a hall of mirrors must end.
 const MAX_BOUNCES: u32 = 32;
 
+/// Connections from a surface, which is sampled where the pixel is: more choose lights no more evenly than samples of the pixel do.
+const FROM_SURFACES: u32 = 4;
+
 /// The golden ratio and the plastic numbers: multiples of them, wrapped, fill the unit interval and square evenly.
 const STEPS: [f32; 3] = [0.618_034, 0.754_877_67, 0.569_840_3];
 
@@ -28,7 +31,7 @@ const STEPS: [f32; 3] = [0.618_034, 0.754_877_67, 0.569_840_3];
 pub struct RaySettings {
     /// Points per sample on a ray through opaque fog: see [`scattering_points`].
     pub density: f32,
-    /// Connections per segment of a ray to lights in whose near field it runs.
+    /// Connections per segment of a ray to lights in whose near field it runs; as many, but four at most, from a surface where there are several lights.
     pub connections: u32,
     /// Whether eye rays see area lights and the environment.
     pub lights_visible: bool,
@@ -37,10 +40,10 @@ pub struct RaySettings {
 }
 
 impl Default for RaySettings {
-    /// Eight points where fog is opaque, four connections to near lights, all light. More of both: less noise in each sample, for
+    /// Eight points where fog is opaque, eight connections to near lights, all light. More of both: less noise in each sample, for
     /// more time; fewer, and samples are spent on rays that bring little.
     fn default() -> Self {
-        Self { density: 8.0, connections: 4, lights_visible: true, indirect: true }
+        Self { density: 8.0, connections: 8, lights_visible: true, indirect: true }
     }
 }
 
@@ -553,7 +556,8 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Gather<'_, M, S> {
     /// The mean of some connections from a surface: of one where there is one light, for which of several was chosen is the most part of the noise.
     fn several(&mut self, connection: &Connection<'_, M, S>) -> Spectrum {
         let (choice, at) = self.surface;
-        let count = if self.estimator.world.lights.len() > 1 { self.settings.connections.max(1) } else { 1 };
+        let count =
+            if self.estimator.world.lights.len() > 1 { self.settings.connections.clamp(1, FROM_SURFACES) } else { 1 };
         let mut sum = Spectrum::ZERO;
         for k in 0..count {
             let wrapped = |x: f32| (x - libm::floorf(x)).min(1.0 - f32::EPSILON);
