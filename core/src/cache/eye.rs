@@ -20,7 +20,7 @@ use crate::world::{Joint, MAX_INTERFACES, NearLight, NearLights, World, beyond, 
 /// Mirrors and panes of glass an eye ray follows: a hall of mirrors must end.
 const MAX_BOUNCES: u32 = 32;
 
-/// Connections from a surface, which is sampled where the pixel is: more choose lights no more evenly than samples of the pixel do.
+/// Connections from a surface at most, where lights are several. More: shadow rays for what samples of a pixel average as well; fewer: the choice of one light makes most of the noise.
 const FROM_SURFACES: u32 = 4;
 
 /// The golden ratio and the plastic numbers: multiples of them, wrapped, fill the unit interval and square evenly.

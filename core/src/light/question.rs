@@ -289,20 +289,14 @@ impl Question for FromRay {
     fn node(&self, node: &LightNode) -> Guess {
         let (centre, radius2) = (node.centre, node.radius2);
         let closest = self.ray.direction.dot(centre - self.ray.origin);
+        let within = float::sqrt(radius2) + node.reach;
+        let around = NearField { centre, radius2: within * within };
+        let Some((from, to)) = around.interval(&self.ray, self.near, self.far) else { return Guess::default() };
         if node.spread < float::PI && !self.may_be_lit(node, centre, radius2) {
             return Guess::default();
         }
-        if node.reach.is_finite() {
-            let within = float::sqrt(radius2) + node.reach;
-            let half2 = within * within - self.ray.at(closest).distance_squared(centre);
-            let half = float::safe_sqrt(half2);
-            let chord = self.far.min(closest + half) - self.near.max(closest - half);
-            if !(half2 > 0.0 && chord > 0.0) {
-                return Guess::default();
-            }
-            if node.reach * node.reach < radius2 {
-                return self.far_apart(node, chord);
-            }
+        if node.reach * node.reach < radius2 {
+            return self.far_apart(node, to - from);
         }
         let distance2 = self.ray.at(closest.max(self.near).min(self.far)).distance_squared(centre);
         let height2 = self.ray.at(closest).distance_squared(centre).max(INSIDE * radius2).max(1e-12);
@@ -328,8 +322,9 @@ impl FromRay {
         (strength * (angle / height).max(1e-30)).clamp(f32::MIN_POSITIVE, 1e30)
     }
 
-    /// Of lights with near fields smaller than what is between them, `Σ I` in all: those count whose field the ray crosses, from inside it, by `∫ dt/r² = 2 acos(h/reach)/h`. If all
-    /// did, they would send `4/reach Σ I`; in the mean, where they lie evenly in a ball of the node's radius through which runs a chord (m), this share of it:
+    /// About what lights send (W·m⁻¹·sr⁻¹) whose near fields are smaller than their node, of intensities `Σ I` in all: those count whose field the ray crosses, each by
+    /// `I ∫ dt/r² = I 2 acos(h/reach)/h`, from within its field. If all did, they would send `4/reach Σ I`; in the mean, where they lie evenly in a ball of the node's radius through which runs a chord (m), this share of it,
+    /// exactly but for rims:
     ///
     /// ```text
     /// 1/V · chord · ∫₀^reach 2 acos(h/reach)/h 2πh dh = 4/reach · share      share = 3/4 · reach² chord/radius³
