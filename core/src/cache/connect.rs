@@ -4,7 +4,7 @@ use glam::{Vec2, Vec3};
 
 use super::estimate::Estimator;
 use crate::host::{Medium, Scene};
-use crate::light::Question;
+use crate::light::{LightSample, Question, Source};
 use crate::math::Ray;
 use crate::phase::{Phase, deflection};
 use crate::sampling::discrete::Choice;
@@ -17,29 +17,45 @@ use crate::world::{World, nearest_surface, shadow_ray};
 /// 0.8 a fifth of the variance); larger: grain before wide lamps.
 const PEAKED: f32 = 0.7;
 
+/// A connection of a point with a light that was chosen, of which is not yet known whether anything lies in between.
+#[derive(Clone, Copy)]
+pub(super) struct Connection {
+    /// Where it begins (m).
+    pub from: Vec3,
+    /// The point of the light.
+    pub source: Source,
+    /// What it would bring, and the probability with which the light was chosen.
+    pub light: Spectrum,
+    pub share: f32,
+}
+
 impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
     /// Light of a light that was chosen, from a point in the unit square for that on it, times `value(to_light, pdf)` with the density
-    /// (sr⁻¹) of that choice, 0 for lights without extent. Transmittance is marched: what ratio tracking adds in noise would rule
-    /// pictures whose other parts have none.
-    pub(super) fn connected_to(
+    /// (sr⁻¹) of that choice, 0 for lights without extent, as if nothing lay in between.
+    pub(super) fn offered(
         &self,
         (chosen, on_light): (Choice, Vec2),
         point: Vec3,
         origin: &dyn Fn(Vec3) -> Vec3,
         value: &dyn Fn(Vec3, f32) -> Spectrum,
-        rng: &mut Generator,
-    ) -> Spectrum {
-        let World { scene, lights, .. } = self.world;
-        let Some(sample) = lights[chosen.index].sample(point, on_light) else { return Spectrum::ZERO };
-        let value = value(sample.incident.to_light, sample.pdf * chosen.probability);
+    ) -> Option<Connection> {
+        let LightSample { source, incident, pdf } = self.world.lights[chosen.index].sample(point, on_light)?;
+        let value = value(incident.to_light, pdf * chosen.probability);
         if value.is_black() {
+            return None;
+        }
+        let (light, share) = (value * incident.irradiance, chosen.probability);
+        Some(Connection { from: origin(incident.to_light), source, light, share })
+    }
+
+    /// What of a connection arrives. Transmittance is marched: what ratio tracking adds in noise would rule pictures whose other parts have none.
+    pub(super) fn arrived(&self, connection: &Connection, rng: &mut Generator) -> Spectrum {
+        let Connection { from, source, light, share } = *connection;
+        let shadow = shadow_ray(from, &source);
+        if self.world.scene.is_blocked(&shadow) {
             return Spectrum::ZERO;
         }
-        let shadow = shadow_ray(origin(sample.incident.to_light), &sample.source);
-        if scene.is_blocked(&shadow) {
-            return Spectrum::ZERO;
-        }
-        value * sample.incident.irradiance * self.passed(&shadow, rng) / chosen.probability
+        light * self.passed(&shadow, rng) / share
     }
 
     /// Light of one of the lights, chosen by `weight`, scattered once at `point` towards `to_eye`: radiance for each unit of scattering (W·m⁻²·sr⁻¹), unbiased but for
@@ -49,15 +65,27 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
     /// both find is weighed by the power heuristic (Veach 1997, § 9.2.4).
     pub(super) fn scattered(
         &self,
-        (weight, point): (&impl Question, Vec3),
+        (weight, point): (&dyn Question, Vec3),
         to_eye: Vec3,
         phase: &Phase,
         random: (f32, Vec2),
         rng: &mut Generator,
     ) -> Spectrum {
         let Some(chosen) = self.world.lights.pick(weight, random.0) else { return Spectrum::ZERO };
-        let may_meet = !self.world.lights[chosen.index].is_delta();
-        let is_peaked = may_meet && phase.mean_cosine().map(f32::abs).max_element() > PEAKED;
+        let offered = self.offered_by_medium((chosen, random.1), point, to_eye, phase);
+        let joined = offered.map_or(Spectrum::ZERO, |connection| self.arrived(&connection, rng));
+        joined + self.met(chosen, point, to_eye, phase, rng)
+    }
+
+    /// The connection of [`Estimator::scattered`], of a light that was chosen.
+    pub(super) fn offered_by_medium(
+        &self,
+        (chosen, on_light): (Choice, Vec2),
+        point: Vec3,
+        to_eye: Vec3,
+        phase: &Phase,
+    ) -> Option<Connection> {
+        let is_peaked = self.looks_for(chosen, phase);
         let value = |to_light: Vec3, pdf: f32| {
             let deflection = deflection(to_light, to_eye);
             let value = phase.value(deflection);
@@ -66,12 +94,26 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
             }
             value * mis::power(pdf, chosen.probability * phase.pdf(deflection))
         };
-        let joined = self.connected_to((chosen, random.1), point, &|_| point, &value, rng);
-        if is_peaked { joined + self.met(chosen, point, to_eye, phase, rng) } else { joined }
+        self.offered((chosen, on_light), point, &|_| point, &value)
     }
 
-    /// What the phase function finds of the light that was chosen.
-    fn met(&self, chosen: Choice, point: Vec3, to_eye: Vec3, phase: &Phase, rng: &mut Generator) -> Spectrum {
+    /// Whether the phase function looks for a light itself.
+    fn looks_for(&self, chosen: Choice, phase: &Phase) -> bool {
+        !self.world.lights[chosen.index].is_delta() && phase.mean_cosine().map(f32::abs).max_element() > PEAKED
+    }
+
+    /// What the phase function finds of the light that was chosen, where it looks for it.
+    pub(super) fn met(
+        &self,
+        chosen: Choice,
+        point: Vec3,
+        to_eye: Vec3,
+        phase: &Phase,
+        rng: &mut Generator,
+    ) -> Spectrum {
+        if !self.looks_for(chosen, phase) {
+            return Spectrum::ZERO;
+        }
         let World { scene, lights, .. } = self.world;
         let (light, sample) = (&lights[chosen.index], phase.sample(to_eye, uniform2(rng)));
         let ray = Ray::new(point, sample.to_light);

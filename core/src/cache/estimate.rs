@@ -3,6 +3,7 @@
 use glam::{Vec2, Vec3};
 
 use super::aim::Aims;
+use super::connect::Connection;
 use super::evidence::{Halves, Openings};
 use super::guide::Looks;
 use super::lobe::{self, Lobe, coefficients_of};
@@ -18,6 +19,7 @@ use crate::math::{Frame, Ray, float};
 use crate::multiple_scatter::{self, Cones, Incoming, Known, Start, Walk};
 use crate::path;
 use crate::phase::{Phase, deflection};
+use crate::sampling::discrete::Choice;
 use crate::sampling::{Generator, mis, uniform, uniform2, warp};
 use crate::sh::Coefficient;
 use crate::single_scatter::{self, Arrival, Contribution, Directional, Sums, Towards};
@@ -405,11 +407,32 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
         random: (f32, Vec2),
         rng: &mut Generator,
     ) -> Spectrum {
-        let origin = |to_light: Vec3| leave(point, hit.normal, to_light, hit.distance);
-        let cosine = |to_light: Vec3, _| Spectrum::splat(if hit.faces(to_light) { hit.cosine(to_light) } else { 0.0 });
         let weight = FromPoint { sky: with_sky, ..FromPoint::all(point) };
         let chosen = self.world.lights.pick(&weight, random.0);
-        chosen.map_or(Spectrum::ZERO, |chosen| self.connected_to((chosen, random.1), point, &origin, &cosine, rng))
+        let offered = chosen.and_then(|chosen| self.offered_at((chosen, random.1), point, hit, None));
+        offered.map_or(Spectrum::ZERO, |connection| self.arrived(&connection, rng))
+    }
+
+    /// A connection of a surface with a light that was chosen: of what arrives, or of what is reflected to an eye.
+    pub(super) fn offered_at(
+        &self,
+        chosen: (Choice, Vec2),
+        point: Vec3,
+        hit: &Hit,
+        to_eye: Option<Vec3>,
+    ) -> Option<Connection> {
+        let origin = |to_light: Vec3| leave(point, hit.normal, to_light, hit.distance);
+        let value = |to_light: Vec3, pdf: f32| {
+            let Some(to_eye) = to_eye else {
+                return Spectrum::splat(if hit.faces(to_light) { hit.cosine(to_light) } else { 0.0 });
+            };
+            let value = hit.value(to_eye, to_light) * hit.cosine(to_light).abs();
+            if !hit.surface.is_followed() || pdf <= 0.0 || value.is_black() {
+                return value;
+            }
+            value * mis::power(pdf, hit.pdf(to_eye, to_light))
+        };
+        self.offered(chosen, point, &origin, &value)
     }
 
     /// Irradiance (W·m⁻²) that is not straight from the lights but from a sky, by one path.
@@ -439,16 +462,9 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
         random: (f32, Vec2),
         rng: &mut Generator,
     ) -> Spectrum {
-        let origin = |to_light: Vec3| leave(point, hit.normal, to_light, hit.distance);
-        let value = |to_light: Vec3, pdf: f32| {
-            let value = hit.value(to_eye, to_light) * hit.cosine(to_light).abs();
-            if !hit.surface.is_followed() || pdf <= 0.0 || value.is_black() {
-                return value;
-            }
-            value * mis::power(pdf, hit.pdf(to_eye, to_light))
-        };
         let chosen = self.world.lights.pick(&FromPoint::all(point), random.0);
-        chosen.map_or(Spectrum::ZERO, |chosen| self.connected_to((chosen, random.1), point, &origin, &value, rng))
+        let offered = chosen.and_then(|chosen| self.offered_at((chosen, random.1), point, hit, Some(to_eye)));
+        offered.map_or(Spectrum::ZERO, |connection| self.arrived(&connection, rng))
     }
 
     /// Light of all lights but a sky, scattered once at `point` towards `to_eye`: one sample of each, or of those that stand

@@ -4,9 +4,10 @@ use glam::{Vec2, Vec3};
 
 use super::estimate::Estimator;
 use super::lookup::{Basis, Reading};
+use super::offers::{FROM_SURFACES, Offers, wrapped};
 use super::store::{SurfaceCache, VolumeCache};
 use crate::host::{Hit, Medium, Properties, Rng, Scene};
-use crate::light::{Except, FromPoint, FromRay, Light, LightSample, Lights, scattered};
+use crate::light::{Except, FromPoint, Light, LightSample, Lights, scattered};
 use crate::march::scattering_points;
 use crate::math::{Frame, Ray};
 use crate::path::connection_pdf;
@@ -15,23 +16,18 @@ use crate::sampling::{Generator, mis, uniform, uniform2, warp};
 use crate::spectrum::Spectrum;
 use crate::surface::{Surface, lambert};
 use crate::transmittance::thickness::{Marching, transmittance, until_the_end};
-use crate::world::{Joint, MAX_INTERFACES, NearLight, NearLights, World, beyond, leave, nearest_surface, shadow_ray};
+use crate::world::{Joint, MAX_INTERFACES, NearLights, World, beyond, leave, nearest_surface, shadow_ray};
 
 /// Mirrors and panes of glass an eye ray follows: a hall of mirrors must end.
 const MAX_BOUNCES: u32 = 32;
-
-/// Connections from a surface at most, where lights are several. More: shadow rays for what samples of a pixel average as well; fewer: the choice of one light makes most of the noise.
-const FROM_SURFACES: u32 = 4;
-
-/// The golden ratio and the plastic numbers: multiples of them, wrapped, fill the unit interval and square evenly.
-const STEPS: [f32; 3] = [0.618_034, 0.754_877_67, 0.569_840_3];
 
 /// How far rays are followed, and with how many points.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RaySettings {
     /// Points per sample on a ray through opaque fog: see [`scattering_points`].
     pub density: f32,
-    /// Connections per segment of a ray to lights in whose near field it runs; as many, but four at most, from a surface where there are several lights.
+    /// Connections per segment of a ray to lights in whose near field it runs; as many, but four at most, from a surface where there are several lights. Of more than eight
+    /// lights, several times as many are tried, from points in the medium as well, and as many as both together are followed (32 and 4 at most).
     pub connections: u32,
     /// Whether eye rays see area lights and the environment.
     pub lights_visible: bool,
@@ -485,6 +481,7 @@ fn gathered<M: Medium + ?Sized, S: Scene + ?Sized>(
         caches,
         settings,
         in_scattered,
+        many: NearLights::are_many(&estimator.world.lights).then(|| Offers::new(estimator, settings.connections)),
         seen: CachedRadiance::default(),
         along,
         light,
@@ -494,11 +491,13 @@ fn gathered<M: Medium + ?Sized, S: Scene + ?Sized>(
         rng: Generator::child(rng),
     };
     look(ray, &estimator.world, settings, rng, &mut gather);
+    if let Some(many) = &mut gather.many {
+        many.settle(&mut gather.rng);
+        gather.seen.medium_single += many.arrived[0];
+        gather.seen.surface_direct += many.arrived[1];
+    }
     gather.seen
 }
-
-/// One connection from a surface, by such random numbers for the light and the point on it.
-type Connection<'c, M, S> = dyn Fn(&Estimator<'_, M, S>, (f32, Vec2), &mut Generator) -> Spectrum + 'c;
 
 struct Gather<'a, M: ?Sized, S: ?Sized> {
     estimator: &'a Estimator<'a, M, S>,
@@ -506,6 +505,8 @@ struct Gather<'a, M: ?Sized, S: ?Sized> {
     settings: &'a RaySettings,
     /// Whether light that the medium scatters counts.
     in_scattered: bool,
+    /// Where lights are many.
+    many: Option<Offers<'a, M, S>>,
     seen: CachedRadiance,
     /// Random numbers of the sample: for connections along segments, from points, from surfaces.
     along: [f32; 2],
@@ -521,10 +522,7 @@ struct Gather<'a, M: ?Sized, S: ?Sized> {
 impl<M: Medium + ?Sized, S: Scene + ?Sized> Gather<'_, M, S> {
     /// Single scattering at a point of the ray of one light, in whose near field it does not lie.
     fn connected(&mut self, point: Vec3, to_eye: Vec3, properties: &Properties, k: u32) -> Spectrum {
-        let [choice, u, v] = [0, 1, 2].map(|i| {
-            let x = self.light[i] + STEPS[i] * k as f32;
-            (x - libm::floorf(x)).min(1.0 - f32::EPSILON)
-        });
+        let [choice, u, v] = [0, 1, 2].map(|i| wrapped(self.light[i], i, k));
         let (to, phase) = (
             FromPoint { except: Except::Steep, sky: !self.settings.indirect, ..FromPoint::all(point) },
             &properties.phase,
@@ -553,17 +551,21 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Gather<'_, M, S> {
         light.is_finite().then_some(light)
     }
 
-    /// The mean of some connections from a surface: of one where there is one light, for which of several was chosen is the most part of the noise.
-    fn several(&mut self, connection: &Connection<'_, M, S>) -> Spectrum {
-        let (choice, at) = self.surface;
-        let count =
-            if self.estimator.world.lights.len() > 1 { self.settings.connections.clamp(1, FROM_SURFACES) } else { 1 };
+    /// The mean of some connections from a surface, of what arrives or of what is reflected to an eye: of one where there is one light, for which of several was chosen is the
+    /// most part of the noise.
+    fn several(&mut self, point: Vec3, hit: &Hit, to_eye: Option<Vec3>) -> Spectrum {
+        let (lights, (choice, at)) = (self.estimator.world.lights, self.surface);
+        let count = if lights.len() > 1 { self.settings.connections.clamp(1, FROM_SURFACES) } else { 1 };
+        let sky = to_eye.is_some() || !self.settings.indirect;
+        let question = FromPoint { sky, ..FromPoint::all(point) };
+        let survey = lights.survey(&question);
         let mut sum = Spectrum::ZERO;
         for k in 0..count {
-            let wrapped = |x: f32| (x - libm::floorf(x)).min(1.0 - f32::EPSILON);
-            let choice = wrapped(choice + k as f32 / count as f32);
-            let at = Vec2::new(wrapped(at.x + STEPS[1] * k as f32), wrapped(at.y + STEPS[2] * k as f32));
-            sum += connection(self.estimator, (choice, at), &mut self.rng);
+            let choice = wrapped(choice + k as f32 / count as f32, 0, 0);
+            let at = Vec2::new(wrapped(at.x, 1, k), wrapped(at.y, 2, k));
+            let chosen = survey.pick(choice).map(|chosen| (chosen, at));
+            let offered = chosen.and_then(|chosen| self.estimator.offered_at(chosen, point, hit, to_eye));
+            sum += offered.map_or(Spectrum::ZERO, |connection| self.estimator.arrived(&connection, &mut self.rng));
         }
         sum / count as f32
     }
@@ -596,27 +598,15 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Sight for Gather<'_, M, S> {
         if self.caches.single.is_some() || !self.in_scattered {
             return;
         }
+        if let Some(many) = &mut self.many {
+            many.along(segment, throughput, self.along, &mut self.rng);
+            return;
+        }
+        let few = NearLights::of(&self.estimator.world.lights, segment, &mut self.rng);
         let count = self.settings.connections.max(1);
-        let lights = self.estimator.world.lights;
-        let few = NearLights::of(&lights, segment, &mut self.rng);
-        let sent = FromRay { ray: *segment, near: 0.0, far: segment.length, steep: true, until: None };
-        let many = few.is_none().then(|| lights.survey(&sent));
         for k in 0..count {
             let u = (k as f32 + self.along[1]) / count as f32;
-            let joint = match (&few, &many) {
-                (Some(few), _) => few.join(segment, u),
-                (None, Some(many)) => {
-                    let choice = self.along[0] + STEPS[0] * k as f32;
-                    many.pick(choice - libm::floorf(choice)).and_then(|chosen| {
-                        let near = NearLight::of(&lights[chosen.index], segment, 0.0, segment.length)?;
-                        let mut joint = near.join(segment, u, uniform2(&mut self.rng))?;
-                        joint.pdf *= chosen.probability;
-                        Some(joint)
-                    })
-                }
-                (None, None) => None,
-            };
-            if let Some(light) = joint.and_then(|joint| self.near(segment, &joint)) {
+            if let Some(light) = few.join(segment, u).and_then(|joint| self.near(segment, &joint)) {
                 self.seen.medium_single += throughput * light / count as f32;
             }
         }
@@ -632,7 +622,14 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Sight for Gather<'_, M, S> {
         let (caches, estimator) = (self.caches, self.estimator);
         let phase = &properties.phase;
         let single = match &caches.single {
-            None => self.connected(point, to_eye, properties, k),
+            None => match &mut self.many {
+                Some(many) => {
+                    let at = (point, to_eye, properties);
+                    many.at_point(at, weight, !self.settings.indirect, (self.light, k), &mut self.rng);
+                    Spectrum::ZERO
+                }
+                None => self.connected(point, to_eye, properties, k),
+            },
             Some(_) => self.cached(caches.single.as_ref(), point, to_eye, |gather| {
                 estimator.towards(point, to_eye, phase, &mut gather.rng)
             }),
@@ -655,25 +652,20 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Sight for Gather<'_, M, S> {
         let point = ray.at(hit.distance);
         let to_eye = -ray.direction;
         let value = match hit.surface {
-            Surface::Lambert { reflectance } => {
-                if reflectance.is_black() || !hit.faces(to_eye) {
-                    return;
-                }
-                lambert::value(reflectance)
-            }
-            _ => {
-                let light =
-                    self.several(&|estimator, random, rng| estimator.reflected(point, hit, to_eye, random, rng));
-                self.seen.surface_direct += weight * light;
-                return;
-            }
+            Surface::Lambert { reflectance } if reflectance.is_black() || !hit.faces(to_eye) => return,
+            Surface::Lambert { reflectance } => Some(lambert::value(reflectance)),
+            _ => None,
         };
-        let with_sky = !self.settings.indirect;
-        let direct = self.several(&|estimator, random, rng| estimator.direct_at(point, hit, with_sky, random, rng));
-        self.seen.surface_direct += weight * value * direct;
-        if !self.settings.indirect {
-            return;
+        let towards = value.is_none().then_some(to_eye);
+        let reflected = weight * value.unwrap_or(Spectrum::ONE);
+        if let Some(many) = &mut self.many {
+            let start = [self.surface.0, self.surface.1.x, self.surface.1.y];
+            many.at_surface((point, hit, towards), reflected, !self.settings.indirect, start, &mut self.rng);
+        } else {
+            let light = self.several(point, hit, towards);
+            self.seen.surface_direct += reflected * light;
         }
+        let Some(value) = value.filter(|_| self.settings.indirect) else { return };
         let indirect = match &self.caches.irradiance {
             None => None,
             Some(reader) => {

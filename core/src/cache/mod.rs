@@ -45,6 +45,7 @@
 //! | `connect` | connections of points to lights, for records and for eye rays |
 //! | `evidence` | how far gradients can be believed; edges of the sky |
 //! | `eye` | [`places`] and [`radiance`] of eye rays |
+//! | `offers` | their connections to many lights: more are tried than are followed |
 //! | `agreement` | whether gradients of records agree with the records around them |
 //! | `audit`, `bias_map` | [`Audit`]: how far pictures from caches are off; [`BiasMap`]: where |
 //! | `refine` | levels of falling error, where time is limited |
@@ -74,6 +75,7 @@ mod lookup;
 mod memory;
 mod mixture;
 mod noise;
+mod offers;
 mod output_bytes;
 mod photons;
 mod pilots;

@@ -31,7 +31,7 @@ pub(crate) struct Cut {
 
 impl Cut {
     /// From the roots down, what is least known first, until nothing is in doubt or there are `limit` nodes.
-    pub(super) fn of(lights: &Lights<'_>, question: &impl Question, limit: usize) -> Self {
+    pub(super) fn of(lights: &Lights<'_>, question: &dyn Question, limit: usize) -> Self {
         let mut cut = Self { entries: heapless::Vec::new(), total: 0.0 };
         let mut doubts = heapless::Vec::<f32, MOST>::new();
         for (_, root) in lights.roots().filter(|(kind, _)| question.asks(*kind)) {
@@ -73,7 +73,7 @@ impl Cut {
         &self.entries
     }
 
-    pub(super) fn pick(&self, lights: &Lights<'_>, question: &impl Question, u: f32) -> Option<Choice> {
+    pub(super) fn pick(&self, lights: &Lights<'_>, question: &dyn Question, u: f32) -> Option<Choice> {
         let mut left = u * self.total;
         let mut found = None;
         for &(node, weight) in &self.entries {
@@ -92,7 +92,7 @@ impl Cut {
     pub(super) fn descend(
         &self,
         lights: &Lights<'_>,
-        question: &impl Question,
+        question: &dyn Question,
         (mut index, _): (u32, f32),
         u: &mut f32,
     ) -> Option<(usize, f32)> {
@@ -123,7 +123,7 @@ impl Cut {
     }
 
     /// The probability with which [`Cut::pick`] takes a light.
-    pub(super) fn share(&self, lights: &Lights<'_>, question: &impl Question, light: usize) -> f32 {
+    pub(super) fn share(&self, lights: &Lights<'_>, question: &dyn Question, light: usize) -> f32 {
         if light >= lights.slice().len() {
             return 0.0;
         }
@@ -150,7 +150,7 @@ impl Cut {
 }
 
 #[inline]
-fn guess(lights: &Lights<'_>, question: &impl Question, index: u32) -> Guess {
+fn guess(lights: &Lights<'_>, question: &dyn Question, index: u32) -> Guess {
     let node = lights.node(index);
     match node.leaf() {
         Some(light) => Guess { weight: question.leaf(node, &lights.slice()[light]), doubt: 0.0 },

@@ -156,20 +156,18 @@ impl<'a> Lights<'a> {
     }
 
     /// Chooses one light by a question.
-    #[inline]
-    pub(crate) fn pick(&self, question: &impl Question, u: f32) -> Option<Choice> {
+    pub(crate) fn pick(&self, question: &dyn Question, u: f32) -> Option<Choice> {
         self.survey(question).pick(u)
     }
 
     /// All that is needed to choose among lights several times.
-    #[inline]
-    pub(crate) fn survey<'q, Q: Question>(&self, question: &'q Q) -> Survey<'q, 'a, Q> {
+    pub(crate) fn survey<'q>(&self, question: &'q dyn Question) -> Survey<'q, 'a> {
         let cut = self.has_tree().then(|| Cut::of(self, question, question.limit()));
         Survey { lights: *self, question, cut }
     }
 
     /// The probability with which the light `index` is chosen by a question.
-    pub(crate) fn share(&self, question: &impl Question, index: usize) -> f32 {
+    pub(crate) fn share(&self, question: &dyn Question, index: usize) -> f32 {
         if self.has_tree() {
             return Cut::of(self, question, question.limit()).share(self, question, index);
         }
@@ -182,7 +180,7 @@ impl<'a> Lights<'a> {
     /// with which it was chosen.
     pub(crate) fn representatives<R: Rng + ?Sized>(
         &self,
-        question: &impl Question,
+        question: &dyn Question,
         rng: &mut R,
         mut visit: impl FnMut(&'a Light<'a>, f32, &mut R),
     ) {
@@ -201,7 +199,7 @@ impl<'a> Lights<'a> {
     }
 
     /// The lights that matter each by itself: all without a tree, else those that stand alone in a cut.
-    pub(crate) fn strong(&self, question: &impl Question) -> Strong {
+    pub(crate) fn strong(&self, question: &dyn Question) -> Strong {
         if !self.has_tree() {
             return Strong { indices: None, others: 0.0 };
         }
@@ -360,13 +358,13 @@ impl Strong {
 }
 
 /// Lights as a question sees them, for any number of choices.
-pub(crate) struct Survey<'q, 'a, Q> {
+pub(crate) struct Survey<'q, 'a> {
     lights: Lights<'a>,
-    question: &'q Q,
+    question: &'q dyn Question,
     cut: Option<Cut>,
 }
 
-impl<Q: Question> Survey<'_, '_, Q> {
+impl Survey<'_, '_> {
     pub(crate) fn pick(&self, u: f32) -> Option<Choice> {
         match &self.cut {
             Some(cut) => cut.pick(&self.lights, self.question, u),
@@ -429,7 +427,7 @@ mod tests {
     }
 
     /// Chooses many times: every light as often as is said of it, with the probability that is said; and those that take part are reached.
-    fn check_choices(lights: &Lights<'_>, question: &impl Question, is_whole: bool) {
+    fn check_choices(lights: &Lights<'_>, question: &dyn Question, is_whole: bool) {
         let survey = lights.survey(question);
         let count = 4000;
         let mut found = alloc::vec![0_u32; lights.len()];
@@ -473,7 +471,7 @@ mod tests {
     }
 
     /// What an estimate of light that is scattered has as its mean square, over its squared mean, where a question chooses the lamp.
-    fn spread_of_scattered(lights: &Lights<'_>, question: &impl Question, (to_eye, phase): (Vec3, &Phase)) -> f64 {
+    fn spread_of_scattered(lights: &Lights<'_>, question: &dyn Question, (to_eye, phase): (Vec3, &Phase)) -> f64 {
         let point = at(&mut Generator::new(8));
         let sent = |(i, light): (usize, &Light<'_>)| {
             let to_light = (light.near_field().unwrap().centre() - point).normalize();
@@ -504,7 +502,7 @@ mod tests {
     }
 
     /// What an estimate by one choice has as its mean square, over its squared mean: 1 where probabilities follow the lights.
-    fn spread(lights: &Lights<'_>, question: &impl Question) -> f64 {
+    fn spread(lights: &Lights<'_>, question: &dyn Question) -> f64 {
         let (mut squares, mut total) = (0.0, 0.0);
         for (i, light) in lights.iter().enumerate() {
             let sent = f64::from(question.light(light));

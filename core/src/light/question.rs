@@ -95,7 +95,7 @@ impl Question for FromPoint {
         }
     }
 
-    #[inline]
+    #[inline(never)]
     fn light(&self, light: &Light<'_>) -> f32 {
         let within = |field: Option<NearField>| field.is_some_and(|field| field.contains(self.point));
         let left_out = match self.except {
@@ -116,7 +116,7 @@ impl Question for FromPoint {
         sent.min(1e30)
     }
 
-    #[inline]
+    #[inline(never)]
     fn leaf(&self, node: &LightNode, light: &Light<'_>) -> f32 {
         if !node.is_even() || node.reach == 0.0 {
             return self.light(light);
@@ -126,7 +126,7 @@ impl Question for FromPoint {
         if left_out { 0.0 } else { (node.strength / distance2.max(1e-12)).min(1e30) }
     }
 
-    #[inline]
+    #[inline(never)]
     fn node(&self, node: &LightNode) -> Guess {
         // At infinity all are the same from everywhere.
         if node.reach == 0.0 {

@@ -485,7 +485,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Walk<'_, M, S> {
     /// Calls `connect(light, probability)` for all lights with positive importance, or for one of them.
     fn each(
         &self,
-        question: &impl Question,
+        question: &dyn Question,
         rng: &mut Generator,
         mut connect: impl FnMut(&Light<'_>, f32, &mut Generator) -> Option<()>,
     ) {

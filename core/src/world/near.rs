@@ -159,11 +159,14 @@ fn runs(is_lit: &dyn Fn(f32) -> bool) -> heapless::Vec<Run, LOOKS> {
 }
 
 impl<'a> NearLights<'a> {
-    /// `None` where lights are many. Where any is near, a point on it is drawn.
-    pub(crate) fn of(lights: &Lights<'a>, ray: &Ray, rng: &mut Generator) -> Option<Self> {
-        if lights.len() > FEW {
-            return None;
-        }
+    /// Whether lights are too many to be looked at each by itself.
+    pub(crate) fn are_many(lights: &Lights<'_>) -> bool {
+        lights.len() > FEW
+    }
+
+    /// Of lights that are not [too many](Self::are_many). Where any is near, a point on it is drawn.
+    pub(crate) fn of(lights: &Lights<'a>, ray: &Ray, rng: &mut Generator) -> Self {
+        debug_assert!(!Self::are_many(lights));
         let mut all = heapless::Vec::new();
         let mut on_light = None;
         let question = FromRay { ray: *ray, near: 0.0, far: ray.length, steep: true, until: None };
@@ -183,7 +186,7 @@ impl<'a> NearLights<'a> {
             let total = runs.iter().map(|run| run.weight).sum();
             let _ = all.push(Lit { near: NearLight { light, interval }, law, anchor, runs, total });
         }
-        Some(Self(all))
+        Self(all)
     }
 
     /// A point of the ray and the light it is to be joined to, by one number `u` in [0, 1); its density is that of both. `None` where no light is near.
@@ -270,7 +273,7 @@ mod tests {
         let mut sums = [0.0; 2];
         for i in 0..samples {
             let mut rng = Generator::new(u64::from(i));
-            let near = NearLights::of(lights, &ray, &mut rng).unwrap();
+            let near = NearLights::of(lights, &ray, &mut rng);
             let shift = uniform(&mut rng);
             let value = |k: u32| {
                 let joint = near.join(&ray, (k as f32 + shift) / 4.0)?;
