@@ -5,12 +5,13 @@ use glam::{Vec2, Vec3};
 use super::connect::Connection;
 use super::estimate::Estimator;
 use crate::host::{Hit, Medium, Properties, Scene};
-use crate::light::{Except, FromPoint, FromRay, LightSample, scattered};
-use crate::math::Ray;
-use crate::phase::deflection;
+use crate::light::{Except, FromPoint, FromRay, LightSample, Question, scattered};
+use crate::math::{Ray, float};
+use crate::phase::{Lobe, Phase, deflection};
 use crate::sampling::discrete::Choice;
 use crate::sampling::{Generator, uniform, uniform2};
 use crate::spectrum::Spectrum;
+use crate::surface::Surface;
 use crate::transmittance::thickness::{Marching, optical_thickness};
 use crate::world::NearLight;
 
@@ -33,6 +34,17 @@ const STEPS: [f32; 3] = [0.618_034, 0.754_877_67, 0.569_840_3];
 pub(super) fn wrapped(start: f32, i: usize, k: u32) -> f32 {
     let x = start + STEPS[i] * k as f32;
     (x - libm::floorf(x)).min(1.0 - f32::EPSILON)
+}
+
+/// A Phong surface as a question about lights sees it: as a medium with a phase function of a lobe about as high and wide (`(1 − g)² ≈ 1/(s + 2)`) and an isotropic one; the
+/// eye is where light that comes from the mirror's direction goes straight on to. None for surfaces that eye rays follow: light that is met there is weighed against
+/// connections by what arrives.
+fn mirrored(hit: &Hit, to_eye: Vec3) -> Option<(Vec3, Phase)> {
+    let Surface::Phong { diffuse, specular, exponent } = hit.surface else { return None };
+    let g = 1.0 - 1.0 / float::sqrt(exponent + 2.0);
+    let lobes = [(diffuse, Phase::ISOTROPIC), (specular, Phase::from(Lobe::HenyeyGreenstein { g }))];
+    let phase = Phase::mix(lobes).ok()?;
+    Some((to_eye - 2.0 * to_eye.dot(hit.shading) * hit.shading, phase))
 }
 
 /// A connection that was tried.
@@ -132,8 +144,11 @@ impl<'a, M: Medium + ?Sized, S: Scene + ?Sized> Offers<'a, M, S> {
         rng: &mut Generator,
     ) {
         let estimator = self.estimator;
-        let question = FromPoint { sky: sky || to_eye.is_some(), ..FromPoint::all(point) };
-        let survey = estimator.world.lights.survey(&question);
+        let to = FromPoint { sky: sky || to_eye.is_some(), ..FromPoint::all(point) };
+        let lobe = to_eye.and_then(|to_eye| mirrored(hit, to_eye));
+        let shown = lobe.as_ref().map(|(from_mirror, phase)| scattered(to, *from_mirror, phase));
+        let question: &dyn Question = if let Some(shown) = &shown { shown } else { &to };
+        let survey = estimator.world.lights.survey(question);
         let connection = |chosen| estimator.offered_at(chosen, point, hit, to_eye);
         let count = TRIED * self.connections.min(FROM_SURFACES);
         self.tried(&|u| survey.pick(u), &connection, (count, 0), (weight, true), start, rng);
@@ -200,8 +215,6 @@ mod tests {
     use crate::cache::{Caches, RaySettings, radiance};
     use crate::light::{Light, LightTree, Lights, PointLight, SphereLight, SpotLight, Sun};
     use crate::medium::Homogeneous;
-    use crate::phase::Lobe;
-    use crate::surface::Surface;
     use crate::transmittance::thickness::Steps;
     use crate::world::World;
     use crate::{multiple_scatter, path};
