@@ -24,8 +24,9 @@ pub(super) struct Connection {
     pub from: Vec3,
     /// The point of the light.
     pub source: Source,
-    /// What it would bring, and the probability with which the light was chosen.
+    /// What it would bring, times `share`: irradiance (W·m⁻²) times the value of what it was offered for.
     pub light: Spectrum,
+    /// The probability with which the light was chosen; at points of a segment times the density (m⁻¹) of the distance and the number that are tried.
     pub share: f32,
 }
 

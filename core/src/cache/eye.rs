@@ -367,7 +367,8 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized, F: FnMut(Place)> Sight for Wanted<'_
 /// Radiance that arrives at the origin of `ray`, read from caches.
 ///
 /// Light of the lights but a sky is connected to at the points of the ray unless [`Caches::single`] is there: to
-/// lights within whose [`Light::steep_field`](crate::light::Light::steep_field) it lies by an equiangular connection per segment.
+/// lights within whose [`Light::steep_field`](crate::light::Light::steep_field) it lies by equiangular connections along each segment. Of more than eight lights,
+/// connections are tried first, and those that are followed are drawn among them by what they would bring (resampled importance sampling, Talbot et al. 2005).
 /// Where a cache has no record at a point, one sample of what it would hold takes its place, so that
 /// gaps make noise and no holes. `estimator` brings the world; its surface cache is what such
 /// samples use. The ray ends where less than 10⁻⁵ of the light behind would be seen, and what is behind is left out.

@@ -12,6 +12,7 @@ use crate::sampling::discrete::Choice;
 use crate::sampling::{Generator, uniform, uniform2};
 use crate::spectrum::Spectrum;
 use crate::surface::Surface;
+use crate::surface::specular::mirrored;
 use crate::transmittance::thickness::{Marching, optical_thickness};
 use crate::world::NearLight;
 
@@ -30,21 +31,21 @@ pub(super) const FROM_SURFACES: u32 = 4;
 /// The golden ratio and the plastic numbers: multiples of them, wrapped, fill the unit interval and square evenly.
 const STEPS: [f32; 3] = [0.618_034, 0.754_877_67, 0.569_840_3];
 
-/// The `k`th number of the sequence that begins at another: evenly in [0, 1) for each of the three.
+/// The `k`th number, in [0, 1), of the `i`th of three sequences, which begins at `start`.
 pub(super) fn wrapped(start: f32, i: usize, k: u32) -> f32 {
     let x = start + STEPS[i] * k as f32;
     (x - libm::floorf(x)).min(1.0 - f32::EPSILON)
 }
 
-/// A Phong surface as a question about lights sees it: as a medium with a phase function of a lobe about as high and wide (`(1 − g)² ≈ 1/(s + 2)`) and an isotropic one; the
-/// eye is where light that comes from the mirror's direction goes straight on to. None for surfaces that eye rays follow: light that is met there is weighed against
-/// connections by what arrives.
-fn mirrored(hit: &Hit, to_eye: Vec3) -> Option<(Vec3, Phase)> {
+/// A Phong surface as a question about lights sees it: the phase function of a medium that scatters about as the surface reflects (a Henyey–Greenstein lobe as high as
+/// the Phong lobe, `(1 − g)² ≈ 1/(s + 2)`, and an isotropic one), and the direction in which light from the mirror's goes straight on. Approximate: it decides what is tried, not
+/// what that brings. None for surfaces that eye rays follow: light that is met there is weighed against connections by what arrives.
+fn as_medium(hit: &Hit, to_eye: Vec3) -> Option<(Vec3, Phase)> {
     let Surface::Phong { diffuse, specular, exponent } = hit.surface else { return None };
     let g = 1.0 - 1.0 / float::sqrt(exponent + 2.0);
     let lobes = [(diffuse, Phase::ISOTROPIC), (specular, Phase::from(Lobe::HenyeyGreenstein { g }))];
     let phase = Phase::mix(lobes).ok()?;
-    Some((to_eye - 2.0 * to_eye.dot(hit.shading) * hit.shading, phase))
+    Some((-mirrored(to_eye, hit.shading), phase))
 }
 
 /// A connection that was tried.
@@ -134,7 +135,8 @@ impl<'a, M: Medium + ?Sized, S: Scene + ?Sized> Offers<'a, M, S> {
         }
     }
 
-    /// Tries lights from a surface, of what arrives or of what is reflected to an eye; `weight` is what of that reaches the eye. A sky counts where it is reflected.
+    /// Tries lights from a surface, of what arrives or, where an eye is given, of what is reflected to it; `weight` is what of that reaches the eye. `sky`: whether a sky counts among what
+    /// arrives; it always does among what is reflected.
     pub(super) fn at_surface(
         &mut self,
         (point, hit, to_eye): (Vec3, &Hit, Option<Vec3>),
@@ -145,7 +147,7 @@ impl<'a, M: Medium + ?Sized, S: Scene + ?Sized> Offers<'a, M, S> {
     ) {
         let estimator = self.estimator;
         let to = FromPoint { sky: sky || to_eye.is_some(), ..FromPoint::all(point) };
-        let lobe = to_eye.and_then(|to_eye| mirrored(hit, to_eye));
+        let lobe = to_eye.and_then(|to_eye| as_medium(hit, to_eye));
         let shown = lobe.as_ref().map(|(from_mirror, phase)| scattered(to, *from_mirror, phase));
         let question: &dyn Question = if let Some(shown) = &shown { shown } else { &to };
         let survey = estimator.world.lights.survey(question);
