@@ -137,9 +137,9 @@ pub(super) struct Step {
 /// blindly: smaller, and it is wasted; larger, and its noise, which has a say in the radius, makes light too dark.
 pub(super) const FIRST_COUNTS: f32 = 0.5;
 
-/// Steps in their order: first coarse irradiance, by which surfaces light everything else, and once more, from what it was revised to;
+/// Steps in their order: first coarse irradiance, by which surfaces light everything else, once more, from what it was revised to, and again where that is in doubt;
 /// then the final kinds, none of which needs another. What is to be averaged comes last.
-pub(super) const TURNS: [Turn; 16] = {
+pub(super) const TURNS: [Turn; 17] = {
     use Kind::{CoarseIrradiance, Irradiance, Multiple, Single, Surface};
     const fn make(kind: Kind) -> Turn {
         Turn::Of(Step { kind, pass: Pass::Make })
@@ -156,6 +156,7 @@ pub(super) const TURNS: [Turn; 16] = {
     [
         make(CoarseIrradiance),
         again(CoarseIrradiance, 0),
+        more(CoarseIrradiance, 4000),
         smooth(CoarseIrradiance),
         make(Surface),
         make(Single),

@@ -297,53 +297,74 @@ mod doubted {
     use super::*;
     use crate::cache::kind::{TURNS, Turn};
     use crate::cache::{RadianceCaches, Settings};
-    use crate::host::Empty;
+    use crate::host::{Hit, Scene};
     use crate::light::Light;
-    use crate::math::Bounds;
+    use crate::math::{Bounds, Ray};
     use crate::medium::{Homogeneous, Placed, Region};
     use crate::phase::Phase;
     use crate::spectrum::Spectrum;
+    use crate::surface::Surface;
     use crate::work;
     use crate::world::Outline;
+
+    /// A grey ball around the world, with a window to the sky.
+    struct Shell;
+
+    impl Scene for Shell {
+        fn closest_hit(&self, ray: &Ray) -> Option<Hit> {
+            let along = ray.origin.dot(ray.direction);
+            let distance = (along * along + 4.0 - ray.origin.length_squared()).sqrt() - along;
+            let normal = -ray.at(distance).normalize();
+            let is_closed = normal.y > -0.7 && distance < ray.length;
+            let surface = Surface::Lambert { reflectance: Spectrum::splat(0.5) };
+            is_closed.then_some(Hit { distance, normal, shading: normal, surface, light: None })
+        }
+    }
+
+    const BRIGHT: f32 = 40.0;
+    const SAMPLES: u32 = 64;
+
+    /// The value of a record of a kind, how many were computed, and how many there are, where its second estimate `is_spoiled` by one sample, and memory too small.
+    fn filled(kind: Kind, is_spoiled: bool, is_cut: bool) -> (f32, u64, u64) {
+        let fog = Homogeneous::new(Spectrum::splat(0.2), Spectrum::splat(1.8), Phase::ISOTROPIC).unwrap();
+        let ball = Placed::new(fog, Region::sphere(Vec3::ZERO, 1.0).unwrap());
+        let sky = [Light::Constant(Spectrum::ONE)];
+        let world = World { medium: &ball, scene: &Shell, lights: (&sky).into() };
+        let bounds = Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE };
+        let settings = Settings::for_outline(&Outline::of(&world, bounds), 0.02).with_walks(SAMPLES);
+        let settings = Settings { rays: 256, error: 0.0, photons: None, ..settings };
+        let of_kind = |turn: &Turn| matches!(turn, Turn::Of(step) if step.kind == kind);
+        let [_, again, more] = core::array::from_fn(|pass| {
+            TURNS.iter().enumerate().filter(|(_, turn)| of_kind(turn)).nth(pass).unwrap().0
+        });
+        let mut filling = RadianceCaches::new(settings).fill(Asked::anywhere_in(bounds));
+        let mut output = FilledRecords::default();
+        while filling.step < again || filling.taken + 1 < filling.jobs {
+            assert!(work::step(&mut filling, &world, &mut output));
+        }
+        if is_spoiled {
+            let first = &mut filling.memory.estimates.as_mut_slice()[0];
+            let value = first.sums.value.mean() * BRIGHT * SAMPLES as f32;
+            first.sums.value *= BRIGHT;
+            first.learnt.add(Vec3::Z, value, 1.0, SAMPLES);
+        }
+        filling.is_cut |= is_cut;
+        while filling.step <= more && work::step(&mut filling, &world, &mut output) {}
+        let records = filling.caches.slots[kind].records();
+        (records[0].value.mean(), filling.computed(kind), records.len() as u64)
+    }
 
     /// An estimate forty times too bright by one of its samples, which no other has foretold, keeps its part of what is estimated anew there, and around it.
     #[test]
     fn what_a_rare_sample_made_bright_is_estimated_once_more() {
-        const BRIGHT: f32 = 40.0;
-        const SAMPLES: u32 = 64;
-        let fog = Homogeneous::new(Spectrum::splat(0.2), Spectrum::splat(1.8), Phase::ISOTROPIC).unwrap();
-        let ball = Placed::new(fog, Region::sphere(Vec3::ZERO, 1.0).unwrap());
-        let sky = [Light::Constant(Spectrum::ONE)];
-        let world = World { medium: &ball, scene: &Empty, lights: (&sky).into() };
-        let bounds = Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE };
-        let settings = Settings::for_outline(&Outline::of(&world, bounds), 0.02).with_walks(SAMPLES);
-        let is_again = |turn: &Turn| matches!(turn, Turn::Of(Step { kind: Kind::Multiple, pass: Pass::Again { .. } }));
-        let again = TURNS.iter().position(is_again).unwrap();
-        let mut found = [(0.0, 0, 0); 3];
-        for (found, (is_spoiled, is_cut)) in found.iter_mut().zip([(false, false), (true, false), (true, true)]) {
-            let settings = Settings { rays: 256, error: 0.0, ..settings };
-            let mut filling = RadianceCaches::new(settings).fill(Asked::anywhere_in(bounds));
-            let mut output = FilledRecords::default();
-            while filling.step < again || filling.taken + 1 < filling.jobs {
-                assert!(work::step(&mut filling, &world, &mut output));
-            }
-            if is_spoiled {
-                let first = &mut filling.memory.estimates.as_mut_slice()[0];
-                let value = first.sums.value.mean() * BRIGHT * SAMPLES as f32;
-                first.sums.value *= BRIGHT;
-                first.learnt.add(Vec3::Z, value, 1.0, SAMPLES);
-            }
-            filling.is_cut |= is_cut;
-            work::finish(&mut filling, &world, &mut output);
-            let (computed, caches) = (filling.computed(Kind::Multiple), filling.finish());
-            let records = caches.records(Kind::Multiple);
-            *found = (records[0].value.mean(), computed, records.len() as u64);
+        for kind in [Kind::Multiple, Kind::CoarseIrradiance] {
+            let [(right, usual, records), (bright, computed, _), (too_bright, with_little_memory, _)] =
+                [(false, false), (true, false), (true, true)].map(|(spoiled, cut)| filled(kind, spoiled, cut));
+            let once_more = computed - usual;
+            assert!(once_more > 0 && once_more < records / 2, "{kind:?}: {once_more} of {records}");
+            assert_eq!(with_little_memory, usual, "{kind:?}");
+            assert!(too_bright > 0.6 * BRIGHT * right, "{kind:?}: {too_bright} {right}");
+            assert!(bright > 2.0 * right && bright < 0.25 * BRIGHT * right, "{kind:?}: {bright} {right}");
         }
-        let [(right, usual, records), (bright, computed, _), (_, with_little_memory, _)] = found;
-        let once_more = computed - usual;
-        assert!(once_more > 0 && once_more < records / 2, "{once_more} of {records}");
-        assert_eq!(with_little_memory, usual);
-        // Without doubt it would have two thirds of it.
-        assert!(bright > 2.0 * right && bright < 0.25 * BRIGHT * right, "{bright} {right}");
     }
 }

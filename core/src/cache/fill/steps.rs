@@ -192,7 +192,8 @@ impl<F> Filling<'_, F> {
             let guide = self.memory.guides[step.kind].as_mut_slice().get_mut(offset);
             let held = guide.as_ref().map_or(FIRST_COUNTS, |guide| guide.held);
             // Nothing stays of what was lit by records that were not all there yet.
-            let held = if step.kind.row().is_ground { 0.0 } else { held };
+            let is_stale = step.kind.row().is_ground && matches!(step.pass, Pass::Again { .. });
+            let held = if is_stale { 0.0 } else { held };
             let share = estimate.effort / (held + estimate.effort);
             if let Some(guide) = guide {
                 guide.held = held + estimate.effort;
