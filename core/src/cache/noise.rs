@@ -28,7 +28,7 @@ const SIDE: usize = 8;
 pub(super) const REGIONS: usize = SIDE * SIDE;
 
 /// Light (of the mean of a picture) that is added to that of each ray, in squares: relative errors of what is black mean nothing.
-const DARK: f64 = 0.05;
+pub(super) const DARK: f64 = 0.05;
 
 /// The kinds that a picture is read from.
 const KINDS: usize = Kind::FINAL.len();

@@ -42,8 +42,8 @@ const CLEARANCES: [f32; 2] = [0.3, 1.0];
 const FREE_PATHS: [f32; 2] = [0.7, 1.3];
 
 /// Cells of light for each free path along the longest side of the bounds, and the least and the most of them: memory goes by the cube. More:
-/// noise in each; fewer: light near lamps and in the outermost layer of fog is blurred.
-const CELLS_PER_FREE_PATH: f32 = 2.0;
+/// noise in each, and walks that pass many before one is known; fewer: light near lamps and in the outermost layer of fog is blurred.
+const CELLS_PER_FREE_PATH: f32 = 1.0;
 
 /// See [`CELLS_PER_FREE_PATH`].
 const CELLS: [u32; 2] = [32, 64];

@@ -19,7 +19,7 @@ pub struct Effort {
     pub tolerance: f32,
     /// Directions or random walks of each estimate of a record (more than one, because noise must not choose both radius and value:
     /// decision 13); fewer where it reaches less far than
-    /// others do, and in later ones up to eight times as many where they differ much or are bright.
+    /// others do, in later ones up to eight times as many where they differ much or are bright, and beyond the second down to a sixteenth in the dark.
     pub samples: u32,
     /// Degree of the expansions; 0 in isotropic media and on surfaces.
     pub degree: usize,

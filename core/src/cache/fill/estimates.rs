@@ -5,7 +5,7 @@ use crate::cache::asked::{Asked, Wanted};
 use crate::cache::guide::{Guide, Guided, Looks};
 use crate::cache::kind::{Kind, Pass, Step};
 use crate::cache::memory::{Estimate, FilledRecords, FillingMemory};
-use crate::cache::noise::regions_in;
+use crate::cache::noise::{DARK, regions_in};
 use crate::cache::radius::Limits;
 use crate::cache::slot::learnt_near;
 use crate::cache::{Effort, Record};
@@ -33,7 +33,7 @@ const FEW: usize = 64;
 /// Samples of any estimate at least.
 const LEAST_SAMPLES: u32 = 16;
 
-/// Share of the samples of a surface record that is hardly seen at all. Less: it is too noisy to tell how far it reaches.
+/// Share of the samples of a record that is hardly seen at all. Less: it is too noisy to tell how far it reaches.
 const LEAST_SEEN: f32 = 0.0625;
 
 /// Brightness (over that of usual records) from which on least radii on the screen no longer shrink. Less: light of ledges two pixels wide lies
@@ -43,6 +43,13 @@ const BRIGHTEST: f32 = 3.0;
 /// Samples that an estimate would get by what is known now, over those that it has, from which on it is in doubt: a sample has been met that hardly any
 /// of the first ones had foretold. Less: time for chance; more: single records that a rare sample makes far too bright.
 const DOUBT: f32 = 2.0;
+
+/// The same of records on which all others stand. Less: all light is too dark, as what was too dark by chance is not looked at again; more: single ones light all fog around them.
+const DOUBT_OF_GROUND: f32 = 4.0;
+
+/// Brightness (over that of usual records) below which noise counts as if a record were that bright, as a picture's does. Larger: noise in dark parts; smaller: time
+/// for what no eye sees, which in dense fog is most of it, for there light is hardest to find.
+const DIM: f32 = DARK as f32;
 
 /// Records that reach less far than usual take a share of the samples down to this.
 const LEAST_SHARE: f32 = 0.25;
@@ -140,10 +147,16 @@ impl<F> Filling<'_, F> {
         let around = learnt_near(slot, guides, self.before[step.kind], record.position);
         // What varies as a whole decides how a picture looks where it is dark, what it varies by how far off the picture is.
         let varies = around.relative_variance() / step.kind.row().spread;
+        let brightness = record.value.mean() / self.bright;
+        // Written so that NaN, of black records alone, counts as bright.
+        let dim = (brightness / DIM).min(1.0);
+        let dim = dim * dim;
+        let varies = varies * dim;
         // More than in proportion: where samples vary most, few records light a whole dark corner, and nothing averages them out.
         let varies = varies * float::sqrt(varies);
-        let brightness = record.value.mean() / self.bright;
         let more = varies.max(brightness * float::sqrt(varies)).clamp(1.0, MOST_SAMPLES);
+        // By the first of them noise is measured, of which little would be seen if they counted less than blind ones.
+        let more = if let Pass::More { .. } = step.pass { more * dim.max(LEAST_SEEN) } else { more };
         let seen = guides.get(offset).map_or(1.0, |guide| guide.seen);
         let count = samples(step.kind, &effort, record.radius, self.usual, seen) as f32 * more;
         Some((around, more, count as u32))
@@ -155,7 +168,8 @@ impl<F> Filling<'_, F> {
         let default = Guide::default();
         let guide = self.memory.guides[kind].as_slice().get(offset).unwrap_or(&default);
         let asked = regions_in(guide.film).map(|region| self.more[kind][region]).max().unwrap_or(0);
-        asked >= self.again || !self.is_cut && effort > DOUBT * guide.held
+        let doubt = if kind.row().is_ground { DOUBT_OF_GROUND } else { DOUBT };
+        asked >= self.again || !self.is_cut && effort > doubt * guide.held
     }
 
     /// Begins a round in which records from a number on are estimated anew, those with many samples by several jobs; whether there are any.
