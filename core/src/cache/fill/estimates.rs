@@ -149,14 +149,15 @@ impl<F> Filling<'_, F> {
         let varies = around.relative_variance() / step.kind.row().spread;
         let brightness = record.value.mean() / self.bright;
         // Written so that NaN, of black records alone, counts as bright.
-        let dim = (brightness / DIM).min(1.0);
-        let dim = dim * dim;
-        let varies = varies * dim;
+        let shown = (brightness / DIM).min(1.0);
+        // Of its variance.
+        let shown = shown * shown;
+        let varies = varies * shown;
         // More than in proportion: where samples vary most, few records light a whole dark corner, and nothing averages them out.
         let varies = varies * float::sqrt(varies);
         let more = varies.max(brightness * float::sqrt(varies)).clamp(1.0, MOST_SAMPLES);
         // By the first of them noise is measured, of which little would be seen if they counted less than blind ones.
-        let more = if let Pass::More { .. } = step.pass { more * dim.max(LEAST_SEEN) } else { more };
+        let more = if let Pass::More { .. } = step.pass { more * shown.max(LEAST_SEEN) } else { more };
         let seen = guides.get(offset).map_or(1.0, |guide| guide.seen);
         let count = samples(step.kind, &effort, record.radius, self.usual, seen) as f32 * more;
         Some((around, more, count as u32))
