@@ -230,6 +230,61 @@ fn photons_are_absorbed_where_diffusion_exactly_says() {
     }
 }
 
+/// Whatever windows ask for, right, far too low or too high, or nothing, light stays the same; the right ones find what hardly a whole photon does.
+#[test]
+fn photons_in_parts_bring_the_same_light_also_where_it_is_dark() {
+    let (extinction, albedo) = (2.0_f32, 0.8_f32);
+    let share = 1.0 - albedo;
+    let fog =
+        Homogeneous::new(Spectrum::splat(extinction * share), Spectrum::splat(extinction * albedo), Phase::ISOTROPIC);
+    let lamp = [Light::Point(PointLight::from_flux(Vec3::ZERO, Spectrum::ONE).unwrap())];
+    let world = World { medium: &fog.unwrap(), scene: &Empty, lights: (&lamp).into() };
+    let parts = |paths, window: &dyn Fn(Vec3) -> Option<f32>, visit: &dyn Fn(Vec3) -> f32| {
+        estimate(paths, |rng| {
+            let mut sum = Spectrum::ZERO;
+            photon::trace_split(&world, &BOUNDS, &Settings::default(), window, rng, &mut |event| {
+                if let Event::Collided { power, point, .. } = *event {
+                    sum += power * (share * visit(point));
+                }
+            });
+            sum
+        })
+    };
+    // Light falls off as e^−κr, with κ = 0.71 σ where so much is absorbed.
+    let right = |at: Vec3| Some((-0.71 * extinction * at.length()).exp());
+    let windows: [(&str, &dyn Fn(Vec3) -> Option<f32>); 5] = [
+        ("right", &right),
+        ("too low", &|at| Some((-4.0 * extinction * at.length()).exp())),
+        ("too high", &|_| Some(5.0)),
+        ("unknown here and there", &|at| (at.x > 0.0).then_some(0.3)),
+        ("none", &|_| None),
+    ];
+    let square = 2.0 / f64::from(extinction * extinction * share);
+    for (name, window) in windows {
+        parts(4_000, window, &|_| 1.0).assert_is([1.0; 3], 1e-4, &format!("absorbed, {name}"));
+        parts(20_000, window, &|at| at.length_squared()).assert_is([square; 3], 1e-4, &format!("mean square, {name}"));
+    }
+    let far = |at: Vec3| f32::from(u8::from(at.length() > 5.0));
+    let (split, whole) = (parts(8_000, &right, &far), parts(200_000, &|_| None, &far));
+    let [split_noise, whole_noise] = [&split, &whole].map(|found| found.error[0] / found.mean[0]);
+    assert!(split_noise < 0.1 && split_noise < 0.5 * whole_noise, "{split_noise} {whole_noise}");
+    let error = (split.error[0].powi(2) + whole.error[0].powi(2)).sqrt();
+    assert!((split.mean[0] - whole.mean[0]).abs() < 4.0 * error, "{} {} {error}", split.mean[0], whole.mean[0]);
+}
+
+/// What neither absorbs nor lets go ends all the same.
+#[test]
+fn photons_in_parts_end() {
+    let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::ONE, Phase::ISOTROPIC).unwrap();
+    let lamp = [Light::Point(PointLight::from_flux(Vec3::ZERO, Spectrum::ONE).unwrap())];
+    let world = World { medium: &fog, scene: &Empty, lights: (&lamp).into() };
+    let mut flights = 0_u64;
+    photon::trace_split(&world, &BOUNDS, &Settings::default(), &|_| Some(1e-6), &mut Generator::new(3), &mut |event| {
+        flights += u64::from(matches!(event, Event::Flew { .. }));
+    });
+    assert!((100_000..10_000_000).contains(&flights), "{flights}");
+}
+
 #[test]
 fn fog_that_only_scatters_is_filled_evenly_by_a_uniform_sky() {
     let ball = Region::sphere(BOUNDS.centre(), 0.9).unwrap();

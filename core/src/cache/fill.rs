@@ -142,9 +142,10 @@ pub struct Filling<'s, F> {
     bright: f32,
     /// In how many jobs each new record is estimated.
     parts: u32,
-    /// What pilots have found, and how often radii have shrunk because of them.
+    /// What pilots have found, how often radii have shrunk because of them, and how far caches were off before they did.
     pilots: Pilots,
     shrunk: u32,
+    off: f64,
     /// What glances have found: the noise of records, light that is dark, how often each kind is to be estimated once more in each region, and what noise is left then.
     noise: Noise,
     dark: f64,
@@ -234,6 +235,7 @@ impl<'s> RadianceCaches<'s> {
             parts: 1,
             pilots: Pilots::default(),
             shrunk: 0,
+            off: 0.0,
             noise: Noise::default(),
             dark: 0.0,
             more: ByKind([[0; REGIONS]; Kind::COUNT]),

@@ -10,9 +10,9 @@ use super::lookup::TurningBasis;
 use super::resolved::{self, MAX_DEGREE};
 use crate::host::{Medium, Properties, Scene};
 use crate::light::Light;
-use crate::math::{Bounds, Ray, Vec3};
+use crate::math::{Bounds, Ray, Vec3, float};
 use crate::phase::Phase;
-use crate::photon::{Event, trace};
+use crate::photon::{Event, trace_split};
 use crate::sampling::uniform::mix;
 use crate::sampling::{Generator, uniform};
 use crate::sent::packed;
@@ -34,14 +34,20 @@ const COUNTED: f64 = 0.25;
 /// Part of the lit cells that photons are to know well. More: all wait for the darkest corner; less: dark parts of a picture are noisy.
 const KNOWN: f64 = 0.9;
 
+/// Steps in which light of dark cells is told, over that of usual ones.
+const STEPS: f32 = 65536.0;
+
+/// Exponent of what nearly all cells are darker by than usual ones, which makes photons more. Larger: time; smaller: clouds of noise in deep fog.
+const MORE_IN_DARK: f32 = 1.0 / 6.0;
+
 /// Photons of the first round.
 const FIRST: u32 = 4096;
 
 /// Photons of one job.
-pub(super) const PATHS_PER_JOB: u32 = 32;
+pub(super) const PATHS_PER_JOB: u32 = 8;
 
-/// What the photons of a job are expected to leave at most, where memory is lent: some hundred cells each.
-pub(super) const DEPOSITS_OF_JOB: usize = 512 * PATHS_PER_JOB as usize;
+/// What the photons of a job are expected to leave at most, where memory is lent: the parts of each pass some hundred cells.
+pub(super) const DEPOSITS_OF_JOB: usize = 2048 * PATHS_PER_JOB as usize;
 
 /// Cells that one job looks at for surfaces.
 pub(super) const CELLS_PER_JOB: u32 = 512;
@@ -91,10 +97,10 @@ impl PhotonEffort {
 pub struct PhotonDeposit {
     cell: u32,
     path: u32,
-    /// Where (m), and the direction of travel.
+    /// Where (m), and the direction of travel; none, while photons are only counted, where nothing scatters.
     at: Vec3,
     direction: Vec3,
-    /// Power times the length of the way (W·m); black, while photons are only counted, where nothing scatters.
+    /// Power times the length of the way (W·m).
     light: Spectrum,
 }
 
@@ -106,6 +112,10 @@ pub struct PhotonCell {
     /// How many counted photons came by, and the last of them.
     paths: u32,
     last: u32,
+    /// What they brought (W·m).
+    light: f32,
+    /// What power photons should have here, as far as was known before this round, over what they left a light with; 0 where it is not.
+    wanted: f32,
     /// Where the first did (m).
     met: Vec3,
     /// Whether something scatters in it, as far as counted photons have seen.
@@ -286,6 +296,9 @@ impl<'s> PhotonGrid<'s> {
             let first = f64::from(FIRST).min(COUNTED * f64::from(effort.paths)) as u32;
             return (effort.paths > 0 && effort.flights > 0).then_some(first.max(1));
         }
+        if self.lit.is_none() {
+            self.weigh();
+        }
         // As many in all as flights allow. Casts saturate.
         let per_path = (self.flights as f64 / f64::from(paths)).max(1.0);
         let most = effort.paths.min((effort.flights as f64 / per_path) as u32);
@@ -319,24 +332,31 @@ impl<'s> PhotonGrid<'s> {
         }
     }
 
-    /// How many times the counted paths it takes until `enough` photons have passed nearly every cell that walks may end in.
-    /// Infinite if none of them has been passed by some, and 0 if there are none.
+    /// How many times the counted paths it takes until `enough` photons have passed nearly every cell that walks may end in, and more the darker these
+    /// cells are: without parts of photons, those of bright cells would be as many more, and pictures show bright ones most.
+    /// Infinite if no cell has been passed by some, and 0 if there are none.
     fn times(&self, enough: u32) -> f64 {
-        let scattering = self.cells.as_slice().iter().filter(|cell| cell.scatters);
-        if scattering.clone().next().is_none() {
+        if !self.cells.as_slice().iter().any(|cell| cell.scatters) {
             return 0.0;
         }
-        let lit = || scattering.clone().map(|cell| cell.paths).filter(|&paths| paths >= LEAST_PATHS);
+        let wanted = |cell: &PhotonCell| (STEPS * cell.wanted) as u32;
+        let [met, dark] = [self.of_most(&|cell| cell.paths), self.of_most(&wanted)];
+        f64::from(enough) / f64::from(met) * f64::from(float::powf(STEPS / dark.max(1) as f32, MORE_IN_DARK))
+    }
+
+    /// The most of something that nearly every cell has that walks may end in.
+    fn of_most(&self, count: &dyn Fn(&PhotonCell) -> u32) -> u32 {
+        let is_lit = |cell: &&PhotonCell| cell.scatters && cell.paths >= LEAST_PATHS;
+        let lit = || self.cells.as_slice().iter().filter(is_lit).map(count);
         let (all, most) = lit().fold((0_u32, 0), |(all, most), paths| (all + 1, most.max(paths)));
         let most_dark = (1.0 - KNOWN) * f64::from(all);
-        // The most photons that nearly every cell has met.
         let (mut low, mut high) = (0, most);
         while low < high {
             let middle = low + (high - low).div_ceil(2);
             let darker = lit().filter(|&paths| paths < middle).count();
             if f64::from(darker as u32) <= most_dark { low = middle } else { high = middle - 1 }
         }
-        f64::from(enough) / f64::from(low)
+        low
     }
 
     pub(super) fn len(&self) -> usize {
@@ -360,6 +380,24 @@ impl<'s> PhotonGrid<'s> {
         (z * self.counts[1] + y) * self.counts[0] + x
     }
 
+    /// What power photons should have at a point, over what they left a light with; `None` where that is not known.
+    fn window(&self, at: Vec3) -> Option<f32> {
+        let cell = self.cells.as_slice().get(self.number(self.cell_of(at)?) as usize)?;
+        (cell.wanted > 0.0).then_some(cell.wanted)
+    }
+
+    /// Takes from the photons that are counted so far what power they should have: in proportion to the light of a cell, so that as many come to each cell that
+    /// scatters, but to bright ones as they do. Not where too few were counted: windows that are far too low split photons without end.
+    fn weigh(&mut self) {
+        let lit = self.cells.as_slice().iter().filter(|cell| cell.scatters);
+        let (sum, count) = lit.fold((0.0, 0_u32), |(sum, count), cell| (sum + f64::from(cell.light), count + 1));
+        let usual = (sum / f64::from(count)) as f32;
+        for cell in self.cells.as_mut_slice() {
+            let is_known = cell.paths >= LEAST_PATHS && usual > 0.0;
+            cell.wanted = if is_known { (cell.light / usual).min(1.0) } else { 0.0 };
+        }
+    }
+
     /// Lets one photon fly; its flights are counted, what it leaves goes to `deposits`.
     pub(super) fn shoot<M: Medium + ?Sized, S: Scene + ?Sized>(
         &self,
@@ -374,7 +412,8 @@ impl<'s> PhotonGrid<'s> {
         let is_counted = self.lit.is_none();
         // What walks connect to is no business of cells.
         let mut is_straight = false;
-        trace(world, &effort.bounds, settings, &mut rng, &mut |event: &Event<'_>| match *event {
+        let window = |at: Vec3| self.window(at);
+        trace_split(world, &effort.bounds, settings, &window, &mut rng, &mut |event: &Event<'_>| match *event {
             Event::Emitted { light, .. } => is_straight = !world.lights.get(light).is_some_and(Light::is_sky),
             Event::Flew { reach, distance, power } => {
                 flights += 1;
@@ -391,12 +430,12 @@ impl<'s> PhotonGrid<'s> {
                     let at = reach.at(near + (i as f32 + uniform(&mut along)) * step);
                     let Some(cell) = self.cell_of(at).map(|cell| self.number(cell)) else { continue };
                     let is_lit = || self.cells.as_slice().get(cell as usize).is_some_and(|cell| cell.is_lit);
-                    let light = match is_counted {
-                        true if world.medium.properties(at).scattering == Spectrum::ZERO => Spectrum::ZERO,
+                    let direction = match is_counted {
+                        true if world.medium.properties(at).scattering == Spectrum::ZERO => Vec3::ZERO,
                         false if !is_lit() => continue,
-                        _ => power * step,
+                        _ => reach.direction,
                     };
-                    kept = kept.and(deposits.push(PhotonDeposit { cell, path, at, direction: reach.direction, light }));
+                    kept = kept.and(deposits.push(PhotonDeposit { cell, path, at, direction, light: power * step }));
                 }
             }
             Event::Collided { .. } | Event::Met { .. } => {}
@@ -419,7 +458,8 @@ impl<'s> PhotonGrid<'s> {
                 if cell.paths == 0 || cell.last != deposit.path {
                     (cell.paths, cell.last) = (cell.paths + 1, deposit.path);
                 }
-                cell.scatters |= deposit.light != Spectrum::ZERO;
+                cell.scatters |= deposit.direction != Vec3::ZERO;
+                cell.light += deposit.light.mean();
             }
             return;
         }
@@ -634,6 +674,23 @@ mod tests {
         let change = at(0.0, turned).0.radiance[0] - ahead.radiance[0];
         let told = at(0.0, (away + turned).normalize()).1.channel(0).dot(turned - away);
         assert!((change / told - 1.0).abs() < 0.01, "{change} {told}");
+    }
+
+    /// Through twelve free paths of fog that absorbs a fifth, light falls by thousands of times: of whole photons as many fewer would come to a cell at the other end.
+    #[test]
+    fn photons_come_to_dark_cells_as_to_bright_ones() {
+        let fog = Homogeneous::new(Spectrum::splat(1.2), Spectrum::splat(4.8), Phase::ISOTROPIC).unwrap();
+        let ball = Placed::new(fog, Region::sphere(Vec3::ZERO, 1.4).unwrap());
+        let lamps = [Light::Point(PointLight::from_flux(Vec3::Z * 0.9, Spectrum::ONE).unwrap())];
+        let world = World { medium: &ball, scene: &crate::host::Empty, lights: (&lamps).into() };
+        let effort = PhotonEffort { cells: 8, enough: 100, ..effort(400_000) };
+        let cells = PhotonGrid::lit(&world, &effort, &path::Settings::default(), 1);
+        let cell =
+            |z: f32| cells.cells.as_slice()[cells.number(cells.cell_of(Vec3::new(0.1, 0.1, z)).unwrap()) as usize];
+        let [near, far] = [cell(0.6), cell(-0.9)];
+        let darker = far.light / near.light;
+        assert!(darker < 1e-3 && far.paths > 20, "{near:?} {far:?}");
+        assert!(far.paths as f32 > 10.0 * darker * near.paths as f32, "{near:?} {far:?}");
     }
 
     /// Where nothing scatters no walk ends, and photons leave nothing; slopes look one cell beyond.

@@ -22,6 +22,10 @@ const FACTORS: [f64; 2] = [0.5, 0.85];
 /// How often radii of a kind may shrink in a fill. More: time, where what is wrong does not come from radii.
 pub(super) const MOST: u32 = 4;
 
+/// To what part of it what is wrong must have fallen as radii shrank, for them to shrink again: by the square of half the radius it is a quarter. More: records
+/// smaller than what eye rays can ask for, where what is wrong does not come from radii.
+pub(super) const HELPS: f64 = 0.5;
+
 /// Samples of each estimate. More: fewer places for the same time; fewer: estimates that start evenly over the sphere miss what lights it.
 pub(super) const SAMPLES: u32 = 64;
 
@@ -73,6 +77,11 @@ impl Pilots {
         self.dd += other.dd;
         self.dt += other.dt;
         self.tt += other.tt;
+    }
+
+    /// How far caches are off, over the light there is.
+    pub(super) fn off(&self) -> f64 {
+        (self.d / self.t).abs()
     }
 
     /// The factor by which radii should shrink for an error of `error`; `None` if they are right.

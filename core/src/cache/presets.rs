@@ -41,19 +41,19 @@ const CLEARANCES: [f32; 2] = [0.3, 1.0];
 /// within one free path, and so does the light of the outermost layer of fog. Larger: borders of fog blur; smaller: records, by the cube.
 const FREE_PATHS: [f32; 2] = [0.7, 1.3];
 
-/// Cells of light for each free path along the longest side of the bounds, and the least and the most of them: memory goes by the cube. More:
+/// Cells of light for each free path along the longest side of the bounds, and the least and the most of them: memory, and photons, go by the cube. More:
 /// noise in each, and walks that pass many before one is known; fewer: light near lamps and in the outermost layer of fog is blurred.
 const CELLS_PER_FREE_PATH: f32 = 1.0;
 
 /// See [`CELLS_PER_FREE_PATH`].
-const CELLS: [u32; 2] = [32, 64];
+const CELLS: [u32; 2] = [32, 40];
 
 /// Photons, and their flights, at most; in fog that hardly absorbs, photons fly for long, and where a cloud is small beside its bounds, most of them meet nothing. More:
 /// time; fewer: dark parts of a picture, or all of a cloud, are too bright or too dark as a whole, for their cells see the same few photons.
 const PHOTONS: u32 = 1 << 22;
 
 /// See [`PHOTONS`].
-const FLIGHTS: f64 = 3e7;
+const FLIGHTS: f64 = 6e7;
 
 /// Photons that know the light of a cell: 7 % of noise, of which a walk meets a mean over many cells. More: time; fewer: clouds of noise, which all records of a place share.
 const ENOUGH: u32 = 192;

@@ -3,7 +3,7 @@
 //! | file | holds |
 //! |---|---|
 //! | `mod` | [`Event`]: what happens to a photon |
-//! | [`trace`](mod@trace) | [`trace()`]: the walk |
+//! | [`trace`](mod@trace) | [`trace()`]: the walk; [`trace_split`]: in parts, by weight windows |
 //!
 //! One walk serves all methods that send light out instead of fetching it (covariance tracing, photon
 //! beams, virtual lights): it tells what happens as [`Event`]s, in order, and whoever listens keeps
@@ -15,7 +15,7 @@ pub mod trace;
 
 use glam::Vec3;
 
-pub use trace::trace;
+pub use trace::{trace, trace_split};
 
 use crate::host::{Hit, Properties};
 use crate::math::Ray;

@@ -2,7 +2,7 @@
 
 use super::Event;
 use crate::host::{Hit, Medium, Rng, Scene};
-use crate::math::{Bounds, Ray};
+use crate::math::{Bounds, Ray, Vec3};
 use crate::path::Settings;
 use crate::sampling::{Generator, uniform, uniform2};
 use crate::spectrum::Spectrum;
@@ -12,6 +12,15 @@ use crate::world::{World, leave, nearest_surface};
 
 /// A walk longer than this ends: a guard against worlds that absorb nothing.
 const MAX_SEGMENTS: u32 = 100_000;
+
+/// Parts of a photon that wait while another flies. Fewer: those of much power stay whole.
+const MOST_WAITING: usize = 64;
+
+/// Parts into which a photon splits at once.
+const MOST_PARTS: usize = 8;
+
+/// Power over what is wanted below which roulette is played for a part. Larger: chance is spent twice, on ending parts and on splitting what is left.
+const LEAST_POWER: f32 = 0.5;
 
 /// Largest probability of going on where roulette is played. Larger: walks in worlds without absorption
 /// take longer to end. Smaller: their powers spread.
@@ -67,6 +76,64 @@ pub fn trace<M: Medium + ?Sized, S: Scene + ?Sized>(
     rng: &mut (impl Rng + ?Sized),
     visit: &mut impl FnMut(&Event<'_>),
 ) {
+    walk(world, bounds, (settings, None), &mut &mut *rng, visit);
+}
+
+/// Sends one photon as [`trace()`] does, split where photons are wanted and ended where there are enough: by weight windows (Booth and Hendricks 1984).
+///
+/// `window` is what power photons should have at a point, over what they have as they leave a light; `None` where that is not known: there
+/// roulette is as [`trace()`] plays it, for what was wanted where they came from. Of more than twice the power, parts go on, which leave the vertex the same way and meet chances of their own; of less than half,
+/// roulette keeps that power. Sums over events stay unbiased whatever the windows. Where photons rarely come, few of much power say as little as
+/// they are: windows in proportion to the light of a place bring as many everywhere. After `Emitted` come the events of all parts, one part after the other.
+///
+/// ```
+/// # use fogbow::{host::Empty, light::{Light, PointLight}, math::*, medium::Homogeneous, phase::Lobe};
+/// # use fogbow::{path::Settings, photon::{self, Event}, sampling::Generator, spectrum::Spectrum, world::World};
+/// // Fog that absorbs half: photons that come far keep the half and meet it twice as often.
+/// let fog = Homogeneous::new(Spectrum::ONE, Spectrum::ONE, Lobe::Isotropic)?;
+/// let lamps = [Light::Point(PointLight::from_flux(Vec3::ZERO, Spectrum::ONE)?)];
+/// let world = World { medium: &fog, scene: &Empty, lights: (&lamps).into() };
+/// let bounds = Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE };
+/// let window = |at: Vec3| Some((-at.length()).exp());
+/// let (mut rng, mut absorbed, mut collisions) = (Generator::new(1), 0.0, 0);
+/// for _ in 0..2000 {
+///     photon::trace_split(&world, &bounds, &Settings::default(), &window, &mut rng, &mut |event| {
+///         if let Event::Collided { power, .. } = event {
+///             (absorbed, collisions) = (absorbed + 0.5 * power[0] / 2000.0, collisions + 1);
+///         }
+///     });
+/// }
+/// assert!((absorbed - 1.0).abs() < 0.05 && collisions > 3 * 2000, "{absorbed} {collisions}");
+/// # Ok::<(), Box<dyn core::error::Error>>(())
+/// ```
+pub fn trace_split<M: Medium + ?Sized, S: Scene + ?Sized>(
+    world: &World<'_, M, S>,
+    bounds: &Bounds,
+    settings: &Settings,
+    window: &dyn Fn(Vec3) -> Option<f32>,
+    rng: &mut (impl Rng + ?Sized),
+    visit: &mut impl FnMut(&Event<'_>),
+) {
+    walk(world, bounds, (settings, Some(window)), &mut &mut *rng, visit);
+}
+
+/// What of a photon is still to fly.
+struct Part {
+    ray: Ray,
+    power: Spectrum,
+    scatterings: u32,
+    /// What power it should have, over that of the whole as it left the light.
+    wanted: f32,
+}
+
+/// One for all who listen, because it is long.
+fn walk<M: Medium + ?Sized, S: Scene + ?Sized>(
+    world: &World<'_, M, S>,
+    bounds: &Bounds,
+    (settings, window): (&Settings, Option<&dyn Fn(Vec3) -> Option<f32>>),
+    rng: &mut dyn Rng,
+    visit: &mut dyn FnMut(&Event<'_>),
+) {
     let choice = uniform(rng);
     let (position, direction) = (uniform2(rng), uniform2(rng));
     if settings.max_scatterings == 0 {
@@ -74,7 +141,7 @@ pub fn trace<M: Medium + ?Sized, S: Scene + ?Sized>(
     }
     let Some(chosen) = world.lights.emitting(bounds, choice) else { return };
     let Some(emission) = world.lights[chosen.index].emit(bounds, position, direction) else { return };
-    let mut power = emission.power * (1.0 / chosen.probability);
+    let power = emission.power * (1.0 / chosen.probability);
     if power.is_black() {
         return;
     }
@@ -86,8 +153,13 @@ pub fn trace<M: Medium + ?Sized, S: Scene + ?Sized>(
     // Roulette keeps powers near this one.
     let usual = power.max_element();
 
-    // As many as segments before: every segment but the last ends in one.
-    for scatterings in 0..MAX_SEGMENTS {
+    let mut waiting = heapless::Vec::<Part, MOST_WAITING>::new();
+    let mut part = Part { ray, power, scatterings: 0, wanted: 1.0 };
+    let mut segments = 0;
+    loop {
+        let Part { ray, power, scatterings, .. } = part;
+        // Of a walk without end no more parts.
+        let window = window.filter(|_| segments < MAX_SEGMENTS);
         // As far as the point that is met, rounded, lies along the ray.
         let along = |hit: Hit| Hit { distance: (ray.at(hit.distance) - ray.origin).dot(ray.direction).max(0.0), ..hit };
         let hit = nearest_surface(&ray, world.scene).map(along);
@@ -97,11 +169,15 @@ pub fn trace<M: Medium + ?Sized, S: Scene + ?Sized>(
         let lobe_choice = uniform(rng);
         let lobe_u = uniform2(rng);
         let survival = uniform(rng);
-        let is_last = scatterings + 1 >= settings.max_scatterings;
+        // As many as segments before: every segment but the last ends in one.
+        let is_last = scatterings + 1 >= settings.max_scatterings.min(MAX_SEGMENTS);
 
         let flown = flight(world.medium, &reach, power, u_distance, &mut child);
         visit(&Event::Flew { reach: &reach, distance: flown.distance, power });
         let arrived = power * flown.weight;
+        let asked = window.and_then(|window| window(reach.at(flown.distance)));
+        let wanted = asked.unwrap_or(part.wanted);
+        let over = |power: Spectrum| power.max_element() / (usual * wanted);
         // Whether the walk goes on with `after`, and with what power.
         let roulette = |after: Spectrum| {
             if is_last || after.is_black() {
@@ -110,7 +186,11 @@ pub fn trace<M: Medium + ?Sized, S: Scene + ?Sized>(
             if scatterings + 1 < settings.roulette_after {
                 return Some(after);
             }
-            let survives = (after.max_element() / usual).min(MAX_SURVIVAL);
+            let survives = match over(after) {
+                over if asked.is_none() => over.min(MAX_SURVIVAL),
+                over if over < LEAST_POWER => over,
+                _ => return Some(after),
+            };
             (survival < survives).then(|| after * (1.0 / survives))
         };
 
@@ -140,14 +220,26 @@ pub fn trace<M: Medium + ?Sized, S: Scene + ?Sized>(
         } else {
             None
         };
-        let Some((after, onward)) = next else { return };
-        (power, ray) = (after, onward);
+        segments += 1;
+        if let Some((power, ray)) = next {
+            // Casts saturate, and take NaN to 0.
+            let most = asked.map_or(1, |_| MOST_PARTS.min(MOST_WAITING - waiting.len() + 1));
+            let parts = (over(power) as usize).clamp(1, most);
+            let power = power * (1.0 / parts as f32);
+            let part_of = || Part { ray, power, scatterings: scatterings + 1, wanted };
+            // There is room for them.
+            waiting.extend((1..parts).map(|_| part_of()));
+            part = part_of();
+        } else {
+            let Some(next) = waiting.pop() else { return };
+            part = next;
+        }
     }
 }
 
 /// What a surface does to power, where a [`SurfaceSample`] says what it does to radiance.
 #[inline]
-fn weight_of_power(hit: &Hit, sample: &SurfaceSample, to_eye: glam::Vec3) -> Spectrum {
+fn weight_of_power(hit: &Hit, sample: &SurfaceSample, to_eye: Vec3) -> Spectrum {
     let weight = hit.surface.power_weight(hit.shading, to_eye, sample);
     if hit.shading == hit.normal {
         return weight;

@@ -87,7 +87,8 @@ impl<F> Filling<'_, F> {
     pub(super) fn take_pilots(&mut self, from: u32) {
         let found = self.at_hand().and_then(|at_hand| {
             let error = self.settings().error * self.settings().coarser[at_hand.0.kind as usize];
-            Some((at_hand, self.pilots.factor(error)?))
+            let helps = self.shrunk == 0 || self.pilots.off() < pilots::HELPS * self.off;
+            Some((at_hand, self.pilots.factor(error).filter(|_| helps)?))
         });
         let Some((at_hand, factor)) = found else {
             self.begin(self.step + 1);
@@ -102,6 +103,7 @@ impl<F> Filling<'_, F> {
 
     fn shrink(&mut self, (step, effort): (Step, Effort), factor: f32) {
         self.shrunk += 1;
+        self.off = self.pilots.off();
         if let Some(effort) = self.caches.settings.effort_mut(step.kind) {
             *effort = effort.nearer(factor);
         }
@@ -140,12 +142,16 @@ mod tests {
         let bounds = Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE };
         let settings =
             Settings { rays: 40, ..Settings::for_outline(&Outline::of(&world, bounds), 0.02).with_walks(16) };
-        for (second, shrunk) in [(found(0.0), 0), (found(0.1), 1)] {
+        let at_pilots = || {
             let mut filling = RadianceCaches::new(settings).fill(Asked::anywhere_in(bounds));
             let mut output = FilledRecords::default();
             while !matches!(filling.round, Round::Pilot { from: 0 }) {
                 assert!(work::step(&mut filling, &world, &mut output), "no pilots");
             }
+            filling
+        };
+        for (second, shrunk) in [(found(0.0), 0), (found(0.1), 1)] {
+            let mut filling = at_pilots();
             let (step, jobs) = (filling.step, filling.jobs);
             filling.pilots = found(0.1);
             filling.take_pilots(0);
@@ -154,6 +160,15 @@ mod tests {
             filling.pilots = second;
             filling.take_pilots(jobs);
             assert_eq!((filling.shrunk, filling.step == step), (shrunk, shrunk > 0));
+        }
+        // Once they have shrunk, only if that has helped.
+        for (bias, helped) in [(0.04, true), (0.06, false)] {
+            let mut filling = at_pilots();
+            let step = filling.step;
+            (filling.shrunk, filling.off) = (1, 0.1);
+            filling.pilots = found(bias);
+            filling.take_pilots(0);
+            assert_eq!(filling.step == step, helped, "{bias}");
         }
     }
 }
