@@ -117,6 +117,9 @@ pub fn trace_split<M: Medium + ?Sized, S: Scene + ?Sized>(
     walk(world, bounds, (settings, Some(window)), &mut &mut *rng, visit);
 }
 
+/// What power photons should have at a point, over what they have as they leave a light.
+type Window<'a> = dyn Fn(Vec3) -> Option<f32> + 'a;
+
 /// What of a photon is still to fly.
 struct Part {
     ray: Ray,
@@ -130,7 +133,7 @@ struct Part {
 fn walk<M: Medium + ?Sized, S: Scene + ?Sized>(
     world: &World<'_, M, S>,
     bounds: &Bounds,
-    (settings, window): (&Settings, Option<&dyn Fn(Vec3) -> Option<f32>>),
+    (settings, window): (&Settings, Option<&Window<'_>>),
     rng: &mut dyn Rng,
     visit: &mut dyn FnMut(&Event<'_>),
 ) {
