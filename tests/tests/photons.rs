@@ -230,6 +230,8 @@ fn photons_are_absorbed_where_diffusion_exactly_says() {
     }
 }
 
+type Window<'a> = &'a dyn Fn(Vec3) -> Option<f32>;
+
 /// Whatever windows ask for, right, far too low or too high, or nothing, light stays the same; the right ones find what hardly a whole photon does.
 #[test]
 fn photons_in_parts_bring_the_same_light_also_where_it_is_dark() {
@@ -239,7 +241,7 @@ fn photons_in_parts_bring_the_same_light_also_where_it_is_dark() {
         Homogeneous::new(Spectrum::splat(extinction * share), Spectrum::splat(extinction * albedo), Phase::ISOTROPIC);
     let lamp = [Light::Point(PointLight::from_flux(Vec3::ZERO, Spectrum::ONE).unwrap())];
     let world = World { medium: &fog.unwrap(), scene: &Empty, lights: (&lamp).into() };
-    let parts = |paths, window: &dyn Fn(Vec3) -> Option<f32>, visit: &dyn Fn(Vec3) -> f32| {
+    let parts = |paths, window: Window<'_>, visit: &dyn Fn(Vec3) -> f32| {
         estimate(paths, |rng| {
             let mut sum = Spectrum::ZERO;
             photon::trace_split(&world, &BOUNDS, &Settings::default(), window, rng, &mut |event| {
@@ -252,7 +254,7 @@ fn photons_in_parts_bring_the_same_light_also_where_it_is_dark() {
     };
     // Light falls off as e^−κr, with κ = 0.71 σ where so much is absorbed.
     let right = |at: Vec3| Some((-0.71 * extinction * at.length()).exp());
-    let windows: [(&str, &dyn Fn(Vec3) -> Option<f32>); 5] = [
+    let windows: [(&str, Window<'_>); 5] = [
         ("right", &right),
         ("too low", &|at| Some((-4.0 * extinction * at.length()).exp())),
         ("too high", &|_| Some(5.0)),
