@@ -83,7 +83,10 @@ fn settings() -> Settings {
 fn settled() -> Settings {
     let more = |effort: Option<Effort>| effort.map(|e| Effort { samples: 512, ..e });
     let few = settings();
-    Settings { surface: more(few.surface), multiple: more(few.multiple), irradiance: more(few.irradiance), ..few }
+    // Nor may all records stand on the chance of a few photons.
+    let photons = few.photons.map(|photons| PhotonEffort { paths: 16 * photons.paths, ..photons });
+    let [surface, multiple, irradiance] = [few.surface, few.multiple, few.irradiance].map(more);
+    Settings { surface, multiple, irradiance, photons, ..few }
 }
 
 type Caches = RadianceCaches<'static>;
