@@ -81,9 +81,9 @@ pub fn trace<M: Medium + ?Sized, S: Scene + ?Sized>(
 
 /// Sends one photon as [`trace()`] does, split where photons are wanted and ended where there are enough: by weight windows (Booth and Hendricks 1984).
 ///
-/// `window` is what power photons should have at a point, over what they have as they leave a light; `None` where that is not known: there
-/// roulette is as [`trace()`] plays it, for what was wanted where they came from. Of more than twice the power, parts go on, which leave the vertex the same way and meet chances of their own; of less than half,
-/// roulette keeps that power. Sums over events stay unbiased whatever the windows. Where photons rarely come, few of much power say as little as
+/// `window` is what power photons should have at a point, over what they have as they leave a light; `None`, or what is no positive number, where that is not known: there
+/// roulette is as [`trace()`] plays it, for what was wanted where they came from. Of at least twice the power, parts go on (up to eight), which leave the vertex the same way and
+/// meet chances of their own; of less than half, roulette keeps that power. Sums over events stay unbiased whatever the windows. Where photons rarely come, few of much power say as little as
 /// they are: windows in proportion to the light of a place bring as many everywhere. After `Emitted` come the events of all parts, one part after the other.
 ///
 /// ```
@@ -179,6 +179,8 @@ fn walk<M: Medium + ?Sized, S: Scene + ?Sized>(
         visit(&Event::Flew { reach: &reach, distance: flown.distance, power });
         let arrived = power * flown.weight;
         let asked = window.and_then(|window| window(reach.at(flown.distance)));
+        // Anything else would end photons, or split them, for nothing.
+        let asked = asked.filter(|asked| asked.is_finite() && *asked > 0.0);
         let wanted = asked.unwrap_or(part.wanted);
         let over = |power: Spectrum| power.max_element() / (usual * wanted);
         // Whether the walk goes on with `after`, and with what power.

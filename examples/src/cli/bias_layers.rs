@@ -44,21 +44,23 @@ mod tests {
         let Command::Render(arguments) = Arguments::try_parse_from(words).unwrap().command else { panic!() };
         let rendered = render(&arguments).unwrap();
         let (film, map) = (rendered.film, rendered.audited.unwrap().map);
-        // As many as the audit's rays tell of: more where it was in doubt.
-        let side = map.side();
-        assert!(side >= 4);
+        // As many as the audit's rays tell of, which are more where it was in doubt: 256 for each.
+        let (side, rays) = (map.side(), map.regions().iter().map(|region| region.rays).sum::<u32>());
+        assert!(side >= 4 && side * side * 256 <= rays);
         let layer =
             |name: &str| film.layers().iter().position(|layer| layer == name).and_then(|i| film.mean(i)).unwrap();
         let [bias, error] = LAYERS.map(layer);
-        // The pixel in the middle of every region, from the upper left.
+        // The first and the last pixel whose middle lies in each region, from the upper left.
+        let first = |number: u32, pixels: u32| (2 * number * pixels).saturating_sub(side).div_ceil(2 * side);
         for (number, region) in map.regions().iter().enumerate() {
-            let middle = |number: u32, pixels: u32| (2 * number + 1) * pixels / (2 * side);
-            let (x, y) = (middle(number as u32 % side, 24), middle(number as u32 / side, 16));
+            let at = [number as u32 % side, number as u32 / side];
+            let [(x, to_x), (y, to_y)] =
+                [(at[0], 24), (at[1], 16)].map(|(at, pixels)| (first(at, pixels), first(at + 1, pixels) - 1));
             let found = region.cached;
             // 256 rays each or more, which come in groups of 32 neighbours.
             assert!(found.error > 0.0 && found.error < 1.0 && region.rays > 100, "{region:?}");
             assert_eq!(bias.get(x, y).unwrap()[1], found.bias as f32);
-            assert_eq!(error.get(x, y).unwrap()[2], found.error as f32);
+            assert_eq!(error.get(to_x, to_y).unwrap()[2], found.error as f32);
         }
     }
 }
