@@ -1,10 +1,10 @@
 //! How the vertices of walks move with their start: closed forms, and gradients of light in a closed room.
 
 use fogbow::cache::Estimator;
-use fogbow::host::{Hit, Medium, Scene};
+use fogbow::host::{Empty, Hit, Medium, Scene};
 use fogbow::light::{Light, PointLight, QuadLight};
 use fogbow::math::{Bounds, Ray, Vec2, Vec3};
-use fogbow::medium::Homogeneous;
+use fogbow::medium::{Homogeneous, Placed, Region};
 use fogbow::multiple_scatter::{self, Shift, Walk, Weight};
 use fogbow::path;
 use fogbow::phase::{Lobe, Phase};
@@ -50,17 +50,11 @@ impl Around {
     /// The shift of a vertex, its segment starting at the origin.
     fn shift(&self, vertex: Vec3) -> Shift {
         let ray = Ray::between(Vec3::ZERO, vertex);
-        let end = self.plane.and_then(|(normal, away)| {
+        let wall = self.plane.and_then(|(normal, away)| {
             let cosine = -normal.dot(ray.direction);
-            (cosine > 0.0).then(|| Hit {
-                distance: away / cosine,
-                normal,
-                shading: normal,
-                surface: Surface::BLACK,
-                light: None,
-            })
+            (cosine > 0.0).then_some((away / cosine, normal))
         });
-        Shift::new(&Ray { length: f32::INFINITY, ..ray }, end.as_ref(), self.reach, ray.length)
+        Shift::new(&Ray { length: f32::INFINITY, ..ray }, wall, self.reach, ray.length)
     }
 
     /// How `Shift::share` changes with the vertex.
@@ -239,12 +233,13 @@ fn panel() -> Light<'static> {
     Light::Quad(QuadLight::new(corner, u, v, Spectrum::ONE).unwrap())
 }
 
-fn estimator<'a>(medium: &'a Homogeneous, scene: &'a Lit, lights: &'a [Light<'a>]) -> Estimator<'a, Homogeneous, Lit> {
+/// By walks of up to so many vertices.
+fn estimator<'a, M, S>(world: World<'a, M, S>, max_vertices: u32) -> Estimator<'a, M, S> {
     Estimator {
-        world: World { medium, scene, lights: lights.into() },
+        world,
         surfaces: None,
         photons: None,
-        walk: multiple_scatter::Settings::new(Steps::Gauss(1)),
+        walk: multiple_scatter::Settings { max_vertices, ..multiple_scatter::Settings::new(Steps::Gauss(1)) },
         // Walls are lit by lamps alone.
         paths: path::Settings { max_scatterings: 1, ..path::Settings::default() },
         light_samples: 1,
@@ -290,8 +285,7 @@ fn check_samples(lobe: Lobe, max_vertices: u32, paths: u32) {
     let towards = Towards { to_eye: Vec3::new(0.36, 0.48, 0.8), phase: &phase };
     for light in [bulb(), panel()] {
         let (scene, lights) = (room(0.5, &light), [light]);
-        let mut make = estimator(&medium, &scene, &lights);
-        make.walk.max_vertices = max_vertices;
+        let make = estimator(World { medium: &medium, scene: &scene, lights: (&lights).into() }, max_vertices);
         let walk = Walk { world: make.world, settings: make.walk };
         for (point, axis) in PLACES {
             check(point, axis, &format!("{lobe:?}, {lights:?}"), |point, rng| {
@@ -308,8 +302,7 @@ fn check_estimates(lobe: Lobe, max_vertices: u32, paths: u32) {
     let (medium, phase) = (fog(lobe), Phase::from(lobe));
     for light in [bulb(), panel()] {
         let (scene, lights) = (room(0.5, &light), [light]);
-        let mut make = estimator(&medium, &scene, &lights);
-        make.walk.max_vertices = max_vertices;
+        let make = estimator(World { medium: &medium, scene: &scene, lights: (&lights).into() }, max_vertices);
         for (point, axis) in PLACES {
             check(point, axis, &format!("{lobe:?}, {lights:?}"), |point, rng| {
                 first(&make.multiple(point, &phase, paths, &mut [], rng))
@@ -324,13 +317,26 @@ fn check_irradiance(lobe: Lobe, max_vertices: u32, paths: u32) {
     let medium = fog(lobe);
     for light in [bulb(), panel()] {
         let (scene, lights) = (room(0.0, &light), [light]);
-        let mut make = estimator(&medium, &scene, &lights);
-        make.walk.max_vertices = max_vertices;
+        let make = estimator(World { medium: &medium, scene: &scene, lights: (&lights).into() }, max_vertices);
         for point in [Vec3::new(1.0, 0.85, 0.1), Vec3::new(1.0, -0.1, 0.1)] {
             check(point, Vec3::Y, &format!("{lobe:?}, {lights:?}"), |point, rng| {
                 first(&make.irradiance(point, Vec3::NEG_X, paths, rng).0)
             });
         }
+    }
+}
+
+/// Fog with open faces under an even sky, near one of them and deep inside, away from it: light is scattered more often inside, and no wall stands behind.
+fn check_open_fog(lobe: Lobe, max_vertices: u32, paths: u32) {
+    let cube = Region::bounds(Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE }).unwrap();
+    let (medium, phase) = (Placed::new(fog(lobe), cube), Phase::from(lobe));
+    let lights = [Light::Constant(Spectrum::ONE)];
+    let world = World { medium: &medium, scene: &Empty, lights: (&lights).into() };
+    let make = estimator(world, max_vertices);
+    for point in [Vec3::new(0.84, -0.2, 0.1), Vec3::new(0.5, -0.1, 0.1)] {
+        check(point, Vec3::NEG_X, &format!("open fog, {lobe:?}"), |point, rng| {
+            first(&make.multiple(point, &phase, paths, &mut [], rng))
+        });
     }
 }
 
@@ -382,4 +388,10 @@ fn estimates_of_light_scattered_forwards_often_change_as_their_gradients_say() {
 #[test]
 fn irradiance_of_light_scattered_forwards_often_changes_as_its_gradient_says() {
     check_irradiance(FORWARDS, 64, 8192);
+}
+
+#[test]
+fn estimates_of_records_at_open_faces_of_fog_change_as_their_gradients_say() {
+    check_open_fog(Lobe::Isotropic, 64, 4096);
+    check_open_fog(FORWARDS, 64, 8192);
 }

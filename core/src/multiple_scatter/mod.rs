@@ -8,8 +8,8 @@
 //! Jarosz et al. 2008, Eq. 27–30, as in the sheet's § 1.7: there the whole path is translated with its
 //! start, and everything but extinction and scattering is frozen. Departs from the paper:
 //!
-//! - vertices move less the nearer they are to the wall behind them or to a lamp ([`Shift`]): translated paths
-//!   cross walls, and the gradient of the volume's border was missing. The sums above get a factor `Πφ` on each
+//! - vertices move less the nearer they are to the wall behind them, to a face of the medium or to a lamp ([`Shift`]): translated paths
+//!   cross walls and leave the fog, and the gradient of the volume's border was missing. The sums above get a factor `Πφ` on each
 //!   `∇` and the terms of [`Weight::advance_by`]; phase functions turn with their directions. Densities,
 //!   lengths, roulette and visibility stay frozen;
 //! - lengths come from marched thickness or delta tracking, which suit heterogeneous media; Eq. 29 remains as a choice;

@@ -388,7 +388,13 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Walk<'_, M, S> {
     fn leg(&self, ray: Ray, end: Option<Hit>) -> Leg {
         let nearest2 = self.world.lights.nearest2(ray.origin);
         let ray = ray.with_length(end.map_or(f32::INFINITY, |hit| hit.distance));
-        Leg { ray, end, reach: REACH * float::sqrt(nearest2), flown: 0.0, passes: 0.0 }
+        let mut wall = end.as_ref().map(|hit| (hit.distance, hit.normal));
+        self.world.medium.faces(&ray, &mut |face| {
+            if face.distance > 0.0 && wall.is_none_or(|(distance, _)| face.distance < distance) {
+                wall = Some((face.distance, face.normal));
+            }
+        });
+        Leg { ray, end, wall, reach: REACH * float::sqrt(nearest2), flown: 0.0, passes: 0.0 }
     }
 
     #[inline]
@@ -517,6 +523,8 @@ struct Leg {
     /// It ends at the surface.
     ray: Ray,
     end: Option<Hit>,
+    /// What comes first that vertices must not cross, as [`Shift::new`] has it.
+    wall: Option<(f32, Vec3)>,
     /// The reach of [`Shift`] at its origin.
     reach: f32,
     /// How far (m) light came that went straight on at a collision.
@@ -555,7 +563,7 @@ impl Carried {
     /// The weight at a point of `leg`, where the gradient of scattering is `slope`; `kappa` is frozen.
     #[inline]
     fn at(&self, leg: &Leg, point: &Collision, kappa: Spectrum, slope: &Gradient) -> Weight {
-        let shift = Shift::new(&leg.ray, leg.end.as_ref(), leg.reach, point.distance);
+        let shift = Shift::new(&leg.ray, leg.wall, leg.reach, point.distance);
         let Collision { factor, thickness, properties, .. } = point;
         self.bent(&leg.ray, &shift).advance_by(&shift, kappa, *factor, thickness, properties.scattering, slope)
     }

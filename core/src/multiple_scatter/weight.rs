@@ -2,7 +2,6 @@
 
 use glam::Vec3;
 
-use crate::host::Hit;
 use crate::math::Ray;
 use crate::single_scatter::Contribution;
 use crate::spectrum::{Gradient, Spectrum};
@@ -16,12 +15,12 @@ const MIN_COSINE: f32 = 0.02;
 /// ```text
 /// y ↦ y + φ δ,   φ = max(0, 1 − t/s),
 /// ∇ ln(dV/r²) = (n + 2 c ω)/(c s) before a surface at s with normal n, c = −n·ω
-///             = ω/s before a sphere of radius s,   2 ω/t beyond it
+///             = ω/s before a sphere of radius s,   2 ω/t beyond it and beyond faces
 /// ```
 ///
 /// for a vertex at `t` in direction `ω`. Near the start vertices go along, or `1/t²` would make the gradient
-/// noise; on surfaces and around lights they stay. So none crosses a wall, the volume that fills with light
-/// as the start leaves one is part of the gradient, and the steep light around a lamp adds no noise.
+/// noise; on surfaces, on faces of the medium and around lights they stay. So none crosses a wall or leaves the fog, the volume that fills with light
+/// as the start leaves a face is part of the gradient, and the steep light around a lamp adds no noise.
 /// With nothing in reach this is J's translation. Neither J nor the sheet (§ 1.7) has it; exact but for visibility.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Shift {
@@ -37,29 +36,29 @@ impl Shift {
     /// The vertex goes all the way with the start.
     pub const TRANSLATION: Self = Self { share: 1.0, spread: Vec3::ZERO, turn: 0.0 };
 
-    /// Of a vertex at `distance` (m) on a ray that ends on a surface, or nowhere. `reach` (m) is the radius
+    /// Of a vertex at `distance` (m) on a ray. `wall` is the first surface that it comes to, or face at which the medium
+    /// changes abruptly ([`Medium::faces`](crate::host::Medium::faces)): distance (m) and unit normal, of either sign. `reach` (m) is the radius
     /// of the sphere around the start beyond which vertices stay.
     ///
     /// ```
-    /// # use fogbow::{host::Hit, math::{Ray, Vec3}, multiple_scatter::Shift, surface::Surface};
-    /// let wall = Hit { distance: 2.0, normal: Vec3::NEG_X, shading: Vec3::NEG_X, surface: Surface::Null, light: None };
-    /// let shift = Shift::new(&Ray::new(Vec3::ZERO, Vec3::X), Some(&wall), f32::INFINITY, 0.5);
+    /// # use fogbow::{math::{Ray, Vec3}, multiple_scatter::Shift};
+    /// let shift = Shift::new(&Ray::new(Vec3::ZERO, Vec3::X), Some((2.0, Vec3::NEG_X)), f32::INFINITY, 0.5);
     /// assert_eq!((shift.share, shift.spread), (0.75, Vec3::new(0.5, 0.0, 0.0)));
     /// ```
     #[inline]
     #[must_use]
-    pub fn new(ray: &Ray, end: Option<&Hit>, reach: f32, distance: f32) -> Self {
-        let wall = end.filter(|end| end.distance > 0.0 && end.distance < reach);
-        let s = wall.map_or(reach, |wall| wall.distance);
+    pub fn new(ray: &Ray, wall: Option<(f32, Vec3)>, reach: f32, distance: f32) -> Self {
+        let wall = wall.filter(|&(at, _)| at > 0.0 && at < reach);
+        let s = wall.map_or(reach, |(at, _)| at);
         if distance >= s {
             return Self { share: 0.0, spread: ray.direction * (2.0 / distance), turn: 1.0 / distance };
         }
-        let Some(wall) = wall else {
+        let Some((_, normal)) = wall else {
             return Self { share: 1.0 - distance / s, spread: ray.direction / s, turn: 1.0 / s };
         };
-        let signed = -wall.normal.dot(ray.direction);
+        let signed = -normal.dot(ray.direction);
         // The side that is seen.
-        let normal = if signed < 0.0 { -wall.normal } else { wall.normal };
+        let normal = if signed < 0.0 { -normal } else { normal };
         let spread = (normal / signed.abs().max(MIN_COSINE) + ray.direction * 2.0) / s;
         Self { share: 1.0 - distance / s, spread, turn: 1.0 / s }
     }
