@@ -1,4 +1,4 @@
-//! How the vertices of walks move with their start: closed forms, and gradients of light in a closed room.
+//! How the vertices of walks move with their start: closed forms, and gradients of light in a closed room and in fog with open faces.
 
 use fogbow::cache::Estimator;
 use fogbow::host::{Empty, Hit, Medium, Scene};

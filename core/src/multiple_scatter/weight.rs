@@ -14,7 +14,7 @@ const MIN_COSINE: f32 = 0.02;
 ///
 /// ```text
 /// y ↦ y + φ δ,   φ = max(0, 1 − t/s),
-/// ∇ ln(dV/r²) = (n + 2 c ω)/(c s) before a surface at s with normal n, c = −n·ω
+/// ∇ ln(dV/r²) = (n + 2 c ω)/(c s) before a surface or face at s with normal n, c = −n·ω
 ///             = ω/s before a sphere of radius s,   2 ω/t beyond it and beyond faces
 /// ```
 ///
