@@ -4,8 +4,8 @@ use alloc::vec::Vec;
 
 use super::slot::Slot;
 use super::{
-    Asked, Audit, AuditedRegion, BiasMap, Compared, Findings, Kind, MOST_REPAIRS, RadianceCaches, Record, Settings,
-    USUAL_ERROR,
+    Asked, Audit, AuditedRegion, BiasMap, Compared, Deviation, Findings, Kind, MOST_REPAIRS, RadianceCaches, Record,
+    Settings, USUAL_ERROR,
 };
 use crate::light::{Light, PointLight};
 use crate::math::{Bounds, Ray, Vec3};
@@ -276,14 +276,19 @@ fn what_is_broken_in_records_is_repaired() {
     assert_eq!(verdict(Some(Broken::Walks), 1), [true, true, true, false]);
 }
 
-/// At the edge of a cloud in the open light bends within a part of a free path. Twenty of them, under an even sky: 2 % too dark, and
-/// more in the middle, unless pilots say how far records may reach.
+/// At the edge of a cloud in the open light bends within a part of a free path. Sixteen of them, under an even sky: 1.6 ± 0.1 % too dark, and
+/// more in the middle, unless pilots say how far records may reach: 0.8 ± 0.1 %. Means of four seeds, as one has 0.25 % by chance.
 #[test]
 fn pilots_know_how_light_falls_off_in_a_cloud_in_the_open() {
+    const SEEDS: u64 = 4;
     let sky = [Light::Constant(Spectrum::ONE)];
     let found = |error: f32| {
-        let change = |settings: Settings| Settings { error, ..settings.with_walks(512) };
-        repaired([1.0, 9.0], (&sky, COMPARED), change, |_| {}, 0).0.cached
+        let sums = (0..SEEDS).fold([0.0; 2], |[bias, square], seed| {
+            let change = |settings: Settings| Settings { error, seed, ..settings.with_walks(512) };
+            let found = repaired([0.8, 7.2], (&sky, COMPARED), change, |_| {}, 0).0.cached;
+            [bias + found.bias, square + found.error * found.error]
+        });
+        Deviation { bias: sums[0] / SEEDS as f64, error: sums[1].sqrt() / SEEDS as f64 }
     };
     let [without, with] = [0.0, USUAL_ERROR].map(found);
     assert!(without.exceeds(0.01) && without.bias < 0.0, "{without:?}");

@@ -89,6 +89,8 @@ pub struct RadianceCaches<'s> {
     pub(super) dropped: u32,
     /// How often when photons were last to meet other chances.
     dropped_with_photons: u32,
+    /// What part of a picture's light each kind brings, in the order of [`Kind::FINAL`], as far as that is known.
+    pub(super) shares: [f64; Kind::FINAL.len()],
     /// The light in cells that the last complete shooting has left: of the world, not of a view.
     pub(super) photons: PhotonGrid<'s>,
 }
@@ -110,6 +112,7 @@ impl RadianceCaches<'static> {
             settled: ByKind([0; Kind::COUNT]),
             dropped: 0,
             dropped_with_photons: 0,
+            shares: [1.0; Kind::FINAL.len()],
             photons: PhotonGrid::none(),
         }
     }
@@ -163,6 +166,7 @@ impl<'s> RadianceCaches<'s> {
             settled: ByKind([0; Kind::COUNT]),
             dropped: 0,
             dropped_with_photons: 0,
+            shares: [1.0; Kind::FINAL.len()],
             photons: PhotonGrid::none(),
         }
     }

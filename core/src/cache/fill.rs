@@ -31,6 +31,7 @@ use crate::spectrum::Spectrum;
 use crate::work::Rounds;
 use crate::world::World;
 
+mod doubt;
 mod estimates;
 mod finer;
 mod glances;
@@ -66,6 +67,10 @@ enum Round {
     Shoot,
     /// Which cells do surfaces cut?
     Divide,
+    /// Light at some places by one half of the photons, and by the other: how noisy are they?
+    Doubt {
+        is_second: bool,
+    },
     /// Sample all light along some eye rays: how much does each kind bring?
     Weigh,
     /// Look which places of a batch have no record.
@@ -166,6 +171,8 @@ pub struct Filling<'s, F> {
     /// Photons before this round, and in it.
     photons_before: u32,
     photons_of_round: u32,
+    /// Whether photons are being shot because those that there were are too noisy.
+    are_more: bool,
     is_cut: bool,
 }
 
@@ -249,6 +256,7 @@ impl<'s> RadianceCaches<'s> {
             all_computed: ByKind([0; Kind::COUNT]),
             photons_before: 0,
             photons_of_round: 0,
+            are_more: false,
             is_cut,
         }
     }
@@ -300,11 +308,11 @@ impl<'s, F> Filling<'s, F> {
     }
 
     /// The relative noise that records leave in the picture, root of the mean of squares over its pixels, as eye rays have told it that read records
-    /// before and after they were estimated anew; `None` before that, and where no picture is asked for. What all records share, the noise of photons, is not in it,
-    /// nor what samples of a pixel average, which their spread tells.
+    /// before and after they were estimated anew, and as halves of the photons have, whose noise all records share; `None` before that, and where no picture is asked for.
+    /// What samples of a pixel average is not in it: their spread tells of that.
     #[must_use]
     pub fn record_noise(&self) -> Option<f32> {
-        self.left
+        self.left.map(|left| float::hypot(left, self.memory.photons.noise()))
     }
 
     /// Walks and directions of all records of this fill.
@@ -326,7 +334,7 @@ impl<'s, F> Filling<'s, F> {
     fn at_hand(&self) -> Option<(Step, Effort)> {
         match *TURNS.get(self.step)? {
             Turn::Of(step) => Some((step, self.settings().effort(step.kind)?)),
-            Turn::Glances { .. } => None,
+            Turn::Doubt | Turn::Glances { .. } => None,
         }
     }
 
@@ -441,8 +449,13 @@ impl<'s, F> Filling<'s, F> {
                 if let Some((effort, seed)) = self.caches.photon_effort() {
                     self.memory.photons.finish(&effort, seed);
                 }
-                self.begin_weighing();
+                if core::mem::take(&mut self.are_more) {
+                    self.begin(self.step);
+                } else {
+                    self.begin_weighing();
+                }
             }
+            Round::Doubt { is_second } => self.take_doubt(is_second),
             Round::Weigh => {
                 self.take_shares();
                 self.begin(0);
@@ -518,6 +531,7 @@ where
             Round::Search => self.search(job, world, output),
             Round::Shoot => self.shoot(job, world, output),
             Round::Divide => self.divide(job, world, output),
+            Round::Doubt { .. } => self.doubt(job, world, output),
             Round::Weigh => self.weigh(job, world, output),
             Round::Look => self.look(job, output),
             Round::Make => self.make(job, world, output),
@@ -543,7 +557,7 @@ where
         if self.round == Round::Look {
             kept = kept.and(memory.still_open.extend_from_slice(output.open.as_slice()));
         }
-        if self.round == Round::Weigh {
+        if matches!(self.round, Round::Weigh | Round::Doubt { .. }) {
             kept = kept.and(memory.glances.extend_from_slice(&output.glances));
         }
         if let Round::Glance { is_second } = self.round {
@@ -562,7 +576,7 @@ where
     fn stage(&self) -> &'static str {
         match self.round {
             Round::Search => "fill search",
-            Round::Shoot | Round::Divide => "fill photons",
+            Round::Shoot | Round::Divide | Round::Doubt { .. } => "fill photons",
             Round::Done => "",
             Round::Weigh | Round::Glance { .. } => "fill glances",
             Round::Look | Round::Make | Round::Pilot { .. } | Round::Again { .. } | Round::Smooth { .. } => {

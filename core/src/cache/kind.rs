@@ -120,6 +120,8 @@ pub(super) enum Pass {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Turn {
     Of(Step),
+    /// Records are read by one half of the photons and by the other.
+    Doubt,
     Glances {
         /// After records have been estimated anew.
         is_second: bool,
@@ -139,7 +141,7 @@ pub(super) const FIRST_COUNTS: f32 = 0.5;
 
 /// Steps in their order: first coarse irradiance, by which surfaces light everything else, once more, from what it was revised to, and again where that is in doubt;
 /// then the final kinds, none of which needs another. What is to be averaged comes last.
-pub(super) const TURNS: [Turn; 17] = {
+pub(super) const TURNS: [Turn; 18] = {
     use Kind::{CoarseIrradiance, Irradiance, Multiple, Single, Surface};
     const fn make(kind: Kind) -> Turn {
         Turn::Of(Step { kind, pass: Pass::Make })
@@ -155,6 +157,7 @@ pub(super) const TURNS: [Turn; 17] = {
     }
     [
         make(CoarseIrradiance),
+        Turn::Doubt,
         again(CoarseIrradiance, 0),
         more(CoarseIrradiance, 4000),
         smooth(CoarseIrradiance),

@@ -50,6 +50,12 @@ impl Glance {
         if all.is_finite() { Self { kinds, all } } else { Self::default() }
     }
 
+    /// Light of one kind, nothing of what is no number.
+    pub(super) fn of(kind: Kind, light: Spectrum) -> Self {
+        let light = if light.is_finite() { light.mean() } else { 0.0 };
+        Self { kinds: Kind::FINAL.map(|other| if other == kind { light } else { 0.0 }), all: light }
+    }
+
     /// As [`Glance::new`], without lights and what else glows.
     pub(super) fn scattered(seen: &CachedRadiance) -> Self {
         Self::new(&CachedRadiance { emitted: Spectrum::ZERO, ..*seen })
@@ -70,6 +76,36 @@ pub(super) fn readings(settings: &Settings) -> u32 {
 pub(super) fn dark(glances: &[Glance]) -> f64 {
     let sum: f64 = glances.iter().map(|glance| f64::from(glance.all)).sum();
     if glances.is_empty() { 0.0 } else { DARK * sum / glances.len() as f64 }
+}
+
+/// Relative variance of what photons tell of each kind, in the order of [`Kind::FINAL`]: of [`READINGS`] at each place by one half of them, and after all these as many by the other.
+///
+/// ```text
+/// E[(A₁ − B₁)(A₂ − B₂) | photons] = (E[A − B | photons])² = 4 V((A + B)/2)   in the mean over photons
+/// ```
+///
+/// As in [`Noise::add`] readings are independent given the photons, so that noise of their walks has no part in it.
+pub(super) fn of_halves(glances: &[Glance]) -> [f64; KINDS] {
+    let half = glances.len() / 2;
+    core::array::from_fn(|k| {
+        let light = |glance: &Glance| f64::from(glance.kinds[k]);
+        let (mut all, mut places, mut sum) = (0.0, 0.0, 0.0);
+        // First how much light there is.
+        for is_second in [false, true] {
+            let dark = DARK * all / places;
+            for (a, b) in glances[..half].chunks_exact(READINGS).zip(glances[half..].chunks_exact(READINGS)) {
+                let mean = a.iter().chain(b).map(light).sum::<f64>() / (2 * READINGS) as f64;
+                if mean > 0.0 && is_second {
+                    let product: f64 = a.iter().zip(b).map(|(a, b)| light(a) - light(b)).product();
+                    sum += product / (4.0 * places * (mean * mean + dark * dark));
+                } else if mean > 0.0 {
+                    (all, places) = (all + mean, places + 1.0);
+                }
+            }
+        }
+        // Neither no places nor a sum that chance made negative tell of noise.
+        sum.max(0.0)
+    })
 }
 
 /// The noise of a kind.
@@ -260,6 +296,32 @@ mod tests {
         let mut noise = Noise::default();
         noise.add([0.0; 2], &[glance(1.0, 0.0); READINGS], &[glance(0.9, 0.0), glance(1.1, 0.0)], 0.0);
         assert!(noise.left([1.0; KINDS]).iter().flatten().all(|left| left.variance == 0.0));
+    }
+
+    /// Halves of the photons that are too bright or too dark by 6 %, at places where single readings vary by as much again.
+    #[test]
+    fn what_halves_differ_by_is_noise_of_all_photons() {
+        const PLACES: usize = 100_000;
+        let mut rng = Generator::new(7);
+        let mut sign = || if uniform(&mut rng) < 0.5 { -1.0 } else { 1.0 };
+        let of = |kind: Kind, light: f32| Glance::of(kind, Spectrum::splat(light));
+        let (mut first, mut second) = (alloc::vec![], alloc::vec![]);
+        for place in 0..PLACES {
+            let kind = if place % 4 == 0 { Kind::Irradiance } else { Kind::Multiple };
+            let off = if place % 4 == 0 { 0.0 } else { 0.06 };
+            for (readings, off) in [(&mut first, off * sign()), (&mut second, off * sign())] {
+                readings.extend([(); READINGS].map(|()| of(kind, 3.0 * (1.0 + off + 0.05 * sign()))));
+            }
+        }
+        first.append(&mut second);
+        let [single, surface, multiple, irradiance] = of_halves(&first);
+        // A quarter of twice the variance of one half.
+        let expected = 0.5 * 0.06_f64.powi(2) / (1.0 + DARK * DARK);
+        assert!((multiple / expected - 1.0).abs() < 0.05, "{multiple} in place of {expected}");
+        assert!(irradiance < 0.05 * expected && (single, surface) == (0.0, 0.0), "{irradiance}");
+        // Neither nothing nor what is no number tells of noise.
+        assert_eq!(of_halves(&[]), [0.0; KINDS]);
+        assert_eq!(of_halves(&[of(Kind::Multiple, f32::NAN), of(Kind::Multiple, 1.0)].repeat(2)), [0.0; KINDS]);
     }
 
     #[test]

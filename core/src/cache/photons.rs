@@ -4,13 +4,16 @@
 //! paths, wherever it goes, at the cost of one walk for all the cells it passes. A cell's light is a mean over its volume, too
 //! coarse for a picture, but what is gathered from many cells some scatterings away is neither blurred nor noisy.
 //!
-//! Where walks may end is decided by photons that are only counted (decision 56).
+//! Where walks may end is decided by photons that are only counted (decision 56). What the light of one half of the photons differs by from that of the other tells
+//! how noisy it is (decision 105).
+
+mod rounds;
 
 use super::lookup::TurningBasis;
 use super::resolved::{self, MAX_DEGREE};
 use crate::host::{Medium, Properties, Scene};
 use crate::light::Light;
-use crate::math::{Bounds, Ray, Vec3, float};
+use crate::math::{Bounds, Ray, Vec3};
 use crate::phase::Phase;
 use crate::photon::{Event, trace_split};
 use crate::sampling::uniform::mix;
@@ -26,22 +29,6 @@ const MAX_COEFFICIENTS: usize = sh::coefficient_count(MAX_DEGREE);
 
 /// Counted photons that must have passed a cell for walks to end there. Fewer: their noise is seen; more: walks go on where light is well known.
 const LEAST_PATHS: u32 = 8;
-
-/// Part of all photons that are only counted. Where walks end must not depend on the photons whose light they find: dark cells that many
-/// happened to pass would be too bright. Larger: photons that bring no light; smaller: walks end nowhere but where light is known very well.
-const COUNTED: f64 = 0.25;
-
-/// Part of the lit cells that photons are to know well. More: all wait for the darkest corner; less: dark parts of a picture are noisy.
-const KNOWN: f64 = 0.9;
-
-/// Steps in which light of dark cells is told, over that of usual ones.
-const STEPS: f32 = 65536.0;
-
-/// Exponent of what nearly all cells are darker by than usual ones, which makes photons more. Larger: time; smaller: clouds of noise in deep fog.
-const MORE_IN_DARK: f32 = 1.0 / 6.0;
-
-/// Photons of the first round.
-const FIRST: u32 = 4096;
 
 /// Photons of one job.
 pub(super) const PATHS_PER_JOB: u32 = 8;
@@ -68,7 +55,8 @@ pub struct PhotonEffort {
     pub paths: u32,
     /// Flights of photons, at which no more paths begin.
     pub flights: u64,
-    /// Photons that are to bring light to nearly every cell that walks may end in.
+    /// Photons that are to bring light to nearly every cell that walks may end in; a [`Filling`](super::Filling) for an [`error`](super::Settings::error)
+    /// shoots as many more as their noise asks for, and this becomes that number.
     pub enough: u32,
 }
 
@@ -85,10 +73,10 @@ impl PhotonEffort {
         Some((side, counts.to_array().map(|count| (libm::ceilf(count - INSET) as u32).clamp(1, self.cells))))
     }
 
-    /// How many cells there are, and coefficients of all together.
+    /// How many cells there are, and coefficients of all together, of light and of what halves differ by.
     pub(super) fn room(&self) -> (usize, usize) {
         let cells = self.division().map_or(0, |(_, counts)| counts.iter().map(|&count| count as usize).product());
-        (cells, cells * sh::coefficient_count(self.degree.min(MAX_DEGREE)))
+        (cells, 2 * cells * sh::coefficient_count(self.degree.min(MAX_DEGREE)))
     }
 }
 
@@ -118,6 +106,8 @@ pub struct PhotonCell {
     wanted: f32,
     /// Where the first did (m).
     met: Vec3,
+    /// How many photons had brought light before it was asked for here.
+    missed: u32,
     /// Whether something scatters in it, as far as counted photons have seen.
     scatters: bool,
     /// Whether it or one beside it scatters: only there light is asked for.
@@ -134,7 +124,7 @@ pub struct PhotonGrid<'s> {
     counts: [u32; 3],
     cells: List<'s, PhotonCell>,
     degree: usize,
-    /// `Σ power · length · Y(direction of travel)` (W·m), cell after cell.
+    /// `Σ power · length · Y(direction of travel)` (W·m), cell after cell, and as many of the even photons less the odd ones.
     moments: List<'s, Spectrum>,
     paths: u32,
     flights: u64,
@@ -144,6 +134,8 @@ pub struct PhotonGrid<'s> {
     lit: Option<u32>,
     /// What all this was done for, and with which random numbers, once it is done.
     made_for: Option<(PhotonEffort, u64)>,
+    /// The noise that they leave in a picture, and of how many photons that is known.
+    noise: (f32, u32),
 }
 
 #[cfg(feature = "alloc")]
@@ -224,6 +216,7 @@ impl<'s> PhotonGrid<'s> {
             counted: 0,
             lit: None,
             made_for: None,
+            noise: (0.0, 0),
         }
     }
 
@@ -245,6 +238,35 @@ impl<'s> PhotonGrid<'s> {
     /// It is done.
     pub(super) fn finish(&mut self, effort: &PhotonEffort, seed: u64) {
         self.made_for = Some((*effort, seed));
+    }
+
+    /// Whether it is done, and how noisy it is has not been told.
+    pub(super) fn is_untold(&self) -> bool {
+        self.is_made() && self.noise.1 != self.paths
+    }
+
+    /// The noise that it leaves in a picture.
+    pub(super) fn tell(&mut self, noise: f32) {
+        self.noise = (noise, self.paths);
+    }
+
+    /// What was told counts no longer: less noise is asked for.
+    pub(super) fn ask_again(&mut self) {
+        self.noise.1 = 0;
+    }
+
+    /// What was told of its noise, 0 if nothing was.
+    pub(super) fn noise(&self) -> f32 {
+        self.noise.0
+    }
+
+    /// Goes over from the light of all photons to twice that of even ones (1), from there to that of odd ones (−2), and back (1). In between it is not done.
+    pub(super) fn turn(&mut self, by: f32) {
+        self.made_for = None;
+        let (moments, differences) = halves(self.moments.as_mut_slice());
+        for (moment, difference) in moments.iter_mut().zip(differences) {
+            *moment += *difference * by;
+        }
     }
 
     /// Bytes of memory that cells hold.
@@ -269,7 +291,7 @@ impl<'s> PhotonGrid<'s> {
     /// Dark cells that fill the bounds.
     pub(super) fn reset(&mut self, effort: &PhotonEffort) -> Result<(), Full> {
         (self.paths, self.flights, self.counted, self.counts) = (0, 0, 0, [0; 3]);
-        (self.lit, self.made_for) = (None, None);
+        (self.lit, self.made_for, self.noise) = (None, None, (0.0, 0));
         self.cells.clear();
         self.moments.clear();
         let Some((side, counts)) = effort.division() else { return Ok(()) };
@@ -286,77 +308,6 @@ impl<'s> PhotonGrid<'s> {
 
     pub(super) fn paths(&self) -> u32 {
         self.paths
-    }
-
-    /// Photons of the next round, no more than all before it; `None` after the last. First they are counted, so long that they are about [`COUNTED`]
-    /// of all, then they bring light: as many as it takes until [`PhotonEffort::enough`] pass nearly every cell that walks may end in.
-    pub(super) fn next_round(&mut self, effort: &PhotonEffort) -> Option<u32> {
-        let (paths, counted) = (self.paths, self.counted);
-        if paths == 0 {
-            let first = f64::from(FIRST).min(COUNTED * f64::from(effort.paths)) as u32;
-            return (effort.paths > 0 && effort.flights > 0).then_some(first.max(1));
-        }
-        if self.lit.is_none() {
-            self.weigh();
-        }
-        // As many in all as flights allow. Casts saturate.
-        let per_path = (self.flights as f64 / f64::from(paths)).max(1.0);
-        let most = effort.paths.min((effort.flights as f64 / per_path) as u32);
-        if self.lit.is_none() {
-            let wanted = f64::from(counted) * (1.0 + self.times(effort.enough));
-            let due = (COUNTED * wanted.min(f64::from(most))) as u32;
-            if counted < due {
-                return Some(counted.min(due - counted));
-            }
-            // Cells that later counts find have missed photons before.
-            if counted == paths {
-                self.widen();
-            }
-            self.lit = Some(most.min(wanted as u32));
-        }
-        let end = self.lit.map_or(0, |end| end.min(most));
-        (paths < end).then(|| paths.min(end - paths))
-    }
-
-    /// Asks for light where something scatters and beside it, where slopes look. Ends of rows are beside beginnings: some cells more.
-    fn widen(&mut self) {
-        let [nx, ny, _] = self.counts.map(|count| count as usize);
-        let cells = self.cells.as_mut_slice();
-        for number in 0..cells.len() {
-            let scatters = |number: usize| cells.get(number).is_some_and(|cell| cell.scatters);
-            let beside = |stride| scatters(number.wrapping_sub(stride)) || scatters(number + stride);
-            let is_lit = scatters(number) || beside(1) || beside(nx) || beside(nx * ny);
-            if let Some(cell) = cells.get_mut(number) {
-                cell.is_lit = is_lit;
-            }
-        }
-    }
-
-    /// How many times the counted paths it takes until `enough` photons have passed nearly every cell that walks may end in, and more the darker these
-    /// cells are: without parts of photons, those of bright cells would be as many more, and pictures show bright ones most.
-    /// Infinite if no cell has been passed by some, and 0 if there are none.
-    fn times(&self, enough: u32) -> f64 {
-        if !self.cells.as_slice().iter().any(|cell| cell.scatters) {
-            return 0.0;
-        }
-        let wanted = |cell: &PhotonCell| (STEPS * cell.wanted) as u32;
-        let [met, dark] = [self.of_most(&|cell| cell.paths), self.of_most(&wanted)];
-        f64::from(enough) / f64::from(met) * f64::from(float::powf(STEPS / dark.max(1) as f32, MORE_IN_DARK))
-    }
-
-    /// The most of something that nearly every cell has that walks may end in.
-    fn of_most(&self, count: &dyn Fn(&PhotonCell) -> u32) -> u32 {
-        let is_lit = |cell: &&PhotonCell| cell.scatters && cell.paths >= LEAST_PATHS;
-        let lit = || self.cells.as_slice().iter().filter(is_lit).map(count);
-        let (all, most) = lit().fold((0_u32, 0), |(all, most), paths| (all + 1, most.max(paths)));
-        let most_dark = (1.0 - KNOWN) * f64::from(all);
-        let (mut low, mut high) = (0, most);
-        while low < high {
-            let middle = low + (high - low).div_ceil(2);
-            let darker = lit().filter(|&paths| paths < middle).count();
-            if f64::from(darker as u32) <= most_dark { low = middle } else { high = middle - 1 }
-        }
-        low
     }
 
     pub(super) fn len(&self) -> usize {
@@ -384,18 +335,6 @@ impl<'s> PhotonGrid<'s> {
     fn window(&self, at: Vec3) -> Option<f32> {
         let cell = self.cells.as_slice().get(self.number(self.cell_of(at)?) as usize)?;
         (cell.wanted > 0.0).then_some(cell.wanted)
-    }
-
-    /// Takes from the photons that are counted so far what power they should have: in proportion to the light of a cell, so that as many come to each cell that
-    /// scatters, but to bright ones as they do. Not where too few were counted: windows that are far too low split photons without end.
-    fn weigh(&mut self) {
-        let lit = self.cells.as_slice().iter().filter(|cell| cell.scatters);
-        let (sum, count) = lit.fold((0.0, 0_u32), |(sum, count), cell| (sum + f64::from(cell.light), count + 1));
-        let usual = (sum / f64::from(count)) as f32;
-        for cell in self.cells.as_mut_slice() {
-            let is_known = cell.paths >= LEAST_PATHS && usual > 0.0;
-            cell.wanted = if is_known { (cell.light / usual).min(1.0) } else { 0.0 };
-        }
     }
 
     /// Lets one photon fly; its flights are counted, what it leaves goes to `deposits`.
@@ -447,7 +386,7 @@ impl<'s> PhotonGrid<'s> {
         self.paths += paths;
         self.flights += flights;
         let stride = self.stride();
-        let (cells, moments) = (self.cells.as_mut_slice(), self.moments.as_mut_slice());
+        let cells = self.cells.as_mut_slice();
         if self.lit.is_none() {
             self.counted += paths;
             for deposit in deposits {
@@ -464,12 +403,19 @@ impl<'s> PhotonGrid<'s> {
             return;
         }
         let mut basis = [0.0; MAX_COEFFICIENTS];
+        let (moments, differences) = halves(self.moments.as_mut_slice());
         for deposit in deposits {
-            let cell = deposit.cell as usize;
-            let Some(sums) = moments.get_mut(cell * stride..(cell + 1) * stride) else { continue };
+            let first = deposit.cell as usize * stride;
+            let of_cell = first..first + stride;
+            let (Some(sums), Some(of_halves)) = (moments.get_mut(of_cell.clone()), differences.get_mut(of_cell)) else {
+                continue;
+            };
             sh::evaluate(deposit.direction, self.degree, &mut basis[..stride]);
-            for (sum, y) in sums.iter_mut().zip(basis) {
-                *sum += deposit.light * y;
+            let sign = 1.0 - 2.0 * (deposit.path & 1) as f32;
+            for ((sum, difference), y) in sums.iter_mut().zip(of_halves).zip(basis) {
+                let light = deposit.light * y;
+                *sum += light;
+                *difference += light * sign;
             }
         }
     }
@@ -506,16 +452,17 @@ impl<'s> PhotonGrid<'s> {
         sh::coefficient_count(self.degree)
     }
 
-    /// The coefficients of a cell where walks may end.
-    fn trusted(&self, [x, y, z]: [u32; 3]) -> Option<&[Spectrum]> {
+    /// The coefficients of a cell where walks may end, and how many photons have brought them.
+    fn trusted(&self, [x, y, z]: [u32; 3]) -> Option<(&[Spectrum], u32)> {
         // Beyond the first cell numbers wrap around.
         let [nx, ny, nz] = self.counts;
         if x >= nx || y >= ny || z >= nz {
             return None;
         }
         let (number, stride) = (self.number([x, y, z]) as usize, self.stride());
-        let is_whole = self.cells.as_slice().get(number).is_some_and(|cell| cell.is_whole);
-        self.moments.as_slice().get(number * stride..(number + 1) * stride).filter(|_| is_whole)
+        let cell = self.cells.as_slice().get(number).filter(|cell| cell.is_whole)?;
+        let paths = self.brought().saturating_sub(cell.missed);
+        self.moments.as_slice().get(number * stride..(number + 1) * stride).filter(|_| paths > 0).zip(Some(paths))
     }
 
     fn brought(&self) -> u32 {
@@ -524,7 +471,7 @@ impl<'s> PhotonGrid<'s> {
 
     /// Whether walks may end at a point.
     pub(super) fn knows(&self, point: Vec3) -> bool {
-        self.brought() > 0 && self.cell_of(point).and_then(|index| self.trusted(index)).is_some()
+        self.cell_of(point).and_then(|index| self.trusted(index)).is_some()
     }
 
     /// All light but that straight from the lights walks connect to, scattered towards `to_eye` at `point`, without the part `f` of it that counts as going
@@ -551,20 +498,17 @@ impl<'s> PhotonGrid<'s> {
         let index = self.cell_of(point)?;
         let cell = self.trusted(index)?;
         let basis = TurningBasis::new(to_eye, self.degree);
-        let paths = self.brought();
-        if paths == 0 {
-            return None;
-        }
-        let scale = 1.0 / (paths as f32 * self.side * self.side * self.side);
+        let volume = self.side * self.side * self.side;
         let straight = Spectrum::splat(self.straight(&properties.phase));
-        let moments: [Spectrum; MAX_DEGREE + 1] =
-            core::array::from_fn(|l| (properties.phase.moment(l) - straight) * scale);
+        let moments: [Spectrum; MAX_DEGREE + 1] = core::array::from_fn(|l| properties.phase.moment(l) - straight);
         let of_degree = |l: usize| l * l..(l + 1) * (l + 1);
-        let light = |cell: &[Spectrum]| -> Spectrum {
+        let scale = |paths: u32| 1.0 / (paths as f32 * volume);
+        let light = |(cell, paths): (&[Spectrum], u32)| -> Spectrum {
             let of = |l: usize| of_degree(l).map(|k| cell[k] * basis.value(k)).sum::<Spectrum>() * moments[l];
-            (0..=self.degree).map(of).sum()
+            (0..=self.degree).map(of).sum::<Spectrum>() * scale(paths)
         };
         let here = light(cell);
+        let (cell, paths) = cell;
         let mut gradient = Gradient::ZERO;
         let mut radiance = here;
         let middle = self.first + (Vec3::from(index.map(|i| i as f32)) + Vec3::splat(0.5)) * self.side;
@@ -584,7 +528,8 @@ impl<'s> PhotonGrid<'s> {
             radiance += slope * (point[axis] - middle[axis]);
         }
         let turned = (1..=self.degree).fold(Gradient::ZERO, |sum, l| {
-            of_degree(l).fold(sum, |sum, k| sum + Gradient::outer(cell[k] * moments[l], basis.slope(k)))
+            of_degree(l)
+                .fold(sum, |sum, k| sum + Gradient::outer(cell[k] * (moments[l] * scale(paths)), basis.slope(k)))
         });
         Some((Contribution { radiance, gradient }, turned))
     }
@@ -598,6 +543,11 @@ impl<'s> PhotonGrid<'s> {
     pub(super) fn unresolved(&self, phase: &Phase) -> f32 {
         resolved::unresolved(phase, self.degree)
     }
+}
+
+/// Coefficients of light, and of what halves of it differ by.
+fn halves(moments: &mut [Spectrum]) -> (&mut [Spectrum], &mut [Spectrum]) {
+    moments.split_at_mut(moments.len() / 2)
 }
 
 fn sign(bit: usize) -> f32 {
@@ -693,6 +643,32 @@ mod tests {
         assert!(far.paths as f32 > 10.0 * darker * near.paths as f32, "{near:?} {far:?}");
     }
 
+    #[test]
+    fn halves_of_the_photons_tell_what_all_differ_by_from_seed_to_seed() {
+        const SEEDS: u64 = 64;
+        let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::ONE, Phase::ISOTROPIC).unwrap();
+        let ball = Placed::new(fog, Region::sphere(Vec3::ZERO, 1.0).unwrap());
+        let lamps = [Light::Point(PointLight::from_flux(Vec3::splat(0.3), Spectrum::ONE).unwrap())];
+        let world = World { medium: &ball, scene: &crate::host::Empty, lights: (&lamps).into() };
+        let (mut sum, mut squares, mut halves) = (0.0, 0.0, 0.0);
+        for seed in 0..SEEDS {
+            let mut cells = PhotonGrid::lit(&world, &effort(4_000), &path::Settings::default(), seed);
+            let mut light = |by: f32| {
+                cells.turn(by);
+                let point = Vec3::splat(-0.1);
+                f64::from(cells.scattered(point, Vec3::X, &ball.properties(point)).unwrap().0.radiance[0])
+            };
+            let [all, even, odd, again] = [0.0, 1.0, -2.0, 1.0].map(&mut light);
+            assert!((0.5 * (even + odd) / all - 1.0).abs() < 1e-5 && (again / all - 1.0).abs() < 1e-5);
+            (sum, squares, halves) = (sum + all, squares + all * all, halves + (even - odd).powi(2) / 4.0);
+        }
+        let seeds = SEEDS as f64;
+        let (told, seen) = (halves / seeds, (squares - sum * sum / seeds) / (seeds - 1.0));
+        // Squares of 64 normal numbers: both vary by 18 %.
+        assert!((0.5..2.0).contains(&(told / seen)), "{told:e} {seen:e}");
+        assert!(told.sqrt() > 0.01 * sum / seeds, "{told:e}");
+    }
+
     /// Where nothing scatters no walk ends, and photons leave nothing; slopes look one cell beyond.
     #[test]
     fn cells_far_from_all_fog_are_dark() {
@@ -709,7 +685,7 @@ mod tests {
         // Where nothing scatters at all, a first look is enough.
         let dark = Homogeneous::new(Spectrum::ONE, Spectrum::ZERO, Phase::ISOTROPIC).unwrap();
         let clear = World { medium: &dark, scene: &crate::host::Empty, lights: (&sky).into() };
-        assert_eq!(PhotonGrid::lit(&clear, &effort, &path::Settings::default(), 1).paths(), FIRST);
+        assert_eq!(PhotonGrid::lit(&clear, &effort, &path::Settings::default(), 1).paths(), rounds::FIRST);
     }
 
     /// A finer level goes on where a coarser one has ended; with another division or other random numbers all begins anew.
@@ -727,8 +703,14 @@ mod tests {
         assert_eq!((cells.paths(), cells.is_made()), (2_000, false));
         cells.light(&world, (&effort(400_000), &walk, 1));
         assert_eq!(cells.paths(), 400_000);
+        // Those that the first few have not met, too.
+        let at = |i: u32| Vec3::new((i % 4) as f32, (i / 4 % 4) as f32, (i / 16) as f32) * 0.3 - Vec3::splat(0.45);
+        for point in (0..64).map(at) {
+            let (light, _) = cells.scattered(point, Vec3::Z, &ball.properties(point)).unwrap();
+            assert!((light.radiance[0] - 1.0).abs() < 0.1, "{point}: {light:?}");
+        }
         let counted = f64::from(cells.counted) / 400_000.0;
-        assert!((counted - COUNTED).abs() < 0.01, "{counted}");
+        assert!((counted - rounds::COUNTED).abs() < 0.01, "{counted}");
         let (light, _) = cells.scattered(Vec3::splat(0.1), Vec3::Z, &ball.properties(Vec3::ZERO)).unwrap();
         assert!((light.radiance[0] - 1.0).abs() < 0.05, "{light:?}");
         for (other, seed) in [(PhotonEffort { cells: 6, ..effort(800_000) }, 1), (effort(800_000), 2), (effort(10), 1)]

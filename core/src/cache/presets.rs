@@ -55,15 +55,21 @@ const PHOTONS: u32 = 1 << 22;
 /// See [`PHOTONS`].
 const FLIGHTS: f64 = 6e7;
 
-/// Photons that know the light of a cell: 7 % of noise, of which a walk meets a mean over many cells. More: time; fewer: clouds of noise, which all records of a place share.
-const ENOUGH: u32 = 192;
+/// Photons that are to light nearly every cell before their noise is told. Fewer: few cells are known, and walks, which then go on, take longer than the photons;
+/// more: time for photons that are not needed.
+const ENOUGH: u32 = 80;
 
-/// The same at least, of rough pictures. Fewer: few cells are known, and walks, which then go on, take longer than the photons; more: time.
+/// The same at least, of rough pictures, whose walks are few.
 const FEWEST: f64 = 24.0;
 
-/// Photons are as many times as many as what cells say of one direction varies more than their fluence does, over this. Less: time; more:
-/// clouds of noise where scattering is sharp, which all records of a place share.
-const EVEN: f32 = 2.0;
+/// Part of the error asked for that noise of photons may have in a picture. All records of a place share it: larger is clouds of noise, smaller is time.
+const PHOTON_NOISE: f64 = 0.5;
+
+/// The same where more photons are worth their time: their number is the square of what noise is to fall by.
+const TOO_NOISY: f64 = 1.2;
+
+/// How many times as many photons are shot at once at most, as noise told of few is uncertain. Less: noise is told more often; more: photons that are not needed.
+const MOST_MORE: f64 = 16.0;
 
 /// Most vertices of a walk. More: nothing, as roulette ends walks long before; fewer: dense fog that hardly absorbs turns out too dark.
 const VERTICES: u32 = 4096;
@@ -136,6 +142,12 @@ pub(super) fn record_noise(error: f32) -> f64 {
     NOISE * f64::from(error)
 }
 
+/// How many times as many photons a picture needs in which their noise is so much, where an error is asked for; `None` if they are enough.
+pub(super) fn more_photons(noise: f32, error: f32) -> Option<f64> {
+    let over = f64::from(noise) / (PHOTON_NOISE * f64::from(error));
+    (over > TOO_NOISY).then(|| (over * over).min(MOST_MORE))
+}
+
 /// Part of what is off in regions from which on a kind is to blame. Larger: what several kinds have wrong stays; smaller: records are made anew that are right.
 pub(super) const BLAMED: f64 = 0.25;
 
@@ -172,6 +184,17 @@ impl Effort {
 }
 
 impl PhotonEffort {
+    /// With as many photons as were found to be needed `before`.
+    pub(super) fn no_fewer_than(self, before: Option<Self>) -> Self {
+        Self { enough: before.map_or(0, |before| before.enough).max(self.enough), ..self }
+    }
+
+    /// For so many times as many photons.
+    pub(super) fn more(self, times: f64) -> Self {
+        // Casts saturate.
+        Self { enough: (f64::from(self.enough) * times) as u32, ..self }
+    }
+
     /// As [`Effort::finer`].
     pub(super) fn finer(self) -> Self {
         Self {
@@ -358,14 +381,13 @@ fn photons(outline: &Outline, scale: f32) -> PhotonEffort {
     // Noise of cells is the same for all that looks at them, and photons are cheap: of rough pictures they are spared less than walks.
     let finer = f64::from(1.0 / (scale * scale.min(1.0)));
     let degree = resolved::degree_for(&outline.phase);
-    let sharper = f64::from(resolved::spread(&outline.phase, degree) / EVEN).max(1.0);
     PhotonEffort {
         bounds: outline.bounds,
         cells,
         degree,
         paths: (f64::from(PHOTONS) * finer) as u32,
         flights: (FLIGHTS * finer) as u64,
-        enough: ((f64::from(ENOUGH) * finer).max(FEWEST) * sharper) as u32,
+        enough: (f64::from(ENOUGH) * finer.min(1.0)).max(FEWEST) as u32,
     }
 }
 

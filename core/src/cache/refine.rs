@@ -51,7 +51,7 @@ pub struct LevelPicture {
     pub time: Duration,
     /// Relative noise of one sample of a pixel, if it has been measured.
     pub noise: Option<f32>,
-    /// Relative noise that records leave in the picture: [`Filling::record_noise`](super::Filling::record_noise).
+    /// Relative noise that records and photons leave in the picture: [`Filling::record_noise`](super::Filling::record_noise).
     pub record_noise: Option<f32>,
 }
 

@@ -63,14 +63,6 @@ pub(super) fn degree_for(phase: &Phase) -> usize {
     degrees.find(|&degree| ends(degree) && left_out(phase, degree) <= RESOLVED).unwrap_or(ELSE_DEGREE)
 }
 
-/// Variance of what such cells say, over that of their fluence: `Σ (2l + 1) (p_l − f)²/(1 − f)²` for light that comes from one direction, where `f` of it goes
-/// straight on.
-pub(super) fn spread(phase: &Phase, degree: usize) -> f32 {
-    let straight = straight(phase, degree);
-    let of = |l: usize| (2 * l + 1) as f32 * phase.moment(l).map(|p| (p - straight) * (p - straight)).max_element();
-    (0..=degree).map(of).sum::<f32>() / ((1.0 - straight) * (1.0 - straight))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

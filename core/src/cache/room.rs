@@ -125,7 +125,7 @@ pub struct Slots<'s> {
     pub guides: [&'s mut [Guide]; Kind::COUNT],
     /// For the cells that photons light.
     pub photons: &'s mut [PhotonCell],
-    /// For the light in them.
+    /// For the light in them, and what that of halves differs by.
     pub photon_moments: &'s mut [Spectrum],
     /// What eye rays read before records are estimated anew.
     pub glances: &'s mut [Glance],

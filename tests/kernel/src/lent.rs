@@ -128,7 +128,8 @@ const PHOTONS: PhotonEffort =
 
 /// Cells of light, and what the photons of a job leave in them: these are few.
 const CELLS: usize = 64;
-const MOMENTS: usize = 9 * CELLS;
+/// Of light, and of what halves of it differ by.
+const MOMENTS: usize = 2 * 9 * CELLS;
 const GLANCES: usize = 0;
 const DEPOSITS: usize = 2048;
 

@@ -63,7 +63,7 @@ impl<'s, F: Fn([f32; 2]) -> Ray> Filling<'s, F> {
             surface: finer(before.surface, settings.surface),
             multiple: finer(before.multiple, settings.multiple),
             irradiance: finer(before.irradiance, settings.irradiance),
-            photons: settings.photons.or(before.photons),
+            photons: settings.photons.or(before.photons).map(|photons| photons.no_fewer_than(before.photons)),
             coarser: before.coarser,
             seed: before.seed,
             ..settings
@@ -113,7 +113,9 @@ impl<'s, F: Fn([f32; 2]) -> Ray> Filling<'s, F> {
         let memory = &mut self.memory;
         memory.wanted.clear();
         memory.glances.clear();
+        memory.photons.ask_again();
         self.level += 1;
+        self.are_more = false;
         self.view = self.asked.mark(&self.caches.settings);
         (self.noise, self.dark, self.left, self.again) = (Noise::default(), 0.0, None, 0);
         self.more = ByKind([[0; REGIONS]; Kind::COUNT]);

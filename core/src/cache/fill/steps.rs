@@ -27,6 +27,9 @@ impl<F> Filling<'_, F> {
             {
                 return;
             }
+            if *turn == Turn::Doubt && self.begin_doubt() {
+                return;
+            }
             let Some((step, effort)) = self.at_hand() else { continue };
             let slot = &self.caches.slots[step.kind];
             if slot.is_off() {

@@ -53,7 +53,8 @@ impl<F> Filling<'_, F> {
     /// Takes what eye rays have found: how coarse each kind may be.
     pub(super) fn take_shares(&mut self) {
         let glances = self.memory.glances.as_slice().iter().zip(0..);
-        let coarser = shares::coarser(shares::shares(glances.map(|(glance, number)| (*glance, Asked::at(number)))));
+        self.caches.shares = shares::shares(glances.map(|(glance, number)| (*glance, Asked::at(number))));
+        let coarser = shares::coarser(self.caches.shares);
         self.memory.glances.clear();
         let all = &mut self.caches.settings.coarser;
         for (kind, (factor, new)) in Kind::ALL.into_iter().zip(all.iter_mut().zip(coarser)) {

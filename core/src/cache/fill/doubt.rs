@@ -1,0 +1,164 @@
+//! Rounds in which light is estimated by one half of the photons, and by the other: how noisy they are, and how many more it takes.
+
+use super::{Filling, RAYS_PER_JOB, Round};
+use crate::cache::guide::Looks;
+use crate::cache::kind::{Kind, Pass, Step};
+use crate::cache::memory::{Estimate, FilledRecords};
+use crate::cache::noise::{self, Glance, READINGS};
+use crate::cache::presets;
+use crate::host::{Medium, Scene};
+use crate::sampling::Generator;
+use crate::sampling::uniform::mix;
+use crate::world::World;
+
+/// Readings by each half. Fewer: noise is told by chance; more: time.
+const DOUBTS: u32 = 1024;
+
+/// Walks of one reading, as a share of those of a record, and at least. As above.
+const WALKS: u32 = 8;
+
+impl<F> Filling<'_, F> {
+    /// Begins to tell the noise of photons, if it is not known.
+    pub(super) fn begin_doubt(&mut self) -> bool {
+        let readings = DOUBTS.min(noise::readings(self.settings()) / 2);
+        let is_asked = self.settings().error > 0.0 && !self.memory.wanted.is_empty();
+        if !(is_asked && readings >= RAYS_PER_JOB && self.memory.photons.is_untold()) {
+            return false;
+        }
+        self.memory.glances.clear();
+        self.memory.photons.turn(1.0);
+        self.enter(Round::Doubt { is_second: false }, readings / RAYS_PER_JOB);
+        true
+    }
+
+    /// Light that is scattered more than once, or falls on surfaces, at some of the places that eye rays ask for.
+    pub(super) fn doubt<M: Medium + ?Sized, S: Scene + ?Sized>(
+        &self,
+        job: u32,
+        world: &World<'_, M, S>,
+        output: &mut FilledRecords<'_>,
+    ) {
+        let wanted = self.memory.wanted.as_slice();
+        let places = self.jobs * RAYS_PER_JOB / READINGS as u32;
+        output.glances = Default::default();
+        for i in 0..RAYS_PER_JOB {
+            let reading = job * RAYS_PER_JOB + i;
+            let from = u64::from(reading / READINGS as u32) * wanted.len() as u64 / u64::from(places);
+            let mut all = wanted.iter().skip(from as usize).chain(wanted).map(|wanted| wanted.place);
+            let Some(place) = all.find(|place| place.is_seen) else { return };
+            let kind = if place.normal.is_some() { Kind::Irradiance } else { Kind::Multiple };
+            let Some(effort) = self.settings().effort(kind) else { continue };
+            let count = (effort.samples / WALKS).max(WALKS);
+            // The same for both halves, so that what differs between them is the photons.
+            let mut rng = Generator::new(mix(self.seed() ^ 0x_d0_0b_75) ^ u64::from(reading));
+            let looks = Looks { count, guide: None, learnt: None, to_eye: place.to_eye };
+            let mut estimate = Estimate { place, ..Estimate::default() };
+            if self.estimate(Step { kind, pass: Pass::Make }, world, looks, &mut estimate, &mut rng, output) {
+                output.glances[i as usize] = Glance::of(kind, estimate.sums.value);
+            }
+            output.higher.clear();
+        }
+    }
+
+    /// Goes on with the other half, or to more photons where both are too noisy.
+    pub(super) fn take_doubt(&mut self, is_second: bool) {
+        let photons = &mut self.memory.photons;
+        if !is_second {
+            photons.turn(-2.0);
+            self.enter(Round::Doubt { is_second: true }, self.jobs);
+            return;
+        }
+        photons.turn(1.0);
+        if let Some((effort, seed)) = self.caches.photon_effort() {
+            photons.finish(&effort, seed);
+        }
+        let variances = noise::of_halves(self.memory.glances.as_slice()).into_iter().zip(self.caches.shares);
+        let noise = libm::sqrt(variances.map(|(variance, share)| variance * share * share).sum()) as f32;
+        photons.tell(noise);
+        self.memory.glances.clear();
+        let settings = &mut self.caches.settings;
+        let more = presets::more_photons(noise, settings.error);
+        let Some((more, effort)) = more.zip(settings.photons.as_mut()) else { return self.begin(self.step + 1) };
+        *effort = effort.more(more);
+        self.are_more = true;
+        if let Some((effort, seed)) = self.caches.photon_effort() {
+            self.is_cut |= self.memory.photons.prepare(&effort, seed).is_err();
+        }
+        self.shoot_more();
+    }
+}
+
+#[cfg(all(test, feature = "alloc"))]
+mod tests {
+    use super::*;
+    use crate::cache::{Asked, PhotonEffort, RadianceCaches, Settings};
+    use crate::host::Empty;
+    use crate::light::{Light, PointLight};
+    use crate::math::{Bounds, Ray, Vec3};
+    use crate::medium::{Homogeneous, Placed, Region};
+    use crate::phase::Phase;
+    use crate::spectrum::Spectrum;
+    use crate::work::finish;
+    use crate::world::Outline;
+
+    #[test]
+    fn as_many_photons_are_shot_as_their_noise_asks_for() {
+        let fog = Homogeneous::new(Spectrum::splat(0.1), Spectrum::splat(3.9), Phase::ISOTROPIC).unwrap();
+        let ball = Placed::new(fog, Region::sphere(Vec3::ZERO, 1.0).unwrap());
+        let lamps = [Light::Point(PointLight::from_flux(Vec3::Y * 0.5, Spectrum::ONE).unwrap())];
+        let world = World { medium: &ball, scene: &Empty, lights: (&lamps).into() };
+        let outline = Outline::of(&world, Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE });
+        let eye = |at: [f32; 2]| Ray::new(3.0 * Vec3::Z, Vec3::new(at[0] - 0.5, at[1] - 0.5, -2.0).normalize());
+        let settings = |error: f32| {
+            let settings = Settings { rays: 2048, ..Settings::for_outline(&outline, 0.08).with_walks(512) };
+            // As many at first, and as many as it takes, whatever the error.
+            let photons =
+                PhotonEffort { cells: 6, enough: 400, paths: 1 << 23, flights: u64::MAX, ..settings.photons.unwrap() };
+            Settings { photons: Some(photons), error, ..settings }
+        };
+        let filled = |error: f32| {
+            let mut filling = RadianceCaches::new(settings(error)).fill(Asked::View { ray: eye, pixel: 0.02 });
+            finish(&mut filling, &world, &mut FilledRecords::default());
+            let told = filling.record_noise().unwrap();
+            let photons = &filling.memory.photons;
+            assert!(photons.noise() > 0.0 && told > photons.noise(), "{told}");
+            (photons.noise(), photons.paths())
+        };
+        let ((rough, few), (fine, many)) = (filled(0.16), filled(0.01));
+        assert!(presets::more_photons(fine, 0.01).is_none() && presets::more_photons(rough, 0.01).is_some(), "{fine}");
+        // Noise falls with the root of what they bring.
+        let expected = (rough / fine).powi(2) * few as f32;
+        assert!(many > 2 * few && (0.5..2.0).contains(&(many as f32 / expected)), "{few} {many} {rough} {fine}");
+    }
+
+    /// Another view finds photons that are good enough, and a finer level looks at them again.
+    #[test]
+    fn noise_that_is_known_is_not_told_again() {
+        let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::ONE, Phase::ISOTROPIC).unwrap();
+        let ball = Placed::new(fog, Region::sphere(Vec3::ZERO, 1.0).unwrap());
+        let lamps = [Light::Point(PointLight::from_flux(Vec3::Y * 0.5, Spectrum::ONE).unwrap())];
+        let world = World { medium: &ball, scene: &Empty, lights: (&lamps).into() };
+        let outline = Outline::of(&world, Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE });
+        let eye = |from: f32| {
+            move |at: [f32; 2]| Ray::new(from * Vec3::Z, Vec3::new(at[0] - 0.5, at[1] - 0.5, -0.5 * from).normalize())
+        };
+        let settings = |error: f32| Settings { rays: 512, ..Settings::for_outline(&outline, error).with_walks(16) };
+        let view = |from: f32| Asked::View { ray: eye(from), pixel: 0.02 };
+        let mut filling = RadianceCaches::new(settings(0.16)).fill(view(3.0));
+        let doubts = |filling: &mut Filling<'_, _>| {
+            let (mut output, mut count) = (FilledRecords::default(), 0);
+            loop {
+                let is_doubt = matches!(filling.round, Round::Doubt { is_second: true }) && filling.taken == 0;
+                count += u32::from(is_doubt);
+                if !crate::work::step(filling, &world, &mut output) {
+                    return count;
+                }
+            }
+        };
+        assert!(doubts(&mut filling) > 0);
+        let mut filling = filling.finish().fill(view(2.5));
+        assert_eq!(doubts(&mut filling), 0);
+        filling.refine(settings(0.08));
+        assert!(doubts(&mut filling) > 0);
+    }
+}
