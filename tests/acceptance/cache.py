@@ -16,7 +16,7 @@ accuracy     default settings: relRMSE_c <= 3 % (6 % in spot-shafts, nave-shafts
              no 16x16 block off by more than 5 %; --seed is 1 unless told. `ref` is the mean standard error of the
              reference's own blocks. The worst block (row, column) is told with its distance in the reference's own standard
              errors there; where all blocks beyond 5 % lie within 3 of them the line says `noise`, and the blocks still count.
-speed        CPU seconds to 2 % relRMSE_c, by the cheapest --error of LADDER that reaches it (the error is the root mean
+speed        CPU seconds to 2 % relRMSE_c, by the largest --error that reaches it, of LADDER and twice halfway back to the rung before (the error is the root mean
              square of three seeds; the audit's time counts), against path tracing and the peer, whose seconds to 2 % are
              c^2 / 0.02^2 of a run each of --samples. At least so many times faster than either as BOXES and SCENES say.
              At --sizes other than 128 those two take as many more seconds as there are more pixels, and the error of
@@ -49,6 +49,8 @@ CORNELL = [f"cornell-{medium}-{phase}" for medium in ("homog", "hetero") for pha
 
 # What --error is asked for; the cheapest first.
 LADDER = (0.03, 0.025, 0.02, 0.015, 0.01)
+# Rungs between the first that is good enough and the one before it: path tracing and the peer are told at the goal itself.
+HALVINGS = 2
 
 # How many times faster than path tracing and than the peer, by the size of the picture and, where not a box, by the scene.
 BOXES = {128: 100, 512: 400, 1024: 800}
@@ -102,15 +104,26 @@ def finely(truth, images):
 
 
 def climb(scene, truth, size, goal):
-    """The first rung whose error is at most `goal`; -> its CPU seconds or None"""
-    for rung in LADDER:
+    """The CPU seconds of the largest `--error` at which a picture is off by at most `goal`: of the ladder, then twice halfway back to the rung before; None if there is none"""
+    def seconds_at(rung):
         runs = [render(scene, *CACHED, "--error", rung, "--seed", seed, *size) for seed in (1, 2, 3)]
         squared = finely(truth, [image for image, _ in runs]) if size else np.mean([truth.relative_square(image) for image, _ in runs])
         seconds = np.mean([cpu(statistics, ["fill", "audit", "render"]) for _, statistics in runs])
-        print(f"    {' '.join(size)} --error {rung}: {100 * np.sqrt(max(squared, 0)):.2f} % in {seconds:.2f} CPU s", flush=True)
-        if squared <= goal**2:
-            return seconds
-    return None
+        print(f"    {' '.join(size)} --error {rung:.4g}: {100 * np.sqrt(max(squared, 0)):.2f} % in {seconds:.2f} CPU s", flush=True)
+        return seconds if squared <= goal**2 else None
+
+    before = None
+    for rung in LADDER:
+        if (seconds := seconds_at(rung)) is not None:
+            break
+        before = rung
+    for _ in range(HALVINGS if seconds is not None and before else 0):
+        halfway = np.sqrt(before * rung)
+        if (less := seconds_at(halfway)) is None:
+            before = halfway
+        else:
+            rung, seconds = halfway, less
+    return seconds
 
 
 def speed(scenes, arguments):
