@@ -65,7 +65,7 @@ const FEWEST: f64 = 24.0;
 /// Part of the error asked for that noise of photons may have in a picture. All records of a place share it: larger is clouds of noise, smaller is time.
 const PHOTON_NOISE: f64 = 0.5;
 
-/// The same where more photons are worth their time: their number is the square of what noise is to fall by.
+/// How many times as much noise must be told for more photons to be shot. Less: time for little; more: clouds of noise.
 const TOO_NOISY: f64 = 1.2;
 
 /// How many times as many photons are shot at once at most, as noise told of few is uncertain. Less: noise is told more often; more: photons that are not needed.
