@@ -59,8 +59,8 @@ const FLIGHTS: f64 = 6e7;
 /// more: time for photons that are not needed.
 const ENOUGH: u32 = 80;
 
-/// The same at least, of rough pictures, whose walks are few.
-const FEWEST: f64 = 24.0;
+/// The same at least, of rough pictures, whose walks are few. Fewer: cells where walks may not end, which make pictures too dark, for walks that then go on are few; more: time.
+const FEWEST: f64 = 48.0;
 
 /// Part of the error asked for that noise of photons may have in a picture. All records of a place share it: larger is clouds of noise, smaller is time.
 const PHOTON_NOISE: f64 = 0.5;

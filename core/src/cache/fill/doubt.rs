@@ -1,14 +1,17 @@
 //! Rounds in which light is estimated by one half of the photons, and by the other: how noisy they are, and how many more it takes.
 
 use super::{Filling, RAYS_PER_JOB, Round};
+use crate::cache::asked::Wanted;
 use crate::cache::guide::Looks;
 use crate::cache::kind::{Kind, Pass, Step};
+use crate::cache::lookup::Basis;
 use crate::cache::memory::{Estimate, FilledRecords};
 use crate::cache::noise::{self, Glance, READINGS};
 use crate::cache::presets;
 use crate::host::{Medium, Scene};
-use crate::sampling::Generator;
+use crate::math::Vec3;
 use crate::sampling::uniform::mix;
+use crate::sampling::{Generator, uniform};
 use crate::world::World;
 
 /// Readings by each half. Fewer: noise is told by chance; more: time.
@@ -31,7 +34,7 @@ impl<F> Filling<'_, F> {
         true
     }
 
-    /// Light that is scattered more than once, or falls on surfaces, at some of the places that eye rays ask for.
+    /// Light that is scattered more than once, or falls on surfaces, at two places of each of some eye rays.
     pub(super) fn doubt<M: Medium + ?Sized, S: Scene + ?Sized>(
         &self,
         job: u32,
@@ -44,17 +47,30 @@ impl<F> Filling<'_, F> {
         for i in 0..RAYS_PER_JOB {
             let reading = job * RAYS_PER_JOB + i;
             let from = u64::from(reading / READINGS as u32) * wanted.len() as u64 / u64::from(places);
-            let mut all = wanted.iter().skip(from as usize).chain(wanted).map(|wanted| wanted.place);
-            let Some(place) = all.find(|place| place.is_seen) else { return };
+            let mut all = wanted.iter().skip(from as usize).chain(wanted);
+            let Some(first) = all.find(|wanted| wanted.place.is_seen) else { return };
+            // The same for both halves, so that what differs between them is the photons.
+            let mut rng = Generator::new(mix(self.seed() ^ 0x_d0_0b_75) ^ u64::from(reading));
+            // What two places of a ray share its pixel shows; the rest it averages.
+            let [start, end] = [first.ray, first.ray + 1].map(|ray| wanted.partition_point(|wanted| wanted.ray < ray));
+            let of_ray = &wanted[start..end];
+            let other = (uniform(&mut rng) * of_ray.len() as f32) as usize;
+            let is_alike =
+                |other: &&Wanted| other.place.is_seen && other.place.normal.is_some() == first.place.normal.is_some();
+            let found = of_ray.iter().skip(other).chain(of_ray).find(is_alike).filter(|_| reading % 2 > 0);
+            let place = found.unwrap_or(first).place;
             let kind = if place.normal.is_some() { Kind::Irradiance } else { Kind::Multiple };
             let Some(effort) = self.settings().effort(kind) else { continue };
             let count = (effort.samples / WALKS).max(WALKS);
-            // The same for both halves, so that what differs between them is the photons.
-            let mut rng = Generator::new(mix(self.seed() ^ 0x_d0_0b_75) ^ u64::from(reading));
             let looks = Looks { count, guide: None, learnt: None, to_eye: place.to_eye };
             let mut estimate = Estimate { place, ..Estimate::default() };
             if self.estimate(Step { kind, pass: Pass::Make }, world, looks, &mut estimate, &mut rng, output) {
-                output.glances[i as usize] = Glance::of(kind, estimate.sums.value);
+                // Of what is scattered sharply most is seen by an eye, and it is noisier than the mean over directions.
+                let to_eye = place.to_eye.filter(|_| !kind.is_on_surfaces());
+                let degree = if to_eye.is_some() { self.caches.slots[kind].degree() } else { 0 };
+                let basis = Basis::new(to_eye.unwrap_or(Vec3::Z), degree);
+                let seen = basis.expanded(estimate.sums.value, output.higher.as_slice());
+                output.glances[i as usize] = Glance::of(kind, seen);
             }
             output.higher.clear();
         }
@@ -94,7 +110,7 @@ mod tests {
     use crate::cache::{Asked, PhotonEffort, RadianceCaches, Settings};
     use crate::host::Empty;
     use crate::light::{Light, PointLight};
-    use crate::math::{Bounds, Ray, Vec3};
+    use crate::math::{Bounds, Ray};
     use crate::medium::{Homogeneous, Placed, Region};
     use crate::phase::Phase;
     use crate::spectrum::Spectrum;
