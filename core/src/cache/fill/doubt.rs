@@ -57,7 +57,12 @@ impl<F> Filling<'_, F> {
             let other = (uniform(&mut rng) * of_ray.len() as f32) as usize;
             let is_alike =
                 |other: &&Wanted| other.place.is_seen && other.place.normal.is_some() == first.place.normal.is_some();
-            let found = of_ray.iter().skip(other).chain(of_ray).find(is_alike).filter(|_| reading % 2 > 0);
+            let found = of_ray
+                .iter()
+                .skip(other)
+                .chain(of_ray)
+                .find(is_alike)
+                .filter(|_| !reading.is_multiple_of(READINGS as u32));
             let place = found.unwrap_or(first).place;
             let kind = if place.normal.is_some() { Kind::Irradiance } else { Kind::Multiple };
             let Some(effort) = self.settings().effort(kind) else { continue };
