@@ -276,8 +276,8 @@ fn what_is_broken_in_records_is_repaired() {
     assert_eq!(verdict(Some(Broken::Walks), 1), [true, true, true, false]);
 }
 
-/// At the edge of a cloud in the open light bends within a part of a free path. Sixteen of them, under an even sky: 1.6 ± 0.1 % too dark, and
-/// more in the middle, unless pilots say how far records may reach: 0.8 ± 0.1 %. Means of four seeds, as one has 0.25 % by chance.
+/// At the edge of a cloud in the open light bends within a part of a free path. Fifteen of them, under an even sky: 1.7 ± 0.1 % too dark, and
+/// more in the middle, unless pilots say how far records may reach: 0.6 ± 0.1 %. Means of four seeds, as one has 0.25 % by chance.
 #[test]
 fn pilots_know_how_light_falls_off_in_a_cloud_in_the_open() {
     const SEEDS: u64 = 4;
@@ -285,7 +285,7 @@ fn pilots_know_how_light_falls_off_in_a_cloud_in_the_open() {
     let found = |error: f32| {
         let sums = (0..SEEDS).fold([0.0; 2], |[bias, square], seed| {
             let change = |settings: Settings| Settings { error, seed, ..settings.with_walks(512) };
-            let found = repaired([0.7, 6.3], (&sky, COMPARED), change, |_| {}, 0).0.cached;
+            let found = repaired([0.75, 6.75], (&sky, COMPARED), change, |_| {}, 0).0.cached;
             [bias + found.bias, square + found.error * found.error]
         });
         Deviation { bias: sums[0] / SEEDS as f64, error: sums[1].sqrt() / SEEDS as f64 }
