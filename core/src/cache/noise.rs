@@ -78,7 +78,7 @@ pub(super) fn dark(glances: &[Glance]) -> f64 {
     if glances.is_empty() { 0.0 } else { DARK * sum / glances.len() as f64 }
 }
 
-/// Relative variance of what photons tell of each kind, in the order of [`Kind::FINAL`]: of [`READINGS`] at each place by one half of them, and after all these as many by the other.
+/// Relative variance of what photons tell of each kind, in the order of [`Kind::FINAL`]: of [`READINGS`] along each ray by one half of them, each at a place of its own, and after all these as many by the other.
 ///
 /// ```text
 /// E[(A₁ − B₁)(A₂ − B₂) | photons] = (E[A − B | photons])² = 4 V((A + B)/2)   in the mean over photons

@@ -420,10 +420,10 @@ impl<'s> PhotonGrid<'s> {
         }
     }
 
-    /// Whether no surface cuts a cell, seen from where a photon came by; of cells that none did, `false`.
+    /// Whether no surface cuts a cell, seen from where a photon came by; of cells that none did, and of those of which it is known, `false`.
     pub(super) fn is_whole<S: Scene + ?Sized>(&self, number: u32, scene: &S) -> bool {
-        let is_known = |cell: &&PhotonCell| cell.is_lit && cell.paths >= LEAST_PATHS;
-        let Some(cell) = self.cells.as_slice().get(number as usize).filter(is_known) else {
+        let is_open = |cell: &&PhotonCell| cell.is_lit && cell.paths >= LEAST_PATHS && !cell.is_whole;
+        let Some(cell) = self.cells.as_slice().get(number as usize).filter(is_open) else {
             return false;
         };
         let [nx, ny, _] = self.counts;
@@ -508,7 +508,7 @@ impl<'s> PhotonGrid<'s> {
             (0..=self.degree).map(of).sum::<Spectrum>() * scale(paths)
         };
         let here = light(cell);
-        let (cell, paths) = cell;
+        let (cell, own) = (cell.0, scale(cell.1));
         let mut gradient = Gradient::ZERO;
         let mut radiance = here;
         let middle = self.first + (Vec3::from(index.map(|i| i as f32)) + Vec3::splat(0.5)) * self.side;
@@ -528,8 +528,7 @@ impl<'s> PhotonGrid<'s> {
             radiance += slope * (point[axis] - middle[axis]);
         }
         let turned = (1..=self.degree).fold(Gradient::ZERO, |sum, l| {
-            of_degree(l)
-                .fold(sum, |sum, k| sum + Gradient::outer(cell[k] * (moments[l] * scale(paths)), basis.slope(k)))
+            of_degree(l).fold(sum, |sum, k| sum + Gradient::outer(cell[k] * (moments[l] * own), basis.slope(k)))
         });
         Some((Contribution { radiance, gradient }, turned))
     }

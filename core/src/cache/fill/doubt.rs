@@ -17,7 +17,7 @@ use crate::world::World;
 /// Readings by each half. Fewer: noise is told by chance; more: time.
 const DOUBTS: u32 = 1024;
 
-/// Walks of one reading, as a share of those of a record, and at least. As above.
+/// A reading has the walks of a record over this, and this many at least. As above, by the square.
 const WALKS: u32 = 8;
 
 impl<F> Filling<'_, F> {
@@ -42,11 +42,11 @@ impl<F> Filling<'_, F> {
         output: &mut FilledRecords<'_>,
     ) {
         let wanted = self.memory.wanted.as_slice();
-        let places = self.jobs * RAYS_PER_JOB / READINGS as u32;
+        let rays = self.jobs * RAYS_PER_JOB / READINGS as u32;
         output.glances = Default::default();
         for i in 0..RAYS_PER_JOB {
             let reading = job * RAYS_PER_JOB + i;
-            let from = u64::from(reading / READINGS as u32) * wanted.len() as u64 / u64::from(places);
+            let from = u64::from(reading / READINGS as u32) * wanted.len() as u64 / u64::from(rays);
             let mut all = wanted.iter().skip(from as usize).chain(wanted);
             let Some(first) = all.find(|wanted| wanted.place.is_seen) else { return };
             // The same for both halves, so that what differs between them is the photons.
