@@ -4,7 +4,7 @@ use glam::{Vec2, Vec3};
 
 use super::aim::Aims;
 use super::connect::Connection;
-use super::evidence::{Halves, Openings};
+use super::evidence::Openings;
 use super::guide::Looks;
 use super::lobe::{self, Lobe, coefficients_of};
 use super::lookup::Reading;
@@ -226,8 +226,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
         let eye = to_eye.filter(|_| !phase.is_isotropic()).map(|to_eye| (to_eye, phase));
         let mixture = Mixture { aims, eye, guide, count, shift };
         self.expanded(phase, higher, to_eye.map(|eye| (eye, MULTIPLE_POWER)), |into, towards| {
-            let (mut cones, mut halves) = (Cones::default(), Halves::default());
-            let mut seen = Cones::default();
+            let (mut cones, mut seen) = (Cones::default(), Cones::default());
             for j in 0..count {
                 let (to_light, pdf) = mixture.direction(j, &warp::uniform_sphere, &|_| warp::uniform_sphere_pdf());
                 let ray = Ray::new(point, to_light);
@@ -240,16 +239,12 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
                 }
                 let mean = incoming.scatter_directional(into.moments, 1.0, into.coefficients);
                 cones.add(to_light, &mean);
-                match eye {
-                    None => halves.add(mixture.half(j), &mean.gradient),
-                    Some((to_eye, phase)) => {
-                        let light = towards.add(&incoming, phase).unwrap_or_else(|| incoming.scatter(to_eye, phase));
-                        seen.add(to_light, &light);
-                        halves.add(mixture.half(j), &light.gradient);
-                    }
+                if let Some((to_eye, phase)) = eye {
+                    let light = towards.add(&incoming, phase).unwrap_or_else(|| incoming.scatter(to_eye, phase));
+                    seen.add(to_light, &light);
                 }
             }
-            let (mut sums, trust) = (cones.sums(), halves.trust());
+            let mut sums = cones.sums();
             if eye.is_none() {
                 // Expansions change faster than their mean over directions.
                 let faster = phase.mean_cosine().map(|g| 1.0 / (1.0 - g.abs()).max(LEAST_BREADTH));
@@ -262,9 +257,6 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
                 (sums.gradient_norms, sums.unshadowed_gradient_norms) =
                     (seen.gradient_norms * scale, seen.unshadowed_gradient_norms * scale);
             }
-            sums.gradient = sums.gradient * trust;
-            into.coefficients.iter_mut().for_each(|c| c.gradient = c.gradient * trust);
-            towards.light.gradient = towards.light.gradient * trust;
             sums
         })
     }
@@ -305,7 +297,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
     ) -> (Sums, Facing) {
         let Looks { count, guide, mut learnt, .. } = paths.into();
         let (mut sums, mut scattered, mut turn) = (Sums::default(), Cones::default(), Gradient::ZERO);
-        let (mut halves, mut openings) = (Halves::default(), Openings::default());
+        let mut openings = Openings::default();
         let mut child = Generator::child(rng);
         let (frame, walk, shift, offset) = (Frame::around(normal), self.walker(), uniform2(rng), uniform(rng));
         let share = 1.0 / count.max(1) as f32;
@@ -346,12 +338,10 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
             if let Some(learnt) = &mut learnt {
                 learnt.add(to_light, total.radiance.mean() * count as f32, pdf, count);
             }
-            halves.add(mixture.half(j), &total.gradient);
             turn += Gradient::outer(total.radiance, to_light / cosine.max(MIN_COSINE));
         }
         sums.add_norm(openings.norm());
         sums.merge(&scattered.sums());
-        sums.gradient = sums.gradient * halves.trust();
         (sums, Facing { normal, turn })
     }
 

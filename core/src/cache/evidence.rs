@@ -1,8 +1,7 @@
-//! What an estimate's samples tell together and no single one knows: how far its gradient can be believed, and
-//! where the edges of the sky are.
+//! What an estimate's samples tell together and no single one knows: where the edges of the sky are.
 
 use crate::host::Hit;
-use crate::spectrum::{Gradient, Spectrum};
+use crate::spectrum::Spectrum;
 
 /// Distance (m) at which surfaces before a sky count if they are nearer.
 const NEAREST: f32 = 1e-12;
@@ -40,39 +39,6 @@ impl Openings {
     /// `Σ‖∇L_j‖` over the directions to the sky: a surface that is faced at the harmonic mean distance has `2L/r`.
     pub(super) fn norm(&self) -> Spectrum {
         if self.met > 0.0 { self.sky * (2.0 * self.near / self.met) } else { Spectrum::ZERO }
-    }
-}
-
-/// How far an estimated gradient can be believed: as far as two halves of its samples agree.
-///
-/// ```text
-/// t = g₁·g₂ / ‖(g₁ + g₂)/2‖², in [0, 1], per channel
-/// ```
-///
-/// The product is an unbiased estimate of the true square, the norm is too large by the noise.
-/// Unbelieved, noise in gradients would brighten whatever is extrapolated with them, because
-/// the exponential of noise is more than 1 in the mean.
-#[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Halves([Gradient; 2]);
-
-impl Halves {
-    /// Adds the gradient of a sample of the first half or the second: 0 or 1.
-    #[inline]
-    pub(super) fn add(&mut self, half: usize, gradient: &Gradient) {
-        self.0[half] += *gradient;
-    }
-
-    pub(super) fn trust(&self) -> Spectrum {
-        let [a, b] = self.0;
-        // Scaled, so that squares stay in the range of f32.
-        let largest = a.norm().max(b.norm());
-        let dot = |a: &Gradient, b: &Gradient| {
-            let part = |a: Spectrum, b: Spectrum| a.ratio(largest) * b.ratio(largest);
-            part(a.x, b.x) + part(a.y, b.y) + part(a.z, b.z)
-        };
-        let sum = a + b;
-        let square = dot(&sum, &sum) * 0.25;
-        dot(&a, &b).zip(square, |ab, ss| if ss > 0.0 { (ab / ss).clamp(0.0, 1.0) } else { 0.0 })
     }
 }
 

@@ -15,7 +15,7 @@ pub enum Extrapolation {
     Curved,
     /// `L e^{∇L·Δ/L}`, mixed by a weighted geometric mean: exact where light falls off
     /// exponentially, never negative (Eq. 35). A geometric mean of noise is darker than the truth
-    /// by half its variance.
+    /// by half its variance, and what is carried by noisy gradients is brighter.
     Exponential,
     /// `L + ∇L·Δ`, mixed by a weighted mean.
     Linear,

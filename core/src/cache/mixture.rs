@@ -30,12 +30,6 @@ impl Mixture<'_> {
         1 + u32::from(!self.aims.is_empty()) + u32::from(self.eye.is_some()) + u32::from(self.guide.is_some())
     }
 
-    /// Which half of the samples one belongs to: each has as many of every density.
-    pub(super) fn half(&self, j: u32) -> usize {
-        let neighbours = if self.parts() == 4 { j >> 2 } else { j >> 1 };
-        (neighbours & 1) as usize
-    }
-
     /// Direction `j` with the density (sr⁻¹) of the mixture.
     pub(super) fn direction(&self, j: u32, sample: &dyn Fn(Vec2) -> Vec3, pdf: &dyn Fn(Vec3) -> f32) -> (Vec3, f32) {
         let (has_aims, parts) = (!self.aims.is_empty(), self.parts());

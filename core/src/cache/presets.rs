@@ -13,14 +13,17 @@ use crate::sh;
 use crate::transmittance::thickness::Steps;
 use crate::world::Outline;
 
-/// Random walks of each of the two estimates of a record of multiple scattering. The error that noise leaves in a picture falls with the
-/// root of it, and time goes with it.
-pub(super) const WALKS: u32 = 512;
+/// Random walks of each of the first two estimates of a record of multiple scattering. More: time where records are many, whose noise a picture averages; fewer: radii and
+/// guides are noise. What noise they leave in a picture further estimates take away.
+pub(super) const WALKS: u32 = 128;
 
 /// Directions of the other kinds, as a share of [`WALKS`]. Light of surfaces varies least from direction to direction; of single
 /// scattering only lights with extent need any.
 const SHARES: [(Kind, f64); 4] =
-    [(Kind::Single, 1.0 / 64.0), (Kind::Surface, 0.25), (Kind::Multiple, 1.0), (Kind::Irradiance, 0.75)];
+    [(Kind::Single, 1.0 / 16.0), (Kind::Surface, 1.0), (Kind::Multiple, 1.0), (Kind::Irradiance, 3.0)];
+
+/// Samples of any kind at least: of fewer, one decides how far a record reaches.
+pub(super) const LEAST_SAMPLES: u32 = 16;
 
 /// `ε` of Eq. 34 for single scattering, light of surfaces, multiple scattering, and irradiance. Larger: borders of shadows blur, corners turn too
 /// bright, light that falls off like 1/r is carried too far. Smaller: records, and time, by the square.
@@ -124,7 +127,7 @@ pub(super) const BLIND: f64 = 2.0;
 pub(super) const SMOOTHED: f64 = 0.7;
 
 /// How often records are estimated once more at most. More: time; fewer: noise where light is hard to find.
-pub(super) const MOST_ROUNDS: u32 = 8;
+pub(super) const MOST_ROUNDS: u32 = 32;
 
 /// Part of the noise of a picture by which it falls at least, over the part by which work grows. Less: long fills for little; more: noise.
 pub(super) const PAYS: f64 = 0.5;
@@ -332,7 +335,7 @@ impl Settings {
         Self { single: Some(single), ..self }
     }
 
-    /// With so many walks for each record of multiple scattering, and samples of the others in proportion.
+    /// With so many walks for each of the first two estimates of a record of multiple scattering, and samples of the others in proportion; at least 16 each.
     #[must_use]
     pub fn with_walks(mut self, walks: u32) -> Self {
         for (kind, _) in SHARES {
@@ -394,7 +397,7 @@ fn photons(outline: &Outline, scale: f32) -> PhotonEffort {
 /// Samples of a kind, for so many walks of multiple scattering.
 fn samples(kind: Kind, walks: u32) -> u32 {
     let share = SHARES.iter().find(|(k, _)| *k == kind).map_or(1.0, |(_, share)| *share);
-    ((f64::from(walks) * share) as u32).max(1)
+    ((f64::from(walks) * share) as u32).max(LEAST_SAMPLES)
 }
 
 /// The least degree beyond which an expansion holds less than `left_out` of the energy of the phase function, applied

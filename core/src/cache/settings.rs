@@ -36,7 +36,7 @@ pub struct Effort {
 impl Effort {
     /// For records that serve the making of others: tolerance and reach towards surfaces times a factor each, samples divided by a number.
     fn coarser(self, [tolerance, clearance]: [f32; 2], fewer: u32) -> Self {
-        let samples = (self.samples / fewer).max(16);
+        let samples = (self.samples / fewer).max(presets::LEAST_SAMPLES);
         Self { tolerance: tolerance * self.tolerance, clearance: clearance * self.clearance, samples, ..self }
     }
 
@@ -56,7 +56,11 @@ impl Effort {
     fn rougher(self, factor: f32) -> Self {
         if factor > 1.0 {
             let samples = (self.samples as f32 / (factor * factor)) as u32;
-            Self { tolerance: self.tolerance * float::sqrt(factor), samples: samples.max(16).min(self.samples), ..self }
+            Self {
+                tolerance: self.tolerance * float::sqrt(factor),
+                samples: samples.max(presets::LEAST_SAMPLES).min(self.samples),
+                ..self
+            }
         } else {
             self
         }

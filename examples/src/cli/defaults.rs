@@ -51,7 +51,7 @@ mod tests {
             ("grid_paths", "[default: 100000, for kernels of photon beams 10000]"),
             ("step_length", "[default: 1/32 of the scene's diagonal, with covariances 1/8]"),
             ("image_share", "[from 0.05 to 1]"),
-            ("paths", "[default: 512]"),
+            ("paths", "[default: 128]"),
             ("noise", "[at least 8 samples, without --spp at most 65536]"),
         ];
         for (id, end) in due {

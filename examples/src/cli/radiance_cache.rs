@@ -59,7 +59,7 @@ pub struct CacheArguments {
     /// Error tolerance of one cache, as CACHE=E; may be repeated.
     #[arg(long, value_name = "CACHE=E", value_parser = named)]
     pub tolerance_of: Vec<(Kind, f64)>,
-    /// Random walks of each of the two estimates of a record of multiple scattering, fewer where it reaches less far
+    /// Random walks of each of the first two estimates of a record of multiple scattering, at least 16, fewer where it reaches less far
     /// than others, in the second up to eight times as many where they differ much or are bright; the other caches in proportion.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     pub paths: Option<u32>,

@@ -6,6 +6,7 @@ use crate::cache::guide::{Guide, Guided, Looks};
 use crate::cache::kind::{Kind, Pass, Step};
 use crate::cache::memory::{Estimate, FilledRecords, FillingMemory};
 use crate::cache::noise::{DARK, regions_in};
+use crate::cache::presets::LEAST_SAMPLES;
 use crate::cache::radius::Limits;
 use crate::cache::slot::learnt_near;
 use crate::cache::{Effort, Record};
@@ -29,9 +30,6 @@ pub(in crate::cache) const MOST_PARTS: usize = MOST_SAMPLES as usize;
 
 /// Records of which nothing usual can be said.
 const FEW: usize = 64;
-
-/// Samples of any estimate at least.
-const LEAST_SAMPLES: u32 = 16;
 
 /// Share of the samples of a record that is hardly seen at all. Less: it is too noisy to tell how far it reaches.
 const LEAST_SEEN: f32 = 0.0625;
