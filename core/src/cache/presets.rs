@@ -285,7 +285,7 @@ impl Settings {
         };
         let effort = |kind: Kind, tolerance: f32, degree: usize, most: f32, clearance: f32| Effort {
             tolerance: tolerance * coarser,
-            samples: samples(kind, walks),
+            samples: samples(kind, walks).max(LEAST_SAMPLES),
             degree,
             limits: Limits { min: LEAST_REACH * size, max: most * size },
             clearance,
@@ -335,7 +335,7 @@ impl Settings {
         Self { single: Some(single), ..self }
     }
 
-    /// With so many walks for each of the first two estimates of a record of multiple scattering, and samples of the others in proportion; at least 16 each.
+    /// With so many walks for each of the first two estimates of a record of multiple scattering, and samples of the others in proportion; a record has 16 at least.
     #[must_use]
     pub fn with_walks(mut self, walks: u32) -> Self {
         for (kind, _) in SHARES {
@@ -397,7 +397,7 @@ fn photons(outline: &Outline, scale: f32) -> PhotonEffort {
 /// Samples of a kind, for so many walks of multiple scattering.
 fn samples(kind: Kind, walks: u32) -> u32 {
     let share = SHARES.iter().find(|(k, _)| *k == kind).map_or(1.0, |(_, share)| *share);
-    ((f64::from(walks) * share) as u32).max(LEAST_SAMPLES)
+    ((f64::from(walks) * share) as u32).max(1)
 }
 
 /// The least degree beyond which an expansion holds less than `left_out` of the energy of the phase function, applied
