@@ -17,7 +17,7 @@ use crate::world::World;
 /// Readings by each half. Fewer: noise is told by chance; more: time.
 const DOUBTS: u32 = 1024;
 
-/// Walks of a reading at least; it has half as many as an estimate of a record of multiple scattering. As above, by the square.
+/// Walks of a reading at least; it has half as many as an estimate of a record of multiple scattering, or where that is not cached of its own kind. As above, by the square.
 const WALKS: u32 = 8;
 
 impl<F> Filling<'_, F> {
@@ -65,8 +65,8 @@ impl<F> Filling<'_, F> {
                 .filter(|_| !reading.is_multiple_of(READINGS as u32));
             let place = found.unwrap_or(first).place;
             let kind = if place.normal.is_some() { Kind::Irradiance } else { Kind::Multiple };
-            let Some(effort) = self.settings().effort(Kind::Multiple) else { continue };
-            let count = (effort.samples / 2).max(WALKS);
+            let Some(effort) = self.settings().effort(kind) else { continue };
+            let count = (self.settings().effort(Kind::Multiple).unwrap_or(effort).samples / 2).max(WALKS);
             let looks = Looks { count, guide: None, learnt: None, to_eye: place.to_eye };
             let mut estimate = Estimate { place, ..Estimate::default() };
             if self.estimate(Step { kind, pass: Pass::Make }, world, looks, &mut estimate, &mut rng, output) {
