@@ -143,6 +143,16 @@ impl<'s> Slot<'s> {
         }
     }
 
+    /// Calls `visit(number)` for the records that reach `point`, or would if they reached twice as far.
+    pub(super) fn visit_wide(&self, point: Vec3, mut visit: impl FnMut(usize)) {
+        let mut each = |number: u32, _: &Record, _| visit(number as usize);
+        match self {
+            Self::Off => {}
+            Self::Volume(cache) => cache.visit_wide(point, &mut each),
+            Self::Surface(cache) => cache.visit_wide(point, &mut each),
+        }
+    }
+
     /// What [`Slot::insert`] has done.
     pub(super) fn insert(&mut self, record: Record, attached: Attached<'_>) -> Inserted {
         let result = match (self, attached) {
@@ -271,7 +281,7 @@ impl<T> core::ops::IndexMut<Kind> for ByKind<T> {
     }
 }
 
-/// Guides of the records from a number on: those made or estimated anew by the fill at hand.
+/// Guides of the records from a number on, those made or estimated anew by the fill at hand, that reach a point: the nearer, the more they count.
 pub(super) fn learnt_near(slot: &Slot<'_>, guides: &[Guide], from: usize, point: Vec3) -> Guide {
     let mut around = Guide::default();
     slot.visit(point, |number, weight| {
@@ -280,4 +290,49 @@ pub(super) fn learnt_near(slot: &Slot<'_>, guides: &[Guide], from: usize, point:
         }
     });
     around
+}
+
+/// As [`learnt_near`] of those within twice their radius, which count alike.
+///
+/// A record that is estimated once more because of what it has met itself is made darker by it, if that was bright; one that missed it stays as dark
+/// as it is. So all that might have met it are asked together.
+pub(super) fn learnt_around(slot: &Slot<'_>, guides: &[Guide], from: usize, point: Vec3) -> Guide {
+    let mut around = Guide::default();
+    slot.visit_wide(point, |number| {
+        if let Some(guide) = number.checked_sub(from).and_then(|i| guides.get(i)) {
+            around.merge(guide, 1.0);
+        }
+    });
+    around
+}
+
+#[cfg(all(test, feature = "alloc"))]
+mod tests {
+    use super::*;
+
+    /// What one of two records within reach of each other has met is told of both as well, wherever it lies; one far off knows nothing of it.
+    #[test]
+    fn those_that_might_have_met_the_same_are_asked_together() {
+        let mut cache: SurfaceCache = Cache::growing(1);
+        let floor = Facing { normal: Vec3::Z, ..Facing::default() };
+        let positions = [0.0, 0.15, 5.0].map(|x| Vec3::X * x);
+        for position in positions {
+            let record = Record { position, radius: 0.1, value: Spectrum::ONE, ..Record::default() };
+            cache.insert(record, &[floor]).unwrap();
+        }
+        cache.finish().unwrap();
+        let slot = Slot::Surface(cache);
+        let mut guides = [Guide::default(); 3];
+        for guide in &mut guides {
+            (0..16).for_each(|_| guide.add(Vec3::Z, 1.0, 0.1, 16));
+        }
+        guides[0].add(Vec3::X, 400.0, 0.1, 16);
+        let varies = |learnt: fn(&Slot<'_>, &[Guide], usize, Vec3) -> Guide| {
+            positions.map(|position| learnt(&slot, &guides, 0, position).relative_variance())
+        };
+        let [here, beside, far] = varies(learnt_around);
+        assert!(here > 5.0 && here == beside && far == 0.0, "{here} {beside} {far}");
+        let [alone, untouched, _] = varies(learnt_near);
+        assert!(alone > 5.0 && untouched == 0.0, "{alone} {untouched}");
+    }
 }

@@ -8,7 +8,7 @@ use crate::cache::memory::{Estimate, FilledRecords, FillingMemory};
 use crate::cache::noise::{DARK, regions_in};
 use crate::cache::presets::LEAST_SAMPLES;
 use crate::cache::radius::Limits;
-use crate::cache::slot::learnt_near;
+use crate::cache::slot::{learnt_around, learnt_near};
 use crate::cache::{Effort, Record};
 use crate::host::{Medium, Scene};
 use crate::math::{Vec3, float};
@@ -42,7 +42,7 @@ const BRIGHTEST: f32 = 3.0;
 /// of the first ones had foretold. Less: time for chance; more: single records that a rare sample makes far too bright.
 const DOUBT: f32 = 2.0;
 
-/// The same of records on which all others stand. Less: all light is too dark, as what was too dark by chance is not looked at again; more: single ones light all fog around them.
+/// The same of records on which all others stand, by what all around them have met. Less: time; more: single ones light all fog around them.
 const DOUBT_OF_GROUND: f32 = 4.0;
 
 /// Brightness (over that of usual records) below which noise counts as if a record were that bright, as a picture's does. Larger: noise in dark parts; smaller: time
@@ -142,7 +142,10 @@ impl<F> Filling<'_, F> {
     fn anew(&self, (step, effort): (Step, Effort), number: usize, offset: usize) -> Option<(Guide, f32, u32)> {
         let (slot, guides) = (&self.caches.slots[step.kind], self.memory.guides[step.kind].as_slice());
         let record = slot.records().get(number)?;
-        let around = learnt_near(slot, guides, self.before[step.kind], record.position);
+        // Doubt of what all else stands on must make nothing darker in the mean.
+        let are_alike = step.kind.row().is_ground && matches!(step.pass, Pass::More { .. });
+        let learnt = if are_alike { learnt_around } else { learnt_near };
+        let around = learnt(slot, guides, self.before[step.kind], record.position);
         // What varies as a whole decides how a picture looks where it is dark, what it varies by how far off the picture is.
         let varies = around.relative_variance() / step.kind.row().spread;
         let brightness = record.value.mean() / self.bright;
