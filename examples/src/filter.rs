@@ -139,11 +139,42 @@ impl FilterTable {
         (Vec2::new(x, y), of_x * of_y)
     }
 
-    fn along(&self, pixel: u32, size: u32, random: f32) -> (f32, f32) {
+    /// Its radius (pixels).
+    #[must_use]
+    pub fn radius(&self) -> f32 {
+        if self.is_box { 0.5 } else { self.half as f32 / STEPS as f32 }
+    }
+
+    /// For which random numbers [`FilterTable::sample`] finds a point of the film (pixels); `None` if it never does.
+    #[must_use]
+    pub fn within(&self, pixel: [u32; 2], size: [u32; 2], at: Vec2) -> Option<Vec2> {
+        let along = |pixel: u32, size: u32, at: f32| {
+            if self.is_box {
+                return at - pixel as f32;
+            }
+            let (first, last) = self.cut(pixel, size);
+            let steps = (f64::from(at) - f64::from(pixel) - 0.5) * STEPS as f64 + self.half as f64;
+            // Casts saturate, and take NaN to 0.
+            let step = (steps as usize).clamp(first, last - 1);
+            let (low, high) = (self.sums[first][0], self.sums[last][0]);
+            let (before, after) = (self.sums[step][0], self.sums[step + 1][0]);
+            let sum = before + (steps - step as f64) * (after - before);
+            ((sum - low) / (high - low)) as f32
+        };
+        let found = Vec2::new(along(pixel[0], size[0], at.x), along(pixel[1], size[1], at.y));
+        (found.cmpge(Vec2::ZERO).all() && found.cmplt(Vec2::ONE).all()).then_some(found)
+    }
+
+    /// The first step of a pixel's filter that lies on the film, and the first beyond.
+    fn cut(&self, pixel: u32, size: u32) -> (usize, usize) {
         // Steps from the centre of the pixel to both borders of the film.
         let to_low = pixel as usize * STEPS + STEPS / 2;
         let to_high = (size - pixel) as usize * STEPS - STEPS / 2;
-        let (first, last) = (self.half - to_low.min(self.half), self.half + to_high.min(self.half));
+        (self.half - to_low.min(self.half), self.half + to_high.min(self.half))
+    }
+
+    fn along(&self, pixel: u32, size: u32, random: f32) -> (f32, f32) {
+        let (first, last) = self.cut(pixel, size);
         let (low, high) = (self.sums[first], self.sums[last]);
         let wanted = low[0] + f64::from(random) * (high[0] - low[0]);
         // The step whose share of the sum holds the number: never one without a share.
@@ -239,6 +270,23 @@ mod tests {
                 for (mean, due) in means.iter().zip(due) {
                     assert!((mean - due).abs() < 2e-3, "{filter:?} at {pixel}: {means:?} and not {due:?}");
                 }
+            }
+        }
+    }
+
+    #[test]
+    fn points_of_the_film_are_found_again() {
+        let size = [7, 5];
+        for filter in ALL.into_iter().chain([Filter::PIXEL]) {
+            let table = FilterTable::new(filter);
+            for pixel in [[0, 0], [3, 2], [6, 4]] {
+                for random in [Vec2::new(0.1, 0.9), Vec2::splat(0.5), Vec2::new(0.999, 0.3)] {
+                    let found = table.within(pixel, size, table.sample(pixel, size, random).0).unwrap();
+                    assert!((found - random).abs().max_element() < 1e-3, "{filter:?} {pixel:?}: {random} {found}");
+                }
+                let beyond = Vec2::splat(2.0 * table.radius() + 9.0);
+                assert_eq!(table.within(pixel, size, beyond), None);
+                assert_eq!(table.within(pixel, size, Vec2::splat(f32::NAN)), None);
             }
         }
     }

@@ -28,6 +28,7 @@ pub mod derivatives;
 pub mod error;
 pub mod figures;
 pub mod filter;
+pub mod glare;
 pub mod mesh;
 pub mod picture;
 pub mod plume;

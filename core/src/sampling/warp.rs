@@ -185,3 +185,88 @@ pub fn uniform_triangle(u: Vec2) -> Vec2 {
         Vec2::new(u.x - y, y)
     }
 }
+
+/// Reach of the discs of [`steep_square`], over the side of the square. Larger: points that fall outside it; smaller: less is drawn to a centre than
+/// rises towards it.
+const STEEP: f32 = 0.5;
+
+/// A point for which one of the unit square stands, and one over its density, at most 2: half of the points are uniform, the others lie within half a side of one of
+/// the `centres`, each as often, uniform in their distance to it. Of points that fall outside the square nothing counts: 0. Without centres the point itself, and 1.
+///
+/// ```text
+/// p = ½ + ½/n Σ 1/(π rᵢ)   over the centres that are less than ½ away
+/// ```
+///
+/// What rays of a pixel see goes like `1/r` around a lamp without extent in fog; its square has no mean over the pixel, while samples drawn so have a bound. Where in the pixel lamps
+/// are seen is for the host to say.
+///
+/// ```
+/// # use fogbow::{math::{Vec2, float::PI}, sampling::warp::steep_square};
+/// let lamp = Vec2::splat(0.5);
+/// let (at, weight) = steep_square(Vec2::new(0.75, 0.0), &[lamp]);
+/// assert_eq!(at, Vec2::new(0.75, 0.5));   // half of the way out
+/// assert!((weight * (0.5 + 0.5 / (0.25 * PI)) - 1.0).abs() < 1e-6);
+/// assert_eq!(steep_square(Vec2::new(0.75, 0.0), &[]), (Vec2::new(0.75, 0.0), 1.0));
+/// ```
+#[must_use]
+pub fn steep_square(u: Vec2, centres: &[Vec2]) -> (Vec2, f32) {
+    let count = centres.len() as f32;
+    if centres.is_empty() {
+        return (u, 1.0);
+    }
+    let point = if u.x < 0.5 {
+        Vec2::new(2.0 * u.x, u.y)
+    } else {
+        // Casts saturate, and take NaN to 0.
+        let which = (2.0 * u.x - 1.0) * count;
+        let centre = (which as usize).min(centres.len() - 1);
+        let (sin, cos) = float::sin_cos(2.0 * PI * u.y);
+        centres[centre] + Vec2::new(cos, sin) * (STEEP * (which - centre as f32))
+    };
+    // Written so that NaN is outside.
+    if !(point.cmpge(Vec2::ZERO).all() && point.cmplt(Vec2::ONE).all()) {
+        return (point, 0.0);
+    }
+    let distances = centres.iter().map(|centre| point.distance(*centre)).filter(|distance| *distance < STEEP);
+    let steep: f32 = distances.map(|distance| 1.0 / (2.0 * PI * STEEP * distance)).sum();
+    (point, 1.0 / (0.5 + 0.5 * steep / count))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sampling::{Generator, uniform2};
+
+    /// 1/r around centres inside, at a border and outside: the mean over the square, within a bound.
+    #[test]
+    fn what_rises_like_one_over_r_has_a_bound_and_its_mean() {
+        const SAMPLES: u32 = 400_000;
+        let middle = Vec2::splat(0.5);
+        // ∫ 1/r over the unit square: 4 asinh 1 about its middle, half of that at a corner.
+        let about_middle = 4.0 * libm::asinh(1.0);
+        for (centres, mean) in [
+            (&[middle][..], about_middle),
+            (&[Vec2::ZERO], 0.5 * about_middle),
+            (&[middle, Vec2::X, Vec2::new(0.1, -0.2)], about_middle),
+        ] {
+            let mut rng = Generator::new(3);
+            let (mut sum, mut squares, mut ones, mut most) = (0.0, 0.0, 0.0, 0.0_f32);
+            for _ in 0..SAMPLES {
+                let (point, weight) = steep_square(uniform2(&mut rng), centres);
+                assert!((0.0..=2.0).contains(&weight), "{point} {weight}");
+                let value = if weight > 0.0 { weight / point.distance(centres[0]) } else { 0.0 };
+                most = most.max(value);
+                (sum, squares) = (sum + f64::from(value), squares + f64::from(value * value));
+                ones += f64::from(weight);
+            }
+            let count = f64::from(SAMPLES);
+            let error = libm::sqrt((squares / count - (sum / count) * (sum / count)) / count);
+            assert!((sum / count - mean).abs() < 4.0 * error, "{centres:?}: {} ± {error}", sum / count);
+            // A weight is at most 2, so that its variance is at most 4.
+            assert!((ones / count - 1.0).abs() < 4.0 * 2.0 / libm::sqrt(count), "{}", ones / count);
+            assert!(most <= 2.0 * PI * centres.len() as f32 * 1.0001, "{most}");
+        }
+        let (_, weight) = steep_square(Vec2::splat(f32::NAN), &[middle]);
+        assert_eq!(weight, 0.0);
+    }
+}

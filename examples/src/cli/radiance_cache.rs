@@ -16,6 +16,7 @@ use fogbow::math::{Ray, Vec2};
 use fogbow::path;
 use fogbow::sampling::{Generator, uniform2};
 use fogbow::sh;
+use fogbow::spectrum::Spectrum;
 use fogbow::work::Rounds;
 use fogbow::world::{Outline, World as LitWorld};
 use fogbow_std::files::{self, Problem};
@@ -36,6 +37,7 @@ use super::{Failure, output};
 use crate::camera::{Camera, Eye};
 use crate::error::SceneError;
 use crate::filter::FilterTable;
+use crate::glare::{Glance, Glares};
 use crate::world::{WithMedium, World};
 
 mod levels;
@@ -285,6 +287,12 @@ pub(super) struct Cached {
 /// caches, without any.
 const LEAST_SAMPLES: u32 = 4;
 
+/// The same where noise may be [`ROUGH`]. Fewer: no halves that tell noise.
+const LEAST_ROUGH_SAMPLES: u32 = 2;
+
+/// Relative noise that is told well enough by halves of one sample a pixel. Less: tiles that stop early by chance; more: rough pictures are finer than was asked for.
+const ROUGH: f32 = 0.05;
+
 /// Caches as far as they were filled.
 struct Filled {
     caches: RadianceCaches<'static>,
@@ -306,7 +314,8 @@ impl Filled {
 
     /// When pixels have enough samples, unless told otherwise.
     fn usual_goal(&self) -> tiles::Goal {
-        tiles::Goal { noise: self.measured.noise, least: LEAST_SAMPLES }
+        let noise = self.measured.noise;
+        tiles::Goal { noise, least: if noise < ROUGH { LEAST_SAMPLES } else { LEAST_ROUGH_SAMPLES } }
     }
 }
 
@@ -501,23 +510,24 @@ impl<M: Medium + Sync> Stages<'_, '_, M> {
         let has_layers = film.layers().len() > 1;
         let has_edges = lights.iter().any(|light| matches!(light, Light::Quad(_) | Light::Sphere(_) | Light::Mesh(_)));
         let straight = if has_edges { STRAIGHT } else { 0 };
-        let (width, height) = (film.width(), film.height());
+        let size = [film.width(), film.height()];
+        let eye = Eye { camera, filter };
+        let glares = Glares::new(&eye, size, &lights, scene);
         Ok(tiles::render(film, settings, self.job.control, |sample, rng, layers| {
             let world = LitWorld {
                 medium: &CountingMedium { medium, tally: sample.tally },
                 scene: &CountingScene { scene, tally: sample.tally },
                 lights,
             };
-            let eye = Eye { camera, filter };
-            let (pixel, size, within) = ([sample.x, sample.y], [width, height], uniform2(rng));
+            let (pixel, within) = ([sample.x, sample.y], uniform2(rng));
             let (ray, weight) = eye.ray_at(pixel, size, within, rng);
             let seen = if paths.max_scatterings == 0 {
                 CachedRadiance {
                     emitted: path::radiance(&ray, &world, &paths, rng).emitted,
                     ..CachedRadiance::default()
                 }
-            } else if is_computed(plan, sample, width) {
-                let seen = caches.radiance(&ray, &world, rng);
+            } else if is_computed(plan, sample, size[0]) {
+                let mut seen = caches.radiance(&ray, &world, rng);
                 let (mut sum, rng) = (seen.straight * weight, &mut Generator::child(rng));
                 for k in 1..=straight {
                     // As even from sample to sample as those of the ray itself are.
@@ -527,7 +537,23 @@ impl<M: Medium + Sync> Stages<'_, '_, M> {
                 }
                 let mean = sum / ((straight + 1) as f32 * weight);
                 let emitted = seen.emitted - seen.straight + mean;
-                if straight > 0 && emitted.is_finite() { CachedRadiance { emitted, ..seen } } else { seen }
+                if straight > 0 && emitted.is_finite() {
+                    seen.emitted = emitted;
+                }
+                if let Some(Glance { at, shares }) = glares.glance(pixel, within) {
+                    let single = |(at, share): (Vec2, f32)| {
+                        let (ray, weight) = eye.ray_at(pixel, size, at, rng);
+                        let other = caches.radiance(&ray, &world, rng);
+                        (seen.lookups, seen.misses) = (seen.lookups + other.lookups, seen.misses + other.misses);
+                        other.medium_single * (share * weight)
+                    };
+                    let looks = at.into_iter().zip(shares).filter(|(_, share)| *share != 0.0);
+                    let single = looks.map(single).sum::<Spectrum>() / weight;
+                    if single.is_finite() {
+                        seen.medium_single = single;
+                    }
+                }
+                seen
             } else {
                 caches.radiance_beyond(&ray, &world, rng)
             };
