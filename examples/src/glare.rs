@@ -33,7 +33,7 @@ pub struct Glares {
 /// Where the pixel is even but for the lamp the difference has the lamp alone. Not so at the edges of what is bright: other light is no business of these looks.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Glance {
-    /// Places in the unit square; what is to count nothing need not be looked at.
+    /// Places in the unit square: one drawn towards the lamps, and the corner that is farthest from them. Where the share is 0 nobody need look.
     pub at: [Vec2; 2],
     /// How much what is seen there counts: in sum 1.
     pub shares: [f32; 2],
@@ -141,7 +141,7 @@ mod tests {
         assert_eq!(all(&glares(&[ahead], Filter::Tent { radius: 1.0 }, &Empty)), [[10, 4], [11, 4], [10, 5], [11, 5]]);
     }
 
-    /// A pixel of light that rises to its left, and 1/r around lamps in it: the mean is right, hardly noisier than that of the rest, and of the rest alone exact.
+    /// A pixel of light that rises to its left, and 1/r around lamps in it: the mean is right, and exact where light is the same everywhere.
     #[test]
     fn a_sample_has_the_mean_of_its_pixel() {
         let lamps = [Vec3::new(-0.05, 0.05, 1.0), Vec3::new(-0.03, 0.02, 1.0)];
@@ -165,7 +165,7 @@ mod tests {
         let (mean, glare) = (sums[0] / f64::from(count), sums[1] / f64::from(count));
         let error = ((squares / f64::from(count) - mean * mean) / f64::from(count)).sqrt();
         assert!((mean - glare - 1.5).abs() < 4.0 * error, "{mean} {glare} {error}");
-        // By the middles of a fine grid, one of whose cells the lamps are seen in.
+        // By the middles of the cells of a fine grid.
         let (cells, mut exact) = (1000, 0.0);
         for i in 0..cells * cells {
             let at = Vec2::new((i % cells) as f32 + 0.5, (i / cells) as f32 + 0.5) / cells as f32;
