@@ -32,7 +32,7 @@ pub struct Glares {
 ///
 /// Where the pixel is even but for the lamp the difference has the lamp alone. Not so at the edges of what is bright: other light is no business of these looks.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Glance {
+pub struct TwoPlaces {
     /// Places in the unit square: one drawn towards the lamps, and the corner that is farthest from them. Where the share is 0 nobody need look.
     pub at: [Vec2; 2],
     /// How much what is seen there counts: in sum 1.
@@ -75,7 +75,7 @@ impl Glares {
 
     /// Where a sample of a pixel looks, for two random numbers; `None` if it has no lamps.
     #[must_use]
-    pub fn glance(&self, [x, y]: [u32; 2], u: Vec2) -> Option<Glance> {
+    pub fn places(&self, [x, y]: [u32; 2], u: Vec2) -> Option<TwoPlaces> {
         let first = self.pixels.partition_point(|pixel| *pixel < [y, x]);
         let count = self.pixels[first..].partition_point(|pixel| *pixel == [y, x]);
         if count == 0 {
@@ -86,7 +86,7 @@ impl Glares {
         let away = |corner: Vec2| lamps.iter().map(|lamp| lamp.distance(corner)).fold(f32::INFINITY, f32::min);
         let aside = corners.into_iter().max_by(|a, b| away(*a).total_cmp(&away(*b)))?;
         let (at, share) = steep_square(u, lamps);
-        Some(Glance { at: [at, aside], shares: [share, 1.0 - share] })
+        Some(TwoPlaces { at: [at, aside], shares: [share, 1.0 - share] })
     }
 }
 
@@ -134,7 +134,7 @@ mod tests {
         let found = glares(&[ahead, behind], Filter::PIXEL, &Empty);
         assert_eq!(all(&found), [[11, 4]]);
         assert!(found.lamps[0].distance(Vec2::new(0.05, 0.8)) < 1e-4, "{:?}", found.lamps);
-        assert!(found.glance([11, 5], Vec2::ZERO).is_none() && found.glance([4, 11], Vec2::ZERO).is_none());
+        assert!(found.places([11, 5], Vec2::ZERO).is_none() && found.places([4, 11], Vec2::ZERO).is_none());
         assert!(glares(&[ahead], Filter::PIXEL, &Wall).pixels.is_empty());
         assert_eq!(all(&glares(&[ahead; 65], Filter::PIXEL, &Empty)), Vec::<[u32; 2]>::new());
         // A filter that is two pixels wide reaches it from four.
@@ -151,7 +151,7 @@ mod tests {
         let mut rng = Generator::new(7);
         let (mut sums, mut squares) = ([0.0; 2], 0.0);
         for _ in 0..count {
-            let Glance { at, shares } = found.glance([10, 4], uniform2(&mut rng)).unwrap();
+            let TwoPlaces { at, shares } = found.places([10, 4], uniform2(&mut rng)).unwrap();
             let glare = |at: Vec2| found.lamps.iter().map(|lamp| 0.1 / at.distance(*lamp)).sum::<f32>();
             let seen = |light: &dyn Fn(Vec2) -> f32| {
                 let of = |k: usize| if shares[k] == 0.0 { 0.0 } else { shares[k] * light(at[k]) };

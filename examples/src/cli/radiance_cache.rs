@@ -37,7 +37,7 @@ use super::{Failure, output};
 use crate::camera::{Camera, Eye};
 use crate::error::SceneError;
 use crate::filter::FilterTable;
-use crate::glare::{Glance, Glares};
+use crate::glare::{Glares, TwoPlaces};
 use crate::world::{WithMedium, World};
 
 mod levels;
@@ -540,7 +540,7 @@ impl<M: Medium + Sync> Stages<'_, '_, M> {
                 if straight > 0 && emitted.is_finite() {
                     seen.emitted = emitted;
                 }
-                if let Some(Glance { at, shares }) = glares.glance(pixel, within) {
+                if let Some(TwoPlaces { at, shares }) = glares.places(pixel, within) {
                     let single = |(at, share): (Vec2, f32)| {
                         let (ray, weight) = eye.ray_at(pixel, size, at, rng);
                         let other = caches.radiance(&ray, &world, rng);
