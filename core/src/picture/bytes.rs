@@ -23,6 +23,7 @@
 //! | | 4 n | samples of pixels |
 //! | | 20 t | of `t` tiles, with a goal: bit 0 enough, bits 1 and 2 which of two `f64` are known: noise squared when samples were last doubled, and one doubling earlier |
 //! | | 24 n | of pixels, with a goal: sum as `f64` and samples before a pass, and after it |
+//! | | 8 n | of pixels, with a goal: variance that all doublings tell, as `f64` |
 //!
 //! A sum is an integer of 16 bytes, of which most are zeros or the sign again: a byte tells how many follow, times 16, and how many zeros come before
 //! them; 0 is zero, and 1 all 16. A part of tiles has sums and samples of its own pixels alone.
@@ -43,7 +44,7 @@ use crate::storage::{Full, List};
 pub const MAGIC: [u8; 8] = *b"\x89FOGPIC\n";
 
 /// Of the layout above.
-pub const VERSION: u32 = 4;
+pub const VERSION: u32 = 5;
 
 /// Length of the header (bytes).
 pub const HEADER_BYTES: usize = 120;
@@ -150,7 +151,7 @@ fn least_bytes(settings: &Settings) -> Option<usize> {
     let pixels = settings.size[0].checked_mul(settings.size[1])? as usize;
     let room = settings.room();
     let sums = pixels.checked_mul(settings.layers as usize)?.checked_mul(3)?;
-    sums.checked_add(pixels.checked_mul(4)?)?.checked_add(room.tiles * 20)?.checked_add(room.pixels.checked_mul(24)?)
+    sums.checked_add(pixels.checked_mul(4)?)?.checked_add(room.tiles * 20)?.checked_add(room.pixels.checked_mul(32)?)
 }
 
 impl<Q, C> Tiles<'_, Q, C> {

@@ -30,7 +30,12 @@ pub const MOST_SAMPLES: u32 = 65536;
 /// as long as the halves are exchangeable, as those of an Owen-scrambled net are. So when samples have been doubled,
 /// the square is divided by `q − 1`; `q`, from 2 (independent) to 4, is how much less the halves differ than at the doubling
 /// before, over all tiles that still got samples. No tile counts as less noisy than one of the most even sequence, given
-/// how far its halves differed at the doubling before: two halves may agree by chance.
+/// how far its halves differed at the doubling before: two halves may agree by chance. Where a single pixel makes most of a tile's noise they often do, so
+/// each pixel also keeps what all its doublings tell together, and the more of both counts:
+///
+/// ```text
+/// V ← ½ (V(2n) + V/q)
+/// ```
 ///
 /// Tiles that a rare bright sample has not met yet stop early: where light has such samples the picture gets darker
 /// by what they would bring, so that methods without them profit most.
@@ -66,13 +71,15 @@ impl Part {
 pub struct PixelNoise {
     before: Part,
     after: Part,
+    /// Variance of the mean when samples were last doubled, as if they were independent: what all doublings tell of it.
+    told: f64,
 }
 
 impl PixelNoise {
     /// Variance of the mean after them: if a sample has variance `σ²`, the two parts' means are apart by
     /// `σ² (1/n + 1/m)` in square, and the whole's varies by `σ²/(n + m)`.
     fn error_squared(&self) -> f64 {
-        let Self { before, after } = *self;
+        let Self { before, after, .. } = *self;
         let new = Part { sum: after.sum - before.sum, count: after.count - before.count };
         if before.count == 0 || new.count == 0 {
             return f64::INFINITY;
@@ -80,6 +87,17 @@ impl PixelNoise {
         let (n, m) = (f64::from(before.count), f64::from(new.count));
         let apart = before.mean() - new.mean();
         apart * apart * n * m / ((n + m) * (n + m))
+    }
+
+    /// The same as all doublings tell it, after one.
+    fn told(&self) -> f64 {
+        if self.is_doubled() { self.told } else { 0.0 }
+    }
+
+    /// Samples have been doubled, where variance falls by so much.
+    fn doubled(&mut self, (is_first, falls): (bool, f64)) {
+        let now = self.error_squared();
+        self.told = if is_first { now } else { 0.5 * (now + self.told / falls) };
     }
 
     fn is_doubled(&self) -> bool {
@@ -137,6 +155,7 @@ impl<'s> Noise<'s> {
             bytes.extend(part.sum.to_le_bytes());
             bytes.extend(part.count.to_le_bytes());
         }
+        self.pixels.as_slice().iter().for_each(|pixel| bytes.extend(pixel.told.to_le_bytes()));
     }
 
     /// Into tiles that were added anew. `None` if it is nothing that passes leave.
@@ -153,7 +172,13 @@ impl<'s> Noise<'s> {
             if before.count > after.count || !before.sum.is_finite() || !after.sum.is_finite() {
                 return None;
             }
-            *pixel = PixelNoise { before, after };
+            (pixel.before, pixel.after) = (before, after);
+        }
+        for pixel in self.pixels.as_mut_slice() {
+            pixel.told = bytes.double();
+            if !(pixel.told >= 0.0 && pixel.told.is_finite()) {
+                return None;
+            }
         }
         Some(())
     }
@@ -182,7 +207,7 @@ impl<'s> Noise<'s> {
         let mut parts = parts.peekable();
         let is_new = pixels.first().is_some_and(|pixel| pixel.after.count == 0);
         if !is_enough && (is_new || parts.peek().is_some_and(|part| part.count.is_power_of_two())) {
-            pixels.iter_mut().zip(parts).for_each(|(pixel, before)| *pixel = PixelNoise { before, after: before });
+            pixels.iter_mut().zip(parts).for_each(|(pixel, before)| (pixel.before, pixel.after) = (before, before));
         }
     }
 
@@ -200,11 +225,10 @@ impl<'s> Noise<'s> {
         let pixels = self.pixels.as_slice();
         let total: f64 = pixels.iter().map(|pixel| pixel.after.mean()).sum();
         let floor = FLOOR * total.abs() / pixels.len().max(1) as f64;
-        let of = |tile: &TileNoise| &pixels[tile.pixels[0] as usize..tile.pixels[1] as usize];
-        let noise_of = |tile: &TileNoise| {
+        let noise_of = |of: &[PixelNoise], error_of: fn(&PixelNoise) -> f64| {
             let (mut shares, mut errors, mut light) = (0.0, 0.0, 0.0);
-            for pixel in of(tile) {
-                let (error, here) = (pixel.error_squared(), pixel.after.mean() * pixel.after.mean() + floor * floor);
+            for pixel in of {
+                let (error, here) = (error_of(pixel), pixel.after.mean() * pixel.after.mean() + floor * floor);
                 light += here;
                 if error > 0.0 {
                     (shares, errors) = (shares + error / here, errors + error);
@@ -212,12 +236,13 @@ impl<'s> Noise<'s> {
             }
             // Of what is bright, and of all pixels alike.
             let by_light = if errors > 0.0 { errors / light } else { 0.0 };
-            f64::max(shares / of(tile).len().max(1) as f64, by_light)
+            f64::max(shares / of.len().max(1) as f64, by_light)
         };
         let (mut last, mut now) = (0.0, 0.0);
         for tile in self.tiles.as_mut_slice().iter_mut().filter(|tile| !tile.is_enough) {
-            if of(tile).iter().all(PixelNoise::is_doubled) {
-                let noise = noise_of(tile);
+            let of = &pixels[tile.pixels[0] as usize..tile.pixels[1] as usize];
+            if of.iter().all(PixelNoise::is_doubled) {
+                let noise = noise_of(of, PixelNoise::error_squared);
                 tile.doubled_before = tile.when_doubled.replace(noise);
                 if let Some(before) = tile.doubled_before {
                     last += before;
@@ -225,17 +250,25 @@ impl<'s> Noise<'s> {
                 }
             }
         }
+        let evenness = if now > 0.0 { (last / now - 1.0_f64).clamp(1.0, EVENNEST) } else { 1.0 };
+        let pixels = self.pixels.as_mut_slice();
+        for tile in self.tiles.as_slice().iter().filter(|tile| !tile.is_enough) {
+            let [from, to] = tile.pixels.map(|at| at as usize);
+            let doubled = pixels[from..to].iter_mut().filter(|pixel| pixel.is_doubled());
+            doubled.for_each(|pixel| pixel.doubled((tile.doubled_before.is_none(), 1.0 + evenness)));
+        }
+        let pixels = self.pixels.as_slice();
         if samples < self.goal.least {
             return false;
         }
-        let evenness = if now > 0.0 { (last / now - 1.0_f64).clamp(1.0, EVENNEST) } else { 1.0 };
         for tile in self.tiles.as_mut_slice().iter_mut().filter(|tile| !tile.is_enough) {
-            let pixels = of(tile);
+            let pixels = &pixels[tile.pixels[0] as usize..tile.pixels[1] as usize];
             let is_known = samples / BLACK >= self.goal.least || pixels.iter().any(|pixel| pixel.after.sum != 0.0);
             let evenness = if pixels.iter().all(PixelNoise::is_doubled) { evenness } else { 1.0 };
             // Where one pixel varies most, its halves may agree by chance; twice in a row they rarely do.
             let at_least = tile.doubled_before.map_or(0.0, |before| before / (1.0 + EVENNEST));
-            tile.is_enough = is_known && noise_of(tile).max(at_least) <= goal * goal * evenness;
+            let noise = [PixelNoise::error_squared, PixelNoise::told].map(|error_of| noise_of(pixels, error_of));
+            tile.is_enough = is_known && noise[0].max(noise[1]).max(at_least) <= goal * goal * evenness;
         }
         self.tiles.as_slice().iter().all(|tile| tile.is_enough)
     }
@@ -309,6 +342,27 @@ mod tests {
         }
     }
 
+    /// Of two pixels one has little noise. The other varies much, but its halves agree at two doublings by chance.
+    #[test]
+    fn halves_that_agree_by_chance_do_not_hide_what_earlier_ones_told() {
+        let is_enough = |noise| {
+            let mut all = self::noise(Goal { noise, least: 8 }, &[2]);
+            for (count, errors) in [(1, [0.4, 0.02]), (2, [0.0, 0.01]), (4, [0.0, 0.005])] {
+                let samples = f64::from(count);
+                all.begin(0, errors.into_iter().map(|error| Part::of(&[samples * (1.0 - error); 3], count)));
+                all.end(0, errors.into_iter().map(|_| Part::of(&[samples * 2.0; 3], 2 * count)));
+                all.judge(2 * count);
+            }
+            all.is_enough(0)
+        };
+        // The noise has fallen to less than a quarter, so samples count as the most even there are, and a third of it is left.
+        let told = |last: f64, before: f64| 0.5 * (last * last + before / 4.0);
+        let of = |errors: [f64; 3]| told(errors[2], told(errors[1], errors[0] * errors[0]));
+        let square = (of([0.4, 0.0, 0.0]) + of([0.02, 0.01, 0.005])) / 2.0 / 1.01 / EVENNEST;
+        let noise = libm::sqrt(square) as f32;
+        assert!(is_enough(1.0001 * noise) && !is_enough(0.9999 * noise));
+    }
+
     #[test]
     fn the_error_of_uneven_parts_is_that_of_their_whole() {
         // Independent samples: the mean square of the estimate is the variance of the mean, 1/12/n.
@@ -319,7 +373,7 @@ mod tests {
         for _ in 0..runs {
             let before = Part { sum: draw(6), count: 6 };
             let after = Part { sum: before.sum + draw(3), count: 9 };
-            total += PixelNoise { before, after }.error_squared();
+            total += PixelNoise { before, after, told: 0.0 }.error_squared();
         }
         let ratio = total / f64::from(runs) * 12.0 * 9.0;
         // Relative standard deviation of a square of a normal number: √2.

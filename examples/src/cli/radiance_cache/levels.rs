@@ -34,17 +34,83 @@ pub(super) fn cached(seen: &CachedRadiance, caches: &Caches<'_>) -> Spectrum {
     parts.into_iter().filter(|(is_cached, _)| *is_cached).map(|(_, light)| light).sum()
 }
 
-/// A picture on its way: what does not come from caches is the mean of all samples, what does of those from the finest caches.
+/// A picture on its way: what does not come from caches is the mean of all samples. What does is that of samples from the finest caches, and as far as these are few
+/// of what was known before.
 struct Growing {
     film: Film,
     /// As it was before the caches at hand were read.
     before: Film,
+    /// What was known then.
+    earlier: Option<Earlier>,
     /// Which layers come from caches.
     cached: Vec<bool>,
     /// What all samples took.
     outcome: Option<Outcome>,
     /// Of one sample of a pixel, once there are two.
     noise: Option<f32>,
+}
+
+/// Light as it was known before the caches at hand.
+struct Earlier {
+    /// Of the layers that come from caches.
+    layers: Vec<Option<Image>>,
+    /// Variance that samples leave in it, over that of one sample of a pixel.
+    variance: f64,
+}
+
+/// How much what the caches at hand tell counts beside what was known before: as both together have the least error. In the records that both come from they differ by
+/// more than in those that they share.
+///
+/// ```text
+/// share = (l + s² v)/(l + s² v + s²/m)     l = ⟨difference of records²⟩, s² variance of a sample, v what is left of it before, m samples
+/// ```
+///
+/// Of what both differ by, neighbouring pixels share what is due to records, which reach over many, and do not share what is due to samples.
+#[derive(Debug, Clone, Copy)]
+struct Shares {
+    /// `l`.
+    records: f64,
+    /// `s²`.
+    sample: f64,
+    /// `v`.
+    before: f64,
+}
+
+impl Shares {
+    /// From what both differ by in pixels with so many samples, relative to their light. Without any difference only the finest caches count.
+    fn of(apart: &[f64], samples: &[u32], width: usize, before: f64) -> Self {
+        let is_known = |at: usize| samples[at] > 0;
+        let (mut all, mut between) = ([0.0; 2], [0.0; 2]);
+        for at in (0..apart.len()).filter(|&at| is_known(at)) {
+            all = [all[0] + apart[at] * apart[at], all[1] + 1.0];
+            if (at + 1) % width != 0 && at + 1 < apart.len() && is_known(at + 1) {
+                let step = apart[at + 1] - apart[at];
+                let samples = [at, at + 1].map(|at| 1.0 / f64::from(samples[at]) + before);
+                between = [between[0] + step * step, between[1] + samples[0] + samples[1]];
+            }
+        }
+        let sample = if between[1] > 0.0 { between[0] / between[1] } else { 0.0 };
+        let known = (0..apart.len()).filter(|&at| is_known(at));
+        let of_samples: f64 = known.map(|at| sample * (1.0 / f64::from(samples[at]) + before)).sum();
+        let records = if all[1] > 0.0 { f64::max(all[0] - of_samples, 0.0) / all[1] } else { 0.0 };
+        Self { records, sample, before }
+    }
+
+    /// Of the finest caches, where a pixel has so many samples from them.
+    fn newest(&self, samples: u32) -> f64 {
+        if samples == 0 {
+            return 0.0;
+        }
+        let (old, new) = (self.records + self.sample * self.before, self.sample / f64::from(samples));
+        if new > 0.0 { old / (old + new) } else { 1.0 }
+    }
+
+    /// Variance that samples leave, over that of one.
+    fn variance(&self, samples: u32) -> f64 {
+        let newest = self.newest(samples);
+        let new = if samples > 0 { newest * newest / f64::from(samples) } else { 0.0 };
+        new + (1.0 - newest) * (1.0 - newest) * self.before
+    }
 }
 
 impl Growing {
@@ -64,7 +130,7 @@ impl Growing {
         };
         let film_of_levels = empty()?;
         let cached = film_of_levels.layers().iter().map(is_cached).collect();
-        Ok(Self { film: film_of_levels, before: empty()?, cached, outcome: None, noise: None })
+        Ok(Self { film: film_of_levels, before: empty()?, earlier: None, cached, outcome: None, noise: None })
     }
 
     /// Adds samples, of which this is what they took.
@@ -77,9 +143,34 @@ impl Growing {
         more.reason
     }
 
+    /// Finer caches follow.
+    fn go_on(&mut self) {
+        if self.film.min_count() > 0 {
+            let (shares, count) = (self.shares(), self.film.height() * self.film.width());
+            let variance = (0..count).map(|at| self.variance(shares.as_ref(), at)).sum::<f64>() / f64::from(count);
+            let layers = 0..self.cached.len();
+            let layers = layers.map(|layer| Some(self.layer(layer, shares.as_ref())?.1).filter(|_| self.cached[layer]));
+            self.earlier = Some(Earlier { layers: layers.collect(), variance });
+        }
+        self.before = self.film.clone();
+    }
+
+    fn variance(&self, shares: Option<&Shares>, at: u32) -> f64 {
+        let samples = self.newest(at);
+        shares.map_or(1.0 / f64::from(samples.max(1)), |shares| shares.variance(samples))
+    }
+
+    /// Samples of a pixel from the finest caches.
+    fn newest(&self, at: u32) -> u32 {
+        let (x, y) = (at % self.film.width(), at / self.film.width());
+        self.film.count(x, y) - self.before.count(x, y)
+    }
+
     /// The picture.
     fn picture(&self, like: &Film) -> Result<Film, Failure> {
-        let layers: Vec<_> = (0..self.film.layers().len()).filter_map(|layer| self.layer(layer)).collect();
+        let shares = self.shares();
+        let layers = (0..self.film.layers().len()).filter_map(|layer| self.layer(layer, shares.as_ref()));
+        let layers: Vec<_> = layers.collect();
         let mut picture = Film::new(like.width(), like.height(), like.layers())?;
         let mut colours = vec![Spectrum::ZERO; like.layers().len()];
         let pixels = (0..like.height()).flat_map(|y| (0..like.width()).map(move |x| (x, y)));
@@ -97,21 +188,54 @@ impl Growing {
     }
 
     /// Means of a layer: of all samples, and of those that count.
-    fn layer(&self, layer: usize) -> Option<(Image, Image)> {
+    fn layer(&self, layer: usize, shares: Option<&Shares>) -> Option<(Image, Image)> {
         let all = self.film.mean(layer)?;
-        let mut counted = all.clone();
-        if self.cached[layer] {
-            let before = self.before.mean(layer)?;
-            for (at, (pixel, before)) in (0..).zip(counted.pixels.iter_mut().zip(&before.pixels)) {
-                let (x, y) = (at % all.width, at / all.width);
-                let [count, earlier] = [&self.film, &self.before].map(|film| f64::from(film.count(x, y)));
-                if count > earlier {
-                    let [kept, gone] = [count, earlier].map(|count_of| (count_of / (count - earlier)) as f32);
-                    *pixel = *pixel * kept - *before * gone;
-                }
+        let Some(mut counted) = self.finest(layer).filter(|_| self.cached[layer]) else {
+            return Some((all.clone(), all));
+        };
+        let earlier = self.earlier.as_ref().and_then(|earlier| earlier.layers[layer].as_ref());
+        if let Some((earlier, shares)) = earlier.zip(shares) {
+            for (at, (pixel, earlier)) in (0..).zip(counted.pixels.iter_mut().zip(&earlier.pixels)) {
+                let newest = shares.newest(self.newest(at)) as f32;
+                *pixel = *pixel * newest + *earlier * (1.0 - newest);
             }
         }
         Some((all, counted))
+    }
+
+    /// The mean of a layer, of samples from the finest caches; where there are none, of all.
+    fn finest(&self, layer: usize) -> Option<Image> {
+        let (mut counted, before) = (self.film.mean(layer)?, self.before.mean(layer)?);
+        for (at, (pixel, before)) in (0..).zip(counted.pixels.iter_mut().zip(&before.pixels)) {
+            let newest = self.newest(at);
+            if newest > 0 {
+                let (x, y) = (at % self.film.width(), at / self.film.width());
+                let [kept, gone] =
+                    [&self.film, &self.before].map(|film| f64::from(film.count(x, y)) / f64::from(newest));
+                *pixel = *pixel * kept as f32 - *before * gone as f32;
+            }
+        }
+        Some(counted)
+    }
+
+    /// How much the finest caches count, if there were others.
+    fn shares(&self) -> Option<Shares> {
+        let earlier = self.earlier.as_ref()?;
+        let mut apart = vec![0.0; self.film.mean(0)?.pixels.len()];
+        for layer in (0..self.cached.len()).filter(|&layer| self.cached[layer]) {
+            let (finest, earlier) = (self.finest(layer)?, earlier.layers[layer].as_ref()?);
+            let pixels = finest.pixels.iter().zip(&earlier.pixels);
+            let step = |(finest, earlier): (&Spectrum, &Spectrum)| f64::from((*finest - *earlier).mean());
+            apart.iter_mut().zip(pixels.map(step)).for_each(|(sum, step)| *sum += step);
+        }
+        let (_, light) = self.sampled()?;
+        let width = self.film.width() as usize;
+        // Fireflies say nothing of the others.
+        let around = squares_around(&light, width);
+        let relative = |at: usize| (apart[at] / around(at).sqrt()).clamp(-1.0, 1.0);
+        let apart: Vec<f64> = (0..light.len()).map(|at| if apart[at] == 0.0 { 0.0 } else { relative(at) }).collect();
+        let samples: Vec<u32> = (0..).take(light.len()).map(|at| self.newest(at)).collect();
+        Some(Shares::of(&apart, &samples, width, earlier.variance))
     }
 
     /// The light of all samples that does not come from caches, and all light.
@@ -126,21 +250,26 @@ impl Growing {
     }
 }
 
-/// Relative noise of one sample of a pixel, of what was sampled by one and by two, and all light.
-fn noise_between(one: &[f64], two: &[f64], light: &[f64], width: usize) -> f32 {
+/// Light around each pixel, in square, with a part of that of the whole picture.
+fn squares_around(light: &[f64], width: usize) -> impl Fn(usize) -> f64 {
     /// Pixels to either side over which light is averaged.
     const AROUND: usize = 2;
     let (height, mean) = (light.len() / width, light.iter().sum::<f64>() / light.len() as f64);
-    let around = |at: usize| {
+    move |at| {
         let (x, y) = (at % width, at / width);
         let rows = y.saturating_sub(AROUND)..(y + AROUND + 1).min(height);
         let columns = x.saturating_sub(AROUND)..(x + AROUND + 1).min(width);
         let count = (rows.len() * columns.len()) as f64;
-        rows.flat_map(|y| &light[y * width + columns.start..y * width + columns.end]).sum::<f64>() / count
-    };
+        let around = rows.flat_map(|y| &light[y * width + columns.start..y * width + columns.end]).sum::<f64>() / count;
+        around * around + 0.01 * mean * mean
+    }
+}
+
+/// Relative noise of one sample of a pixel, of what was sampled by one and by two, and all light.
+fn noise_between(one: &[f64], two: &[f64], light: &[f64], width: usize) -> f32 {
+    let around = squares_around(light, width);
     let square = |at: usize| {
         let (apart, light) = (two[at] - one[at], around(at));
-        let light = light * light + 0.01 * mean * mean;
         // Fireflies say nothing of the others.
         if light > 0.0 { (2.0 * apart * apart / light).min(1.0) } else { 0.0 }
     };
@@ -199,7 +328,7 @@ impl<M: Medium + Sync> Stages<'_, '_, M> {
                 break;
             }
             error = refinement.error();
-            growing.before = growing.film.clone();
+            growing.go_on();
             let count = growing.film.min_count();
             let sample = |growing: &Growing| {
                 growing.outcome.map_or(0.0, |outcome| outcome.seconds.wall) / f64::from(count.max(1))
@@ -256,6 +385,8 @@ impl<M: Medium + Sync> Stages<'_, '_, M> {
 
 #[cfg(test)]
 mod tests {
+    use fogbow::sampling::{Generator, uniform};
+
     use super::*;
 
     fn grey(light: &[f32]) -> Vec<Spectrum> {
@@ -275,6 +406,37 @@ mod tests {
         assert_eq!(growing.picture(&film).unwrap().mean(0).unwrap().pixels, grey(&[8.0, 10.0]));
         let (sampled, all) = growing.sampled().unwrap();
         assert_eq!((sampled, all), (vec![7.0, 6.0], vec![9.5, 10.0]));
+    }
+
+    /// What two sets of caches and their samples tell of a light of 1: records that reach over a row of pixels, and samples that no pixels share. The mixture has the least error
+    /// that any has, and each alone counts where the other is much worse.
+    #[test]
+    fn caches_and_samples_before_and_now_are_mixed_to_the_least_error() {
+        const WIDTH: usize = 256;
+        let rng = &mut Generator::new(3);
+        let mut even = |deviation: f64| (f64::from(uniform(rng)) - 0.5) * deviation * 12.0_f64.sqrt();
+        for (records, sample, before, now) in
+            [(0.1, 0.2, 16, 4), (0.02, 0.2, 16, 4), (0.1, 0.02, 1, 1), (0.001, 0.2, 99, 1)]
+        {
+            // Those of the finest caches are better in what both differ by.
+            let of_records: Vec<f64> = (0..WIDTH).map(|_| even(records)).collect();
+            let mut of_samples = |count: u32| even(sample / f64::from(count).sqrt());
+            let pixels = (0..WIDTH * WIDTH).map(|at| [of_records[at / WIDTH] + of_samples(before), of_samples(now)]);
+            let pixels: Vec<_> = pixels.collect();
+            let apart: Vec<f64> = pixels.iter().map(|[old, new]| new - old).collect();
+            let shares = Shares::of(&apart, &vec![now; apart.len()], WIDTH, 1.0 / f64::from(before));
+            let error = |newest: f64| {
+                let of = |[old, new]: &[f64; 2]| (newest * new + (1.0 - newest) * old).powi(2);
+                pixels.iter().map(of).sum::<f64>() / pixels.len() as f64
+            };
+            let least = (0..=100).map(|i| error(f64::from(i) / 100.0)).fold(f64::INFINITY, f64::min);
+            let share = shares.newest(now);
+            assert!(error(share) < 1.05 * least, "{share}: {} instead of {least}", error(share));
+            let left = shares.variance(now) * shares.sample + (1.0 - share).powi(2) * shares.records;
+            assert!((left / error(share) - 1.0).abs() < 0.1, "{left} told of {}", error(share));
+        }
+        let same = Shares::of(&[0.0; 8], &[1; 8], 4, 1.0);
+        assert_eq!((same.newest(1), same.newest(0)), (1.0, 0.0));
     }
 
     #[test]
