@@ -7,7 +7,7 @@ use fogbow::cache::{
 use fogbow::host::{Empty, Hit, Medium, Scene};
 use fogbow::light::{EnvironmentMap, Light, PointLight, QuadLight, SphereLight, Sun};
 use fogbow::math::{Bounds, Mat3, Ray, Vec2, Vec3, float::PI};
-use fogbow::medium::Homogeneous;
+use fogbow::medium::{Homogeneous, Placed, Region};
 use fogbow::multiple_scatter;
 use fogbow::path;
 use fogbow::phase::{Lobe, Phase};
@@ -15,7 +15,7 @@ use fogbow::sampling::{Generator, uniform2, warp};
 use fogbow::sh::{self, Coefficient};
 use fogbow::single_scatter::Sums;
 use fogbow::spectrum::{Gradient, Spectrum};
-use fogbow::surface::Surface;
+use fogbow::surface::{Distribution, Plastic, Principled, RoughPlastic, Surface};
 use fogbow::transmittance::thickness::Steps;
 use fogbow::world::World;
 use fogbow_tests::analytic::INFINITE_MEDIUM_MULTIPLE;
@@ -76,7 +76,6 @@ fn sky() -> [Light<'static>; 1] {
 /// all directions, whatever was scattered how often.
 #[test]
 fn light_in_a_furnace_is_as_bright_as_the_sky() {
-    use fogbow::medium::{Placed, Region};
     let point = Vec3::new(0.2, -0.1, 0.4);
     for (phase, degree) in [(Phase::ISOTROPIC, 0), (Lobe::HenyeyGreenstein { g: 0.5 }.into(), 3)] {
         let medium = Placed::new(fog(0.0, 1.2, phase), Region::sphere(Vec3::ZERO, 1.0).unwrap());
@@ -497,5 +496,61 @@ fn records_of_low_degree_hold_the_light_towards_an_eye() {
         let bent = if towards == to_eye { 0.0 } else { 0.03 };
         assert!(mean.abs() < 4.0 * error + bent * walked.mean[0], "{towards}: {made:?} {walked:?}");
         assert!(error < 0.02 * walked.mean[0], "{made:?} {walked:?}");
+    }
+}
+
+/// A floor at height 0 and a wall at its side, of one kind, under a ball of light.
+struct Corner(Surface);
+
+const BALL: Ball = Ball { centre: Vec3::new(0.3, 1.5, -0.5), radius: 0.15, surface: Surface::BLACK };
+
+impl Scene for Corner {
+    fn closest_hit(&self, ray: &Ray) -> Option<Hit> {
+        let plane = |origin: f32, direction: f32, normal: Vec3| {
+            let distance = -origin / direction;
+            let hit = Hit { distance, normal, shading: normal, surface: self.0, light: None };
+            (distance > 0.0 && distance < ray.length).then_some(hit)
+        };
+        let floor = plane(ray.origin.y, ray.direction.y, Vec3::Y);
+        let wall = plane(ray.origin.x + 1.0, ray.direction.x, Vec3::X);
+        let ball = BALL.closest_hit(ray).map(|hit| Hit { light: Some(0), ..hit });
+        [floor, wall, ball].into_iter().flatten().min_by(|a, b| a.distance.total_cmp(&b.distance))
+    }
+}
+
+/// The diffuse bases of materials are looked up, and eye rays bring the rest: together as much as paths bring, with a sky and without.
+#[test]
+fn coated_surfaces_seen_by_eye_rays_are_as_bright_as_by_paths() {
+    let (diffuse, white) = (Spectrum::new(0.7, 0.5, 0.2), Spectrum::ONE);
+    let plastic = Plastic { eta: 1.5, diffuse, specular: white, nonlinear: true };
+    let body = Principled { base_color: diffuse, roughness: 0.4, sheen: 0.5, clearcoat: 0.5, ..Principled::default() };
+    let surfaces = [
+        Surface::Phong { diffuse, specular: Spectrum::splat(0.2), exponent: 30.0 },
+        Surface::Plastic(plastic),
+        Surface::RoughPlastic(RoughPlastic::new(plastic, Distribution::Ggx, 0.2)),
+        Surface::Principled(body),
+    ];
+    let medium = fog(0.0, 0.15, Phase::ISOTROPIC);
+    let medium = Placed::new(medium, Region::sphere(Vec3::Y, 1.5).unwrap());
+    let lamp = Light::Sphere(SphereLight::new(BALL.centre, BALL.radius, Spectrum::splat(20.0)).unwrap());
+    let lights = [lamp, Light::Constant(Spectrum::new(0.3, 0.4, 0.5))];
+    let ray = Ray::between(Vec3::new(0.9, 1.0, 1.2), Vec3::new(-0.2, 0.0, -0.3)).with_length(f32::INFINITY);
+    for surface in surfaces {
+        for lights in [&lights[..], &lights[..1]] {
+            let scene = Corner(surface);
+            let make = estimator(&medium, &scene, lights);
+            let eye = RaySettings { density: 4.0, connections: 2, lights_visible: true, indirect: true };
+            let seen = estimate(40_000, |rng| radiance(&ray, &make, &Caches::default(), &eye, rng).total());
+            let traced = estimate(160_000, |rng| path::radiance(&ray, &make.world, &make.paths, rng).total());
+            for c in 0..3 {
+                let (apart, error) = (seen.mean[c] - traced.mean[c], seen.error[c].hypot(traced.error[c]));
+                assert!(error < 0.01 * traced.mean[c], "too noisy to tell: {seen:?} {traced:?}");
+                assert!(
+                    apart.abs() < 4.0 * error,
+                    "{surface:?}, {} lights: {seen:?} instead of {traced:?}",
+                    lights.len()
+                );
+            }
+        }
     }
 }

@@ -3,7 +3,7 @@
 use fogbow::light::{EnvironmentMap, Light, LightImage, MeshLight, PictureLight, QuadLight, SphereLight, Triangle};
 use fogbow::math::{Mat3, Vec3};
 use fogbow::phase::{Lobe, Phase, deflection};
-use fogbow::sampling::{discrete, distance, uniform, warp};
+use fogbow::sampling::{Generator, discrete, distance, uniform, uniform2, warp};
 use fogbow::spectrum::Spectrum;
 use fogbow::surface::Surface;
 use fogbow_tests::chi_square::{self, compare, interval, sphere, square, upper_gamma};
@@ -23,7 +23,7 @@ fn tail_of_chi_square_agrees_with_tables() {
 #[test]
 fn chi_square_notices_a_density_that_is_tilted_by_five_percent() {
     let mut counts = [0_u64; 20];
-    let mut rng = fogbow::sampling::Generator::new(3);
+    let mut rng = Generator::new(3);
     for _ in 0..SAMPLES {
         counts[(uniform(&mut rng) * 20.0) as usize] += 1;
     }
@@ -368,6 +368,20 @@ fn lights_with_extent() {
     check_light("mesh", &Light::Mesh(mesh), from, Vec3::new(0.5, 0.5, 0.0) - from, 1.5, |direction| {
         triangles.iter().find_map(|t| meet(t.corners, from, direction))
     });
+
+    // A closed body: of the sides that are turned away no sample is lost.
+    let (o, x, y, z) = (Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z);
+    let sides = [[o, y, x], [o, x, z], [o, z, y], [x, y, z]].map(|corners| Triangle { corners });
+    let mut table = [0.0; 4];
+    let body = Light::Mesh(MeshLight::new(&sides, &mut table, Spectrum::ONE).unwrap());
+    let rng = &mut Generator::new(3);
+    for from in [Vec3::new(-0.5, -0.4, 0.3), Vec3::new(0.8, 0.9, 1.1)] {
+        assert!((0..1000).all(|_| body.sample(from, uniform2(rng)).is_some()), "from {from}");
+        check_light("body", &body, from, Vec3::splat(0.25) - from, 1.5, |direction| {
+            let front = |t: &&Triangle| t.cross().dot(direction) < 0.0;
+            sides.iter().filter(front).find_map(|t| meet(t.corners, from, direction))
+        });
+    }
 }
 
 #[test]

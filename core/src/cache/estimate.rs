@@ -403,20 +403,23 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
         offered.map_or(Spectrum::ZERO, |connection| self.arrived(&connection, rng))
     }
 
-    /// A connection of a surface with a light that was chosen: of what arrives, or of what is reflected to an eye.
+    /// A connection of a surface with a light that was chosen: of what arrives, or of what is reflected to an eye, but for light of a sky that a base of this albedo reflects.
     pub(super) fn offered_at(
         &self,
         chosen: (Choice, Vec2),
         point: Vec3,
         hit: &Hit,
-        to_eye: Option<Vec3>,
+        to_eye: Option<(Vec3, Spectrum)>,
     ) -> Option<Connection> {
+        let sky = self.world.lights[chosen.0.index].is_sky();
         let origin = |to_light: Vec3| leave(point, hit.normal, to_light, hit.distance);
         let value = |to_light: Vec3, pdf: f32| {
-            let Some(to_eye) = to_eye else {
-                return Spectrum::splat(if hit.faces(to_light) { hit.cosine(to_light) } else { 0.0 });
+            let faces = hit.faces(to_light);
+            let Some((to_eye, base)) = to_eye else {
+                return Spectrum::splat(if faces { hit.cosine(to_light) } else { 0.0 });
             };
-            let value = hit.value(to_eye, to_light) * hit.cosine(to_light).abs();
+            let known = if sky && faces { lambert::value(base) } else { Spectrum::ZERO };
+            let value = (hit.value(to_eye, to_light) - known) * hit.cosine(to_light).abs();
             if !hit.surface.is_followed() || pdf <= 0.0 || value.is_black() {
                 return value;
             }
@@ -453,7 +456,8 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
         rng: &mut Generator,
     ) -> Spectrum {
         let chosen = self.world.lights.pick(&FromPoint::all(point), random.0);
-        let offered = chosen.and_then(|chosen| self.offered_at((chosen, random.1), point, hit, Some(to_eye)));
+        let offered =
+            chosen.and_then(|chosen| self.offered_at((chosen, random.1), point, hit, Some((to_eye, Spectrum::ZERO))));
         offered.map_or(Spectrum::ZERO, |connection| self.arrived(&connection, rng))
     }
 

@@ -185,7 +185,8 @@ fn look<M: Medium + ?Sized, S: Scene + ?Sized>(
     rng: &mut (impl Rng + ?Sized),
     sight: &mut impl Sight,
 ) {
-    let mut throughput = Spectrum::ONE;
+    // Of what lights send straight on, and of all else: what a diffuse base reflects of that is known.
+    let (mut of_lights, mut throughput) = (Spectrum::ONE, Spectrum::ONE);
     // Until the first real scattering lights may be hidden; after a lobe they were connected to, but for a part.
     let (mut lights_visible, mut last) = (settings.lights_visible, Last::Discrete);
     let mut bounced = false;
@@ -208,8 +209,8 @@ fn look<M: Medium + ?Sized, S: Scene + ?Sized>(
             }
         });
         sight.emitted(throughput * seen.radiance);
-        throughput *= seen.transmittance;
-        if throughput.max_element() < INVISIBLE {
+        (of_lights, throughput) = (of_lights * seen.transmittance, throughput * seen.transmittance);
+        if strength(throughput, of_lights) < INVISIBLE {
             return;
         }
         let Some(hit) = hit else {
@@ -219,9 +220,10 @@ fn look<M: Medium + ?Sized, S: Scene + ?Sized>(
                     if radiance.is_black() {
                         return radiance;
                     }
-                    last.share(radiance, &world.lights, index, ray.direction, (f32::INFINITY, Vec3::ZERO))
+                    let arrives = if light.is_sky() { throughput } else { of_lights };
+                    arrives * last.share(radiance, &world.lights, index, ray.direction, (f32::INFINITY, Vec3::ZERO))
                 };
-                let light = throughput * world.lights.distant().map(of).sum::<Spectrum>();
+                let light = world.lights.distant().map(of).sum::<Spectrum>();
                 if bounces == 0 { sight.straight(light) } else { sight.emitted(light) }
             }
             return;
@@ -234,7 +236,7 @@ fn look<M: Medium + ?Sized, S: Scene + ?Sized>(
         {
             let radiance = light.radiance(point, hit.normal, to_eye);
             let at = (last.distance(point), hit.normal);
-            let light = throughput * last.share(radiance, &world.lights, index, ray.direction, at);
+            let light = of_lights * last.share(radiance, &world.lights, index, ray.direction, at);
             if bounces == 0 { sight.straight(light) } else { sight.emitted(light) }
         }
         if hidden || hit.surface == Surface::Null {
@@ -248,7 +250,9 @@ fn look<M: Medium + ?Sized, S: Scene + ?Sized>(
         if matches!(hit.surface, Surface::Lambert { .. }) {
             return;
         }
-        let Some(sample) = hit.sample(to_eye, choice, turn) else { return };
+        let base = if settings.indirect { known_base(&hit, to_eye) } else { Spectrum::ZERO };
+        let drawn = if base.is_black() { hit } else { Hit { surface: hit.surface.without_base(), ..hit } };
+        let Some(sample) = drawn.sample(to_eye, choice, turn) else { return };
         let is_followed = hit.surface.is_followed();
         // Without indirect light only what mirrors show of lights is seen, and that once.
         if !settings.indirect && (bounced || !is_followed) {
@@ -260,10 +264,37 @@ fn look<M: Medium + ?Sized, S: Scene + ?Sized>(
             0.0 => Last::Discrete,
             pdf => Last::Lobe { point, pdf },
         };
+        let before = throughput;
         throughput *= sample.weight;
+        of_lights = throughput;
+        if !base.is_black() && sample.pdf > 0.0 {
+            let known = if hit.faces(sample.to_light) { base } else { Spectrum::ZERO };
+            let value = hit.value(to_eye, sample.to_light) - lambert::value(known);
+            throughput = before * value * (hit.cosine(sample.to_light).abs() / sample.pdf);
+            // Most is known already.
+            let survives =
+                2.0 * if is_followed { strength(throughput, of_lights) } else { strength(throughput, throughput) };
+            if survives < 1.0 {
+                if uniform(rng) >= survives {
+                    return;
+                }
+                (throughput, of_lights) = (throughput / survives, of_lights / survives);
+            }
+        }
         ray = Ray::new(leave(point, hit.normal, sample.to_light, hit.distance), sample.to_light);
         (bounces, interfaces) = (bounces + 1, 0);
     }
+}
+
+/// The albedo of a surface's diffuse base that an eye sees: what it reflects of indirect light is looked up.
+fn known_base(hit: &Hit, to_eye: Vec3) -> Spectrum {
+    if hit.faces(to_eye) { hit.surface.base(hit.shading, to_eye) } else { Spectrum::ZERO }
+}
+
+/// The largest channel of either, of whatever sign.
+fn strength(a: Spectrum, b: Spectrum) -> f32 {
+    let of = |spectrum: Spectrum| spectrum.map(f32::abs).max_element();
+    of(a).max(of(b))
 }
 
 /// A place where an eye ray asks a cache.
@@ -338,10 +369,9 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized, F: FnMut(Place)> Wanted<'_, M, S, F>
     }
 
     fn on_surface(&mut self, ray: &Ray, hit: &Hit, is_seen: bool, share: f32) {
-        if let Surface::Lambert { reflectance } = hit.surface
-            && !reflectance.is_black()
-            && hit.faces(-ray.direction)
-        {
+        // Records' own samples look up Lambertian surfaces alone.
+        let asks = is_seen || matches!(hit.surface, Surface::Lambert { .. });
+        if asks && !known_base(hit, -ray.direction).is_black() {
             let (point, normal, to_eye) = (ray.at(hit.distance), Some(hit.shading), Some(-ray.direction));
             (self.visit)(Place { point, normal, is_seen, share, to_eye });
         }
@@ -356,7 +386,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized, F: FnMut(Place)> Sight for Wanted<'_
     }
 
     fn surface(&mut self, ray: &Ray, hit: &Hit, weight: Spectrum) {
-        self.on_surface(ray, hit, true, weight.mean().min(1.0));
+        self.on_surface(ray, hit, true, weight.map(f32::abs).mean().min(1.0));
         let point = ray.at(hit.distance);
         let direction = Frame::around(hit.shading).to_world(warp::cosine_hemisphere(uniform2(&mut self.rng)));
         let origin = leave(point, hit.normal, direction, hit.distance);
@@ -554,7 +584,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Gather<'_, M, S> {
 
     /// The mean of some connections from a surface, of what arrives or of what is reflected to an eye: of one where there is one light, for which of several was chosen is the
     /// most part of the noise.
-    fn several(&mut self, point: Vec3, hit: &Hit, to_eye: Option<Vec3>) -> Spectrum {
+    fn several(&mut self, point: Vec3, hit: &Hit, to_eye: Option<(Vec3, Spectrum)>) -> Spectrum {
         let (lights, (choice, at)) = (self.estimator.world.lights, self.surface);
         let count = if lights.len() > 1 { self.settings.connections.clamp(1, FROM_SURFACES) } else { 1 };
         let sky = to_eye.is_some() || !self.settings.indirect;
@@ -652,21 +682,25 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Sight for Gather<'_, M, S> {
     fn surface(&mut self, ray: &Ray, hit: &Hit, weight: Spectrum) {
         let point = ray.at(hit.distance);
         let to_eye = -ray.direction;
-        let value = match hit.surface {
-            Surface::Lambert { reflectance } if reflectance.is_black() || !hit.faces(to_eye) => return,
-            Surface::Lambert { reflectance } => Some(lambert::value(reflectance)),
-            _ => None,
-        };
-        let towards = value.is_none().then_some(to_eye);
-        let reflected = weight * value.unwrap_or(Spectrum::ONE);
+        let indirect = self.settings.indirect;
+        let is_plain = matches!(hit.surface, Surface::Lambert { .. });
+        let base = if indirect || is_plain { known_base(hit, to_eye) } else { Spectrum::ZERO };
+        if is_plain && base.is_black() {
+            return;
+        }
+        let towards = (!is_plain).then_some((to_eye, base));
+        let base = weight * lambert::value(base);
+        let reflected = if is_plain { base } else { weight };
         if let Some(many) = &mut self.many {
             let start = [self.surface.0, self.surface.1.x, self.surface.1.y];
-            many.at_surface((point, hit, towards), reflected, !self.settings.indirect, start, &mut self.rng);
+            many.at_surface((point, hit, towards), reflected, !indirect, start, &mut self.rng);
         } else {
             let light = self.several(point, hit, towards);
             self.seen.surface_direct += reflected * light;
         }
-        let Some(value) = value.filter(|_| self.settings.indirect) else { return };
+        if !indirect || base.is_black() {
+            return;
+        }
         let indirect = match &self.caches.irradiance {
             None => None,
             Some(reader) => {
@@ -677,7 +711,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Sight for Gather<'_, M, S> {
             }
         };
         let indirect = indirect.unwrap_or_else(|| self.estimator.indirect(point, hit, &mut self.rng));
-        self.seen.surface_indirect += weight * value * indirect;
+        self.seen.surface_indirect += base * indirect;
     }
 
     fn emitted(&mut self, light: Spectrum) {

@@ -136,10 +136,10 @@ impl<'a, M: Medium + ?Sized, S: Scene + ?Sized> Offers<'a, M, S> {
     }
 
     /// Tries lights from a surface, of what arrives or, where an eye is given, of what is reflected to it; `weight` is what of that reaches the eye. `sky`: whether a sky counts among what
-    /// arrives; it always does among what is reflected.
+    /// arrives; it always does among what is reflected, but for what a base of the albedo given beside the eye reflects of it.
     pub(super) fn at_surface(
         &mut self,
-        (point, hit, to_eye): (Vec3, &Hit, Option<Vec3>),
+        (point, hit, to_eye): (Vec3, &Hit, Option<(Vec3, Spectrum)>),
         weight: Spectrum,
         sky: bool,
         start: [f32; 3],
@@ -147,7 +147,7 @@ impl<'a, M: Medium + ?Sized, S: Scene + ?Sized> Offers<'a, M, S> {
     ) {
         let estimator = self.estimator;
         let to = FromPoint { sky: sky || to_eye.is_some(), ..FromPoint::all(point) };
-        let lobe = to_eye.and_then(|to_eye| as_medium(hit, to_eye));
+        let lobe = to_eye.and_then(|(to_eye, _)| as_medium(hit, to_eye));
         let shown = lobe.as_ref().map(|(from_mirror, phase)| scattered(to, *from_mirror, phase));
         let question: &dyn Question = if let Some(shown) = &shown { shown } else { &to };
         let survey = estimator.world.lights.survey(question);
@@ -179,7 +179,7 @@ impl<'a, M: Medium + ?Sized, S: Scene + ?Sized> Offers<'a, M, S> {
     }
 
     fn offer(&mut self, connection: Connection, weight: Spectrum, is_reflected: bool, rng: &mut Generator) {
-        let guess = (weight * connection.light).mean() / connection.share;
+        let guess = (weight * connection.light).map(f32::abs).mean() / connection.share;
         if guess > 0.0 && guess.is_finite() {
             if self.waiting.is_full() {
                 self.settle(rng);
@@ -352,7 +352,7 @@ mod tests {
         let of_tried = |rng: &mut Generator| {
             let mut offers = Offers::new(&estimator, 4);
             let start = [0; 3].map(|_| uniform(rng));
-            offers.at_surface((point, &hit, Some(to_eye)), Spectrum::ONE, false, start, rng);
+            offers.at_surface((point, &hit, Some((to_eye, Spectrum::ZERO))), Spectrum::ONE, false, start, rng);
             offers.settle(rng);
             let single = |rng: &mut Generator| {
                 let random = (uniform(rng), uniform2(rng));

@@ -1,8 +1,8 @@
 //! A cut through the tree of lights: nodes that hold every light once, small where what they send matters.
 
-use super::lights::Lights;
+use super::lights::{Floor, Lights};
 use super::question::{Guess, Question};
-use super::tree::NONE;
+use super::tree::{Kind, NONE};
 use crate::sampling::discrete::Choice;
 use crate::sampling::uniform::ONE_MINUS_EPSILON;
 
@@ -23,6 +23,17 @@ pub(super) const REPRESENTATIVES: usize = 64;
 /// noisier; smaller: nodes are opened that do not matter.
 const DOUBT: f32 = 0.1;
 
+/// Lights that are somewhere, suns, and skies.
+const GROUPS: usize = 3;
+
+fn group(kind: Kind) -> u8 {
+    match kind {
+        Kind::Sun => 1,
+        Kind::Sky => 2,
+        _ => 0,
+    }
+}
+
 /// Nodes with what they send, about.
 pub(crate) struct Cut {
     entries: heapless::Vec<(u32, f32), MOST>,
@@ -34,12 +45,13 @@ impl Cut {
     pub(super) fn of(lights: &Lights<'_>, question: &dyn Question, limit: usize) -> Self {
         let mut cut = Self { entries: heapless::Vec::new(), total: 0.0 };
         let mut doubts = heapless::Vec::<f32, MOST>::new();
-        for (_, root) in lights.roots().filter(|(kind, _)| question.asks(*kind)) {
+        let mut groups = heapless::Vec::<u8, MOST>::new();
+        for (kind, root) in lights.roots().filter(|(kind, _)| question.asks(*kind)) {
             let guess = guess(lights, question, root);
             if guess.weight > 0.0 {
                 cut.total += guess.weight;
                 // There is room for `limit` nodes.
-                let _ = (cut.entries.push((root, guess.weight)), doubts.push(guess.doubt));
+                let _ = (cut.entries.push((root, guess.weight)), doubts.push(guess.doubt), groups.push(group(kind)));
             }
         }
         while cut.entries.len() < limit.min(MOST) {
@@ -55,18 +67,37 @@ impl Cut {
             }
             let (index, weight) = cut.entries.swap_remove(worst);
             doubts.swap_remove(worst);
+            let group = groups.swap_remove(worst);
             cut.total -= weight;
             for child in lights.node(index).children() {
                 let guess = guess(lights, question, child);
                 if guess.weight > 0.0 {
                     cut.total += guess.weight;
-                    let _ = (cut.entries.push((child, guess.weight)), doubts.push(guess.doubt));
+                    let _ = (cut.entries.push((child, guess.weight)), doubts.push(guess.doubt), groups.push(group));
                 }
             }
         }
+        cut.raise(&groups);
         // Anew, so that rounding does not add up.
         cut.total = cut.entries.iter().map(|(_, weight)| weight).sum();
         cut
+    }
+
+    /// What is sent from where light may not arrive counts no less than [`Floor`] says.
+    fn raise(&mut self, groups: &[u8]) {
+        let first = groups.first().copied();
+        if groups.iter().all(|group| Some(*group) == first) {
+            return;
+        }
+        let mut sent = [0.0; GROUPS];
+        for ((_, weight), group) in self.entries.iter().zip(groups) {
+            sent[usize::from(*group)] += weight;
+        }
+        let floor = Floor::of(sent.into_iter());
+        for ((_, weight), group) in self.entries.iter_mut().zip(groups) {
+            let of_group = sent[usize::from(*group)];
+            *weight *= floor.raised(of_group) / of_group;
+        }
     }
 
     pub(super) fn entries(&self) -> &[(u32, f32)] {

@@ -129,13 +129,14 @@ impl<'a> Lights<'a> {
         !self.nodes.is_empty()
     }
 
-    /// Chooses one of the lights by what it sends to `point`, about in proportion to [`Light::importance`]; `u` in [0, 1). Its index and
+    /// Chooses one of the lights by what it sends to `point`, about in proportion to [`Light::importance`]; `u` in [0, 1). As that may not arrive, each that shines there has an equal
+    /// part of a quarter besides; where there is a [`LightTree`], suns together, skies together and all others have. Its index and
     /// probability; `None` where nothing was found that shines there.
     ///
     /// ```
     /// # use fogbow::{light::{Light, Lights, PointLight}, math::Vec3, spectrum::Spectrum};
     /// let lamps = [1.0, 3.0].map(|w| Light::Point(PointLight::new(Vec3::Z, Spectrum::splat(w)).unwrap()));
-    /// assert_eq!(Lights::from(&lamps).choose(Vec3::ZERO, 0.5), Some((1, 0.75)));
+    /// assert_eq!(Lights::from(&lamps).choose(Vec3::ZERO, 0.5), Some((1, 0.75 * 0.75 + 0.125)));
     /// ```
     #[must_use]
     pub fn choose(&self, point: Vec3, u: f32) -> Option<(usize, f32)> {
@@ -148,7 +149,7 @@ impl<'a> Lights<'a> {
     /// ```
     /// # use fogbow::{light::{Light, Lights, PointLight}, math::Vec3, spectrum::Spectrum};
     /// let lamps = [1.0, 3.0].map(|w| Light::Point(PointLight::new(Vec3::Z, Spectrum::splat(w)).unwrap()));
-    /// assert_eq!(Lights::from(&lamps).probability(Vec3::ZERO, 0), 0.25);
+    /// assert_eq!(Lights::from(&lamps).probability(Vec3::ZERO, 0), 0.75 * 0.25 + 0.125);
     /// ```
     #[must_use]
     pub fn probability(&self, point: Vec3, index: usize) -> f32 {
@@ -162,8 +163,17 @@ impl<'a> Lights<'a> {
 
     /// All that is needed to choose among lights several times.
     pub(crate) fn survey<'q>(&self, question: &'q dyn Question) -> Survey<'q, 'a> {
-        let cut = self.has_tree().then(|| Cut::of(self, question, question.limit()));
-        Survey { lights: *self, question, cut }
+        let answers = if self.has_tree() {
+            Answers::Cut(Cut::of(self, question, question.limit()))
+        } else if self.all.len() <= FEW {
+            let mut weights: heapless::Vec<f32, FEW> = self.all.iter().map(|light| question.light(light)).collect();
+            let floor = Floor::of(weights.iter().copied());
+            weights.iter_mut().for_each(|weight| *weight = floor.raised(*weight));
+            Answers::Few(weights)
+        } else {
+            Answers::Many(Floor::of(self.all.iter().map(|light| question.light(light))))
+        };
+        Survey { lights: *self, question, answers }
     }
 
     /// The probability with which the light `index` is chosen by a question.
@@ -172,8 +182,7 @@ impl<'a> Lights<'a> {
             return Cut::of(self, question, question.limit()).share(self, question, index);
         }
         let own = self.all.get(index).map_or(0.0, |light| question.light(light));
-        let total: f32 = self.all.iter().map(|light| question.light(light)).sum();
-        if total > 0.0 { own / total } else { 0.0 }
+        Floor::of(self.all.iter().map(|light| question.light(light))).raised(own)
     }
 
     /// Calls `visit(light, share)` for lights that stand for all: every one without a tree, else a bounded number, each with the probability
@@ -357,22 +366,60 @@ impl Strong {
     }
 }
 
+/// What a question knows of lights is what they send, not what arrives: of a sun above a roof nothing does, and all light in the room comes from a lamp that sends a
+/// thousandth of that. So each of them, or of suns, skies and the others together where there is a tree, has a part of this in equal shares. Larger: choices in vain where all arrives; smaller: bright dots.
+pub(super) const UNSEEN: f32 = 0.25;
+
+/// By which probabilities have a least one.
+pub(super) struct Floor {
+    total: f32,
+    least: f32,
+}
+
+impl Floor {
+    /// Of such weights.
+    pub(super) fn of(weights: impl Iterator<Item = f32>) -> Self {
+        let (mut total, mut count) = (0.0, 0.0);
+        for weight in weights.filter(|weight| *weight > 0.0) {
+            (total, count) = (total + weight, count + 1.0);
+        }
+        Self { total, least: if count > 0.0 { UNSEEN / count } else { 0.0 } }
+    }
+
+    /// The probability of one of them.
+    pub(super) fn raised(&self, weight: f32) -> f32 {
+        if weight > 0.0 && self.total > 0.0 { (1.0 - UNSEEN) * (weight / self.total) + self.least } else { 0.0 }
+    }
+}
+
 /// Lights as a question sees them, for any number of choices.
 pub(crate) struct Survey<'q, 'a> {
     lights: Lights<'a>,
     question: &'q dyn Question,
-    cut: Option<Cut>,
+    answers: Answers,
+}
+
+/// Without a tree, so many are asked once for all choices.
+const FEW: usize = 8;
+
+enum Answers {
+    Cut(Cut),
+    /// Probabilities.
+    Few(heapless::Vec<f32, FEW>),
+    Many(Floor),
 }
 
 impl Survey<'_, '_> {
     pub(crate) fn pick(&self, u: f32) -> Option<Choice> {
-        match &self.cut {
-            Some(cut) => cut.pick(&self.lights, self.question, u),
-            None => {
-                let lights = self.lights.iter().map(|light| (self.question.light(light), ()));
-                discrete::choose(lights, u).map(|((), choice)| choice)
+        let chosen = match &self.answers {
+            Answers::Cut(cut) => return cut.pick(&self.lights, self.question, u),
+            Answers::Few(weights) => discrete::choose(weights.iter().map(|weight| (*weight, ())), u),
+            Answers::Many(floor) => {
+                let weights = self.lights.iter().map(|light| floor.raised(self.question.light(light)));
+                discrete::choose(weights.map(|weight| (weight, ())), u)
             }
-        }
+        };
+        chosen.map(|((), choice)| choice)
     }
 }
 #[cfg(all(test, feature = "alloc"))]
@@ -415,6 +462,29 @@ mod tests {
             }
         };
         (0..count).map(&mut light).chain([Light::Constant(Spectrum::splat(0.01))]).collect()
+    }
+
+    /// A sun that may not come through a roof, above a lamp that sends a thousandth of its light: by itself, and among many.
+    #[test]
+    fn lights_that_send_little_are_chosen_where_others_may_not_arrive() {
+        let sun = Light::Sun(Sun::new(Vec3::Z, Spectrum::splat(1000.0)).unwrap());
+        for count in [1, 30] {
+            let mut lights = lamps(count);
+            lights.push(sun);
+            let point = Vec3::splat(1.0);
+            let tree = (count > 1).then(|| LightTree::new(&lights, Vec::new()).unwrap());
+            let all = tree.as_ref().map_or(Lights::from(&lights), |tree| Lights::with_tree(&lights, tree));
+            let shares: Vec<f32> = (0..=count).map(|index| all.probability(point, index)).collect();
+            let of_lamps: f32 = shares[..count].iter().sum();
+            assert!(of_lamps > 0.5 * UNSEEN && of_lamps < 0.5 * UNSEEN + 0.1, "{count}: {of_lamps}");
+            assert!((of_lamps + shares[count] - 1.0).abs() < 1e-5, "{count}: {shares:?}");
+            // What is chosen is what is told.
+            const CHOICES: usize = 4000;
+            let chosen = (0..CHOICES).filter_map(|i| all.choose(point, (i as f32 + 0.5) / CHOICES as f32));
+            let of_sun = chosen.inspect(|(index, share)| assert!((share / shares[*index] - 1.0).abs() < 1e-3));
+            let of_sun = of_sun.filter(|(index, _)| *index == count).count() as f32 / CHOICES as f32;
+            assert!((of_sun - shares[count]).abs() < 0.01, "{count}: {of_sun} instead of {}", shares[count]);
+        }
     }
 
     fn questions(rng: &mut Generator) -> ([FromPoint; 3], [FromRay; 2]) {

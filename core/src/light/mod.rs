@@ -256,7 +256,7 @@ impl Light<'_> {
             Self::Point(_) | Self::Phong(_) | Self::Spot(_) | Self::Projector(_) | Self::Sun(_) => 0.0,
             Self::Quad(light) => light.pdf(from, to_light, distance),
             Self::Sphere(light) => light.pdf(from),
-            Self::Mesh(light) => light.pdf(to_light, distance, normal),
+            Self::Mesh(light) => light.pdf(from, to_light, distance, normal),
             Self::Picture(light) => light.pdf(from, to_light, distance),
             Self::Constant(_) => crate::math::float::INV_FOUR_PI,
             Self::Environment(map) => map.pdf(to_light),

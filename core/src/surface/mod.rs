@@ -32,7 +32,7 @@ pub use microfacet::{Distribution, Roughness};
 pub use plastic::{Plastic, RoughPlastic, diffuse_reflectance};
 pub use principled::{Principled, PrincipledThin};
 
-use crate::math::Frame;
+use crate::math::{Frame, float};
 use crate::spectrum::Spectrum;
 
 /// What a surface does to light.
@@ -258,6 +258,54 @@ impl Surface {
                 let all = sheet.value(eye, light).mean();
                 Some(Gloss { exponent: sheet.facets().exponent(), share: share(all - base, base) })
             }
+        }
+    }
+
+    /// Albedo of the Lambertian surface that sends `to_eye` about what the diffuse base of this one does; black where there is none, and from behind. Exact for
+    /// Lambert and Phong; of coated and principled surfaces the mean of directions, in which their bases hardly differ.
+    ///
+    /// ```
+    /// # use fogbow::{math::Vec3, spectrum::Spectrum, surface::{Plastic, Surface}};
+    /// let (grey, up) = (Spectrum::splat(0.5), Vec3::Z);
+    /// let floor = Surface::Phong { diffuse: grey, specular: Spectrum::splat(0.2), exponent: 20.0 };
+    /// assert_eq!((floor.base(up, up), floor.base(up, -up)), (grey, Spectrum::ZERO));
+    /// let coated = Surface::Plastic(Plastic { eta: 1.5, diffuse: grey, specular: Spectrum::ONE, nonlinear: false });
+    /// assert!((coated.base(up, up)[0] - 0.46).abs() < 0.01);
+    /// ```
+    #[inline(never)]
+    #[must_use]
+    pub fn base(&self, normal: Vec3, to_eye: Vec3) -> Spectrum {
+        /// A direction as steep as those of a diffuse sky are in the mean.
+        const MEAN: Vec3 = Vec3::new(0.0, 0.745_356, 2.0 / 3.0);
+        if normal.dot(to_eye) <= 0.0 {
+            return Spectrum::ZERO;
+        }
+        match self {
+            Self::Lambert { reflectance } => *reflectance,
+            Self::Phong { diffuse, .. } => *diffuse,
+            Self::Plastic(plastic) => plastic.value(Frame::around(normal).to_local(to_eye), MEAN) * float::PI,
+            Self::RoughPlastic(plastic) => {
+                plastic.diffuse_value(Frame::around(normal).to_local(to_eye), MEAN) * float::PI
+            }
+            Self::Principled(body) => {
+                body.base_value(Frame::along(normal, body.tangent).to_local(to_eye), MEAN) * float::PI
+            }
+            _ => Spectrum::ZERO,
+        }
+    }
+
+    /// What draws directions of light that its [`base`](Self::base) does not send: a Phong surface without that, all others as they are.
+    ///
+    /// ```
+    /// # use fogbow::{math::Vec3, spectrum::Spectrum, surface::Surface};
+    /// let floor = Surface::Phong { diffuse: Spectrum::ONE, specular: Spectrum::ONE, exponent: 20.0 };
+    /// assert_eq!(floor.without_base().base(Vec3::Z, Vec3::Z), Spectrum::ZERO);
+    /// ```
+    #[must_use]
+    pub fn without_base(&self) -> Self {
+        match *self {
+            Self::Phong { specular, exponent, .. } => Self::Phong { diffuse: Spectrum::ZERO, specular, exponent },
+            other => other,
         }
     }
 
