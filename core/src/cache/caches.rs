@@ -3,7 +3,7 @@
 use super::asked::Asked;
 use super::audit::{Deviation, Findings};
 use super::bias_map::BiasMap;
-use super::eye::{CachedRadiance, Caches, Reader, radiance, radiance_beyond, straight};
+use super::eye::{CachedRadiance, Caches, Last, Reader, radiance, radiance_beyond, straight};
 use super::kind::Kind;
 use super::photons::{PhotonEffort, PhotonGrid};
 use super::presets::{MENDED, finer_by};
@@ -285,7 +285,8 @@ impl RadianceCaches<'_> {
         if !eye.lights_visible {
             return Spectrum::ZERO;
         }
-        straight(ray, world, Marching { steps: walk.steps, offset: uniform(rng) })
+        let all = (Last::Discrete, Spectrum::ONE, Spectrum::ONE);
+        straight(ray, world, Marching { steps: walk.steps, offset: uniform(rng) }, all)
     }
 
     /// Drops the records that an [`Audit`](super::Audit) has found off by certainly more than `error`, or, in the mean of the picture, certainly off and by more than

@@ -5,6 +5,7 @@ use glam::{Vec2, Vec3};
 use super::aim::Aims;
 use super::connect::Connection;
 use super::evidence::Openings;
+use super::eye::{Onward, known_base};
 use super::guide::Looks;
 use super::lobe::{self, Lobe, coefficients_of};
 use super::lookup::Reading;
@@ -369,7 +370,12 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
     pub fn outgoing(&self, ray: &Ray, hit: &Hit, rng: &mut Generator) -> Spectrum {
         let point = ray.at(hit.distance);
         let Surface::Lambert { reflectance } = hit.surface else {
-            return self.traced(&Ray { origin: leave(point, hit.normal, -ray.direction, hit.distance), ..*ray }, rng);
+            // What glows on the way of a path is in none of its parts alone.
+            if self.world.medium.is_emissive() {
+                let before = leave(point, hit.normal, -ray.direction, hit.distance);
+                return self.traced(&Ray { origin: before, ..*ray }, rng);
+            }
+            return self.sent_on(point, hit, -ray.direction, rng);
         };
         // One-sided: black from behind.
         if reflectance.is_black() || !hit.faces(-ray.direction) {
@@ -379,6 +385,23 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
         let known = self.surfaces.and_then(|(cache, reading)| cache.lookup(point, hit.shading, &reading));
         let indirect = known.unwrap_or_else(|| self.indirect(point, hit, rng));
         lambert::value(reflectance) * (direct + indirect)
+    }
+
+    /// Radiance (W·m⁻²·sr⁻¹) that a surface which is not Lambertian sends `to_eye`, but for its own emission: by a connection, what is known of its diffuse base, and a path.
+    fn sent_on(&self, point: Vec3, hit: &Hit, to_eye: Vec3, rng: &mut Generator) -> Spectrum {
+        let base = known_base(hit, to_eye);
+        let look_up = || self.surfaces.and_then(|(cache, reading)| cache.lookup(point, hit.shading, &reading));
+        let known = if base.is_black() { None } else { look_up() };
+        let base = if known.is_some() { base } else { Spectrum::ZERO };
+        let mut light = lambert::value(base) * known.unwrap_or_default();
+        if !hit.surface.is_discrete() {
+            let random = (uniform(rng), uniform2(rng));
+            light += self.reflected_but(base, (point, hit, to_eye), random, rng);
+        }
+        let (choice, turn) = (uniform(rng), uniform2(rng));
+        let Some(onward) = Onward::draw((point, hit, to_eye), base, choice, turn) else { return light };
+        light += onward.straight(&self.world, Marching { steps: self.walk.steps, offset: uniform(rng) });
+        light + onward.rest * self.traced(&onward.ray, rng)
     }
 
     /// Irradiance (W·m⁻²) from the lights but a sky, by one connection.
@@ -455,9 +478,19 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
         random: (f32, Vec2),
         rng: &mut Generator,
     ) -> Spectrum {
+        self.reflected_but(Spectrum::ZERO, (point, hit, to_eye), random, rng)
+    }
+
+    /// The same, but for light of a sky that a base of this albedo reflects.
+    fn reflected_but(
+        &self,
+        base: Spectrum,
+        (point, hit, to_eye): (Vec3, &Hit, Vec3),
+        random: (f32, Vec2),
+        rng: &mut Generator,
+    ) -> Spectrum {
         let chosen = self.world.lights.pick(&FromPoint::all(point), random.0);
-        let offered =
-            chosen.and_then(|chosen| self.offered_at((chosen, random.1), point, hit, Some((to_eye, Spectrum::ZERO))));
+        let offered = chosen.and_then(|chosen| self.offered_at((chosen, random.1), point, hit, Some((to_eye, base))));
         offered.map_or(Spectrum::ZERO, |connection| self.arrived(&connection, rng))
     }
 

@@ -139,7 +139,7 @@ trait Sight {
 
 /// How an eye ray came to go where it goes: what of the light that it runs into is not in a connection.
 #[derive(Clone, Copy)]
-enum Last {
+pub(super) enum Last {
     /// By a mirror, through glass, or from the eye: all.
     Discrete,
     /// From a surface that was connected to all lights: nothing.
@@ -168,12 +168,32 @@ impl Last {
         (distance, normal): (f32, Vec3),
     ) -> Spectrum {
         match *self {
+            _ if radiance.is_black() => radiance,
             Self::Discrete => radiance,
             Self::Connected => Spectrum::ZERO,
             Self::Lobe { point, pdf } => {
                 radiance * mis::power(pdf, connection_pdf(lights, index, (point, false), direction, distance, normal))
             }
         }
+    }
+
+    /// What counts of the lights at infinity, with factors on suns and on skies.
+    #[inline(never)]
+    fn distant(&self, lights: &Lights<'_>, direction: Vec3, (of_suns, of_skies): (Spectrum, Spectrum)) -> Spectrum {
+        let of = |(index, light): (usize, &Light<'_>)| {
+            let factor = if light.is_sky() { of_skies } else { of_suns };
+            factor * self.share(light.background(direction), lights, index, direction, (f32::INFINITY, Vec3::ZERO))
+        };
+        lights.distant().map(of).sum()
+    }
+
+    /// What counts of the light of a surface that is met at a point, if it is one.
+    #[inline(never)]
+    fn met(&self, lights: &Lights<'_>, hit: &Hit, point: Vec3, direction: Vec3) -> Spectrum {
+        let index = hit.light.map_or(usize::MAX, |index| index as usize);
+        let Some(light) = lights.get(index) else { return Spectrum::ZERO };
+        let radiance = light.radiance(point, hit.normal, -direction);
+        self.share(radiance, lights, index, direction, (self.distance(point), hit.normal))
     }
 }
 
@@ -215,28 +235,15 @@ fn look<M: Medium + ?Sized, S: Scene + ?Sized>(
         }
         let Some(hit) = hit else {
             if lights_visible {
-                let of = |(index, light): (usize, &Light<'_>)| {
-                    let radiance = light.background(ray.direction);
-                    if radiance.is_black() {
-                        return radiance;
-                    }
-                    let arrives = if light.is_sky() { throughput } else { of_lights };
-                    arrives * last.share(radiance, &world.lights, index, ray.direction, (f32::INFINITY, Vec3::ZERO))
-                };
-                let light = world.lights.distant().map(of).sum::<Spectrum>();
+                let light = last.distant(&world.lights, ray.direction, (of_lights, throughput));
                 if bounces == 0 { sight.straight(light) } else { sight.emitted(light) }
             }
             return;
         };
         let hidden = !lights_visible && hit.light.is_some();
         let point = segment.at(hit.distance);
-        if !hidden
-            && let Some(index) = hit.light.map(|i| i as usize)
-            && let Some(light) = world.lights.get(index)
-        {
-            let radiance = light.radiance(point, hit.normal, to_eye);
-            let at = (last.distance(point), hit.normal);
-            let light = of_lights * last.share(radiance, &world.lights, index, ray.direction, at);
+        if !hidden && hit.light.is_some() {
+            let light = of_lights * last.met(&world.lights, &hit, point, ray.direction);
             if bounces == 0 { sight.straight(light) } else { sight.emitted(light) }
         }
         if hidden || hit.surface == Surface::Null {
@@ -251,43 +258,74 @@ fn look<M: Medium + ?Sized, S: Scene + ?Sized>(
             return;
         }
         let base = if settings.indirect { known_base(&hit, to_eye) } else { Spectrum::ZERO };
-        let drawn = if base.is_black() { hit } else { Hit { surface: hit.surface.without_base(), ..hit } };
-        let Some(sample) = drawn.sample(to_eye, choice, turn) else { return };
-        let is_followed = hit.surface.is_followed();
+        let Some(onward) = Onward::draw((point, &hit, to_eye), base, choice, turn) else { return };
         // Without indirect light only what mirrors show of lights is seen, and that once.
-        if !settings.indirect && (bounced || !is_followed) {
+        if !settings.indirect && (bounced || !hit.surface.is_followed()) {
             return;
         }
-        (lights_visible, bounced) = (true, true);
-        last = match sample.pdf {
-            _ if !is_followed => Last::Connected,
+        (lights_visible, bounced, last) = (true, true, onward.last);
+        (of_lights, throughput) = (throughput * onward.of_lights, throughput * onward.rest);
+        if !base.is_black() {
+            // Most is known already.
+            let survives = (2.0 * strength(throughput, of_lights)).min(1.0);
+            if uniform(rng) >= survives {
+                return;
+            }
+            (throughput, of_lights) = (throughput / survives, of_lights / survives);
+        }
+        (ray, bounces, interfaces) = (onward.ray, bounces + 1, 0);
+    }
+}
+
+/// Where a ray goes on from a surface of which some light is known.
+pub(super) struct Onward {
+    /// The ray.
+    pub(super) ray: Ray,
+    /// How it came there.
+    pub(super) last: Last,
+    /// Factor on what lights send straight along it.
+    pub(super) of_lights: Spectrum,
+    /// Factor on all else: without what a diffuse base reflects, if that is known.
+    pub(super) rest: Spectrum,
+}
+
+impl Onward {
+    /// `base` is the albedo of the base whose light is known. `None` where nothing is sent on.
+    pub(super) fn draw(
+        (point, hit, to_eye): (Vec3, &Hit, Vec3),
+        base: Spectrum,
+        choice: f32,
+        turn: Vec2,
+    ) -> Option<Self> {
+        let drawn = if base.is_black() { *hit } else { Hit { surface: hit.surface.without_base(), ..*hit } };
+        let sample = drawn.sample(to_eye, choice, turn)?;
+        let last = match sample.pdf {
+            _ if !hit.surface.is_followed() => Last::Connected,
             0.0 => Last::Discrete,
             pdf => Last::Lobe { point, pdf },
         };
-        let before = throughput;
-        throughput *= sample.weight;
-        of_lights = throughput;
+        let mut rest = sample.weight;
         if !base.is_black() && sample.pdf > 0.0 {
-            let known = if hit.faces(sample.to_light) { base } else { Spectrum::ZERO };
-            let value = hit.value(to_eye, sample.to_light) - lambert::value(known);
-            throughput = before * value * (hit.cosine(sample.to_light).abs() / sample.pdf);
-            // Most is known already.
-            let survives =
-                2.0 * if is_followed { strength(throughput, of_lights) } else { strength(throughput, throughput) };
-            if survives < 1.0 {
-                if uniform(rng) >= survives {
-                    return;
-                }
-                (throughput, of_lights) = (throughput / survives, of_lights / survives);
-            }
+            let known = if hit.faces(sample.to_light) { lambert::value(base) } else { Spectrum::ZERO };
+            let value = hit.value(to_eye, sample.to_light) - known;
+            rest = value * (hit.cosine(sample.to_light).abs() / sample.pdf);
         }
-        ray = Ray::new(leave(point, hit.normal, sample.to_light, hit.distance), sample.to_light);
-        (bounces, interfaces) = (bounces + 1, 0);
+        let ray = Ray::new(leave(point, hit.normal, sample.to_light, hit.distance), sample.to_light);
+        Some(Self { ray, last, of_lights: sample.weight, rest })
+    }
+
+    /// Light that comes straight along the ray from lights and a sky.
+    pub(super) fn straight<M: Medium + ?Sized, S: Scene + ?Sized>(
+        &self,
+        world: &World<'_, M, S>,
+        marching: Marching,
+    ) -> Spectrum {
+        straight(&self.ray, world, marching, (self.last, self.of_lights, self.rest))
     }
 }
 
 /// The albedo of a surface's diffuse base that an eye sees: what it reflects of indirect light is looked up.
-fn known_base(hit: &Hit, to_eye: Vec3) -> Spectrum {
+pub(super) fn known_base(hit: &Hit, to_eye: Vec3) -> Spectrum {
     if hit.faces(to_eye) { hit.surface.base(hit.shading, to_eye) } else { Spectrum::ZERO }
 }
 
@@ -369,9 +407,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized, F: FnMut(Place)> Wanted<'_, M, S, F>
     }
 
     fn on_surface(&mut self, ray: &Ray, hit: &Hit, is_seen: bool, share: f32) {
-        // Records' own samples look up Lambertian surfaces alone.
-        let asks = is_seen || matches!(hit.surface, Surface::Lambert { .. });
-        if asks && !known_base(hit, -ray.direction).is_black() {
+        if !known_base(hit, -ray.direction).is_black() {
             let (point, normal, to_eye) = (ray.at(hit.distance), Some(hit.shading), Some(-ray.direction));
             (self.visit)(Place { point, normal, is_seen, share, to_eye });
         }
@@ -467,21 +503,23 @@ pub fn radiance_beyond<M: Medium + ?Sized, S: Scene + ?Sized>(
     gathered(ray, estimator, caches, settings, false, rng)
 }
 
-/// Light that comes straight along a ray from lights and a sky, through the medium and past null interfaces.
+/// Light that comes straight along a ray from lights and a sky, through the medium and past null interfaces: of how it came there, with factors on that of lights and of skies.
+#[inline(never)]
 pub(super) fn straight<M: Medium + ?Sized, S: Scene + ?Sized>(
     ray: &Ray,
     world: &World<'_, M, S>,
     marching: Marching,
+    (last, of_lights, of_skies): (Last, Spectrum, Spectrum),
 ) -> Spectrum {
     let (mut rest, mut sum) = (*ray, Spectrum::ZERO);
+    if matches!(last, Last::Connected) {
+        return sum;
+    }
     for _ in 0..=MAX_INTERFACES {
         let hit = world.scene.closest_hit(&rest);
         let light = match &hit {
-            None => world.lights.distant().map(|(_, light)| light.background(ray.direction)).sum(),
-            Some(hit) => {
-                let light = hit.light.and_then(|index| world.lights.get(index as usize));
-                light.map_or(Spectrum::ZERO, |light| light.radiance(rest.at(hit.distance), hit.normal, -ray.direction))
-            }
+            None => last.distant(&world.lights, ray.direction, (of_lights, of_skies)),
+            Some(hit) => of_lights * last.met(&world.lights, hit, rest.at(hit.distance), ray.direction),
         };
         if !light.is_black() {
             // Most rays meet no light, and need none of this.

@@ -400,7 +400,6 @@ impl<'s> Index<'s> {
     }
 
     /// The blocks of the leaf around `point`: all spheres that contain it are in there, and others.
-    #[inline]
     pub(super) fn leaf(&self, point: Vec3) -> Range<usize> {
         const CELLS: f32 = (1 << DEPTH) as f32;
         let position = (point - self.low) * self.scale * CELLS;

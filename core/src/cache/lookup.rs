@@ -168,7 +168,6 @@ impl VolumeCache<'_> {
     ///
     /// An expansion is evaluated with its gradient first and then extrapolated, because coefficients
     /// are signed. Source: Jarosz et al. 2008, Eq. 35; sheet § 1.10.
-    #[inline]
     #[must_use]
     pub fn lookup(&self, point: Vec3, basis: &Basis, reading: &Reading) -> Option<Spectrum> {
         let mut blend = reading.blend();
@@ -276,7 +275,6 @@ impl SurfaceCache<'_> {
     /// lies off its plane; its value changes with position and with the normal (vector irradiance). From
     /// [`Cache::finish`](super::Cache::finish) on, records reach half as far again, and in gaps twice as far: noise is
     /// averaged over twice as many.
-    #[inline]
     #[must_use]
     pub fn lookup(&self, point: Vec3, normal: Vec3, reading: &Reading) -> Option<Spectrum> {
         let at = |width: f32| self.mixed(point, normal, reading, width);

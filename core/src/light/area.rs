@@ -365,6 +365,9 @@ pub struct MeshLight<'a> {
     pub radiance: Spectrum,
 }
 
+/// Triangles up to which it is known which face a point. More: time of each sample; fewer: samples of what nobody sees.
+const FACED: usize = 16;
+
 impl<'a> MeshLight<'a> {
     /// From triangles and a lent table of as many entries.
     ///
@@ -416,7 +419,6 @@ impl<'a> MeshLight<'a> {
     }
 
     /// A point of a triangle, and the normal.
-    #[inline]
     fn point(&self, index: usize, u: Vec2) -> Option<(Vec3, Vec3)> {
         let triangle = &self.triangles[index];
         let [a, b, c] = triangle.corners;
@@ -424,35 +426,37 @@ impl<'a> MeshLight<'a> {
         Some((a + (b - a) * at.x + (c - a) * at.y, triangle.cross().try_normalize()?))
     }
 
-    /// Areas (m²) of triangles, of those that are seen from behind 0; `None` where they are too many to be looked at.
-    fn seen(&self, from: Vec3) -> Option<impl Iterator<Item = f32>> {
-        /// Triangles up to which it is known which face a point. More: time of each sample; fewer: samples of what nobody sees.
-        const MOST: usize = 16;
-        let faces = move |triangle: &Triangle| triangle.cross().dot(from - triangle.corners[0]) > 0.0;
-        let below = [0.0].into_iter().chain(self.areas.iter().copied());
-        let areas = self.areas.iter().zip(below).map(|(sum, below)| sum - below);
-        let all = self.triangles.iter().zip(areas);
-        let area = self.area;
-        (self.triangles.len() <= MOST).then(|| all.map(move |(t, part)| if faces(t) { part * area } else { 0.0 }))
+    /// Areas (m²) of triangles, of those that are seen from behind 0; of none where they are too many to be looked at.
+    fn seen(&self, from: Vec3) -> heapless::Vec<f32, FACED> {
+        let (mut seen, mut below) = (heapless::Vec::new(), 0.0);
+        if self.triangles.len() > FACED {
+            return seen;
+        }
+        for (triangle, sum) in self.triangles.iter().zip(self.areas) {
+            let faces = triangle.cross().dot(from - triangle.corners[0]) > 0.0;
+            let _ = seen.push(if faces { (sum - below) * self.area } else { 0.0 });
+            below = *sum;
+        }
+        seen
     }
 
     #[inline]
     pub(super) fn sample(&self, from: Vec3, u: Vec2) -> Option<LightSample> {
-        let Some(areas) = self.seen(from) else {
+        let seen = self.seen(from);
+        if seen.is_empty() {
             let Source { position, normal, .. } = self.anchor(u)?;
             return surface_sample(from, position, normal, self.radiance, 1.0 / self.area);
-        };
-        let mut seen = 0.0;
-        let areas = areas.inspect(|area| seen += area);
-        let ((), choice) = discrete::choose(areas.map(|area| (area, ())), u.x)?;
+        }
+        let ((), choice) = discrete::choose(seen.iter().map(|area| (*area, ())), u.x)?;
         let (position, normal) = self.point(choice.index, Vec2::new(choice.remainder, u.y))?;
-        surface_sample(from, position, normal, self.radiance, 1.0 / seen)
+        surface_sample(from, position, normal, self.radiance, 1.0 / seen.iter().sum::<f32>())
     }
 
     #[inline]
     pub(super) fn pdf(&self, from: Vec3, to_light: Vec3, distance: f32, normal: Vec3) -> f32 {
-        let seen = self.seen(from).map_or(self.area, |areas| areas.sum());
-        if seen > 0.0 { to_solid_angle(1.0 / seen, to_light, distance, normal) } else { 0.0 }
+        let seen = self.seen(from);
+        let area = if seen.is_empty() { self.area } else { seen.iter().sum() };
+        if area > 0.0 { to_solid_angle(1.0 / area, to_light, distance, normal) } else { 0.0 }
     }
 
     pub(super) fn importance(&self, from: Vec3) -> f32 {

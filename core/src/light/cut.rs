@@ -93,7 +93,7 @@ impl Cut {
         for ((_, weight), group) in self.entries.iter().zip(groups) {
             sent[usize::from(*group)] += weight;
         }
-        let floor = Floor::of(sent.into_iter());
+        let floor = Floor::of(&mut sent.into_iter());
         for ((_, weight), group) in self.entries.iter_mut().zip(groups) {
             let of_group = sent[usize::from(*group)];
             *weight *= floor.raised(of_group) / of_group;

@@ -163,26 +163,25 @@ impl<'a> Lights<'a> {
 
     /// All that is needed to choose among lights several times.
     pub(crate) fn survey<'q>(&self, question: &'q dyn Question) -> Survey<'q, 'a> {
-        let answers = if self.has_tree() {
-            Answers::Cut(Cut::of(self, question, question.limit()))
-        } else if self.all.len() <= FEW {
-            let mut weights: heapless::Vec<f32, FEW> = self.all.iter().map(|light| question.light(light)).collect();
-            let floor = Floor::of(weights.iter().copied());
-            weights.iter_mut().for_each(|weight| *weight = floor.raised(*weight));
-            Answers::Few(weights)
-        } else {
-            Answers::Many(Floor::of(self.all.iter().map(|light| question.light(light))))
-        };
-        Survey { lights: *self, question, answers }
+        if self.has_tree() {
+            let cut = Some(Cut::of(self, question, question.limit()));
+            return Survey { lights: *self, question, cut, few: heapless::Vec::new(), floor: Floor::NONE };
+        }
+        // More than fit are asked again for every choice.
+        let few = self.all.iter().take(FEW).map(|light| question.light(light)).collect();
+        let mut survey = Survey { lights: *self, question, cut: None, few, floor: Floor::NONE };
+        survey.floor = Floor::of(&mut (0..self.all.len()).map(|index| survey.weight(index)));
+        survey
     }
 
     /// The probability with which the light `index` is chosen by a question.
     pub(crate) fn share(&self, question: &dyn Question, index: usize) -> f32 {
-        if self.has_tree() {
-            return Cut::of(self, question, question.limit()).share(self, question, index);
+        let survey = self.survey(question);
+        match &survey.cut {
+            Some(cut) => cut.share(self, question, index),
+            None if index < self.all.len() => survey.floor.raised(survey.weight(index)),
+            None => 0.0,
         }
-        let own = self.all.get(index).map_or(0.0, |light| question.light(light));
-        Floor::of(self.all.iter().map(|light| question.light(light))).raised(own)
     }
 
     /// Calls `visit(light, share)` for lights that stand for all: every one without a tree, else a bounded number, each with the probability
@@ -377,11 +376,15 @@ pub(super) struct Floor {
 }
 
 impl Floor {
+    const NONE: Self = Self { total: 0.0, least: 0.0 };
+
     /// Of such weights.
-    pub(super) fn of(weights: impl Iterator<Item = f32>) -> Self {
+    pub(super) fn of(weights: &mut dyn Iterator<Item = f32>) -> Self {
         let (mut total, mut count) = (0.0, 0.0);
-        for weight in weights.filter(|weight| *weight > 0.0) {
-            (total, count) = (total + weight, count + 1.0);
+        for weight in weights {
+            if weight > 0.0 {
+                (total, count) = (total + weight, count + 1.0);
+            }
         }
         Self { total, least: if count > 0.0 { UNSEEN / count } else { 0.0 } }
     }
@@ -392,36 +395,33 @@ impl Floor {
     }
 }
 
+/// Without a tree, so many are asked once for all choices.
+const FEW: usize = 8;
+
 /// Lights as a question sees them, for any number of choices.
 pub(crate) struct Survey<'q, 'a> {
     lights: Lights<'a>,
     question: &'q dyn Question,
-    answers: Answers,
-}
-
-/// Without a tree, so many are asked once for all choices.
-const FEW: usize = 8;
-
-enum Answers {
-    Cut(Cut),
-    /// Probabilities.
-    Few(heapless::Vec<f32, FEW>),
-    Many(Floor),
+    cut: Option<Cut>,
+    /// What the first of them send, without a tree.
+    few: heapless::Vec<f32, FEW>,
+    floor: Floor,
 }
 
 impl Survey<'_, '_> {
     pub(crate) fn pick(&self, u: f32) -> Option<Choice> {
-        let chosen = match &self.answers {
-            Answers::Cut(cut) => return cut.pick(&self.lights, self.question, u),
-            Answers::Few(weights) => discrete::choose(weights.iter().map(|weight| (*weight, ())), u),
-            Answers::Many(floor) => {
-                let weights = self.lights.iter().map(|light| floor.raised(self.question.light(light)));
-                discrete::choose(weights.map(|weight| (weight, ())), u)
-            }
-        };
-        chosen.map(|((), choice)| choice)
+        if let Some(cut) = &self.cut {
+            return cut.pick(&self.lights, self.question, u);
+        }
+        let weights = (0..self.lights.len()).map(|index| (self.floor.raised(self.weight(index)), ()));
+        discrete::choose(weights, u).map(|((), choice)| choice)
+    }
+
+    fn weight(&self, index: usize) -> f32 {
+        self.few.get(index).copied().unwrap_or_else(|| self.question.light(&self.lights[index]))
     }
 }
+
 #[cfg(all(test, feature = "alloc"))]
 mod tests {
     use alloc::vec::Vec;

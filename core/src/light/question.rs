@@ -240,7 +240,6 @@ pub(crate) struct FromRay {
 
 impl FromRay {
     /// The part of the ray (m) that lies in a light's near field, and that it reaches.
-    #[inline]
     pub(crate) fn part(&self, light: &Light<'_>) -> Option<(f32, f32)> {
         let field = if self.steep { light.steep_field()? } else { light.near_field()? };
         let far = match self.until {

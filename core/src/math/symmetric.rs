@@ -308,7 +308,6 @@ impl Symmetric2 {
     }
 
     /// Scaled back as a whole if a variance exceeds `most`; positive semi-definite input stays so.
-    #[inline]
     #[must_use]
     pub(crate) fn bounded(&self, most: f32) -> Self {
         let larger = float::max(self.xx.abs(), self.yy.abs());

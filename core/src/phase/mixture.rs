@@ -265,7 +265,6 @@ impl Phase {
     /// let value = cloud.value(deflection(sample.to_light, Vec3::Z))[0];
     /// assert!((sample.weight[0] * sample.pdf / value - 1.0).abs() < 1e-3);
     /// ```
-    #[inline]
     #[must_use]
     pub fn sample(&self, to_eye: Vec3, u: Vec2) -> PhaseSample {
         let (lobe, u_cos) = if self.count == 1 {

@@ -272,7 +272,6 @@ impl Surface {
     /// let coated = Surface::Plastic(Plastic { eta: 1.5, diffuse: grey, specular: Spectrum::ONE, nonlinear: false });
     /// assert!((coated.base(up, up)[0] - 0.46).abs() < 0.01);
     /// ```
-    #[inline(never)]
     #[must_use]
     pub fn base(&self, normal: Vec3, to_eye: Vec3) -> Spectrum {
         /// A direction as steep as those of a diffuse sky are in the mean.
@@ -317,7 +316,6 @@ impl Surface {
     /// let value = wall.value(Vec3::Z, Vec3::Z, Vec3::new(0.6, 0.0, 0.8));
     /// assert!((value[0] - 0.5 / core::f32::consts::PI).abs() < 1e-7);
     /// ```
-    #[inline]
     #[must_use]
     pub fn value(&self, normal: Vec3, to_eye: Vec3, to_light: Vec3) -> Spectrum {
         // What has two sides of its own.
@@ -371,7 +369,6 @@ impl Surface {
     /// assert_eq!(sample.pdf, floor.pdf(Vec3::Z, to_eye, sample.to_light));   // of both lobes, whichever was drawn
     /// assert_eq!(floor.pdf(Vec3::Z, to_eye, Vec3::NEG_Z), 0.0);
     /// ```
-    #[inline]
     #[must_use]
     pub fn pdf(&self, normal: Vec3, to_eye: Vec3, to_light: Vec3) -> f32 {
         match self {
@@ -427,7 +424,6 @@ impl Surface {
     /// assert!((sample.to_light - Vec3::new(-0.6, 0.0, 0.8)).length() < 1e-6 && sample.pdf == 0.0);
     /// assert!(mirror.sample(Vec3::Z, Vec3::NEG_Z, 0.5, Vec2::ZERO).is_none());   // from behind
     /// ```
-    #[inline]
     #[must_use]
     pub fn sample(&self, normal: Vec3, to_eye: Vec3, choice: f32, u: Vec2) -> Option<SurfaceSample> {
         match *self {

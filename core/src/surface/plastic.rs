@@ -206,7 +206,6 @@ impl RoughPlastic {
     }
 
     /// The base alone.
-    #[inline]
     pub(super) fn diffuse_value(&self, eye: Vec3, light: Vec3) -> Spectrum {
         base(&self.plastic, self.internal) * (self.passes(eye.z) * self.passes(light.z))
     }
