@@ -345,7 +345,7 @@ impl Triangle {
     }
 }
 
-/// Triangles that shine to the side of their normals.
+/// Triangles that shine to the side of their normals. Samples for a place come, evenly over area, from those that face it, if they are 16 in all at most; else from all.
 ///
 /// ```
 /// # use fogbow::{light::{MeshLight, Triangle}, math::Vec3, spectrum::Spectrum};

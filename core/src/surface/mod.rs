@@ -261,8 +261,9 @@ impl Surface {
         }
     }
 
-    /// Albedo of the Lambertian surface that sends `to_eye` about what the diffuse base of this one does; black where there is none, and from behind. Exact for
-    /// Lambert and Phong; of coated and principled surfaces the mean of directions, in which their bases hardly differ.
+    /// Albedo (1) of the Lambertian surface that sends `to_eye` about what the diffuse base of this one does; black where there is none, from behind, and of thin sheets, whose light comes
+    /// from both sides. Exact for Lambert and Phong. Of coated and principled surfaces it is `π` times the value of the base for light from the mean direction of a diffuse sky (a cosine of ⅔): bases hardly depend on it but
+    /// at grazing angles. What is looked up by it is corrected for the difference (`cache/eye.rs`), so that nothing else need be exact.
     ///
     /// ```
     /// # use fogbow::{math::Vec3, spectrum::Spectrum, surface::{Plastic, Surface}};
@@ -274,7 +275,7 @@ impl Surface {
     /// ```
     #[must_use]
     pub fn base(&self, normal: Vec3, to_eye: Vec3) -> Spectrum {
-        /// A direction as steep as those of a diffuse sky are in the mean.
+        /// As steep as directions of a diffuse sky are in the mean.
         const MEAN: Vec3 = Vec3::new(0.0, 0.745_356, 2.0 / 3.0);
         if normal.dot(to_eye) <= 0.0 {
             return Spectrum::ZERO;

@@ -190,9 +190,10 @@ impl Growing {
     /// Means of a layer: of all samples, and of those that count.
     fn layer(&self, layer: usize, shares: Option<&Shares>) -> Option<(Image, Image)> {
         let all = self.film.mean(layer)?;
-        let Some(mut counted) = self.finest(layer).filter(|_| self.cached[layer]) else {
+        if !self.cached[layer] {
             return Some((all.clone(), all));
-        };
+        }
+        let mut counted = self.finest(layer)?;
         let earlier = self.earlier.as_ref().and_then(|earlier| earlier.layers[layer].as_ref());
         if let Some((earlier, shares)) = earlier.zip(shares) {
             for (at, (pixel, earlier)) in (0..).zip(counted.pixels.iter_mut().zip(&earlier.pixels)) {
