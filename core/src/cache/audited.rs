@@ -238,10 +238,10 @@ fn few_records_are_right_unless_broken() {
     assert_eq!(verdict(None, 0), [false; 4]);
 }
 
-/// −1.0 ± 0.2 % of all light, and 14 ± 1 % of that in a corner.
+/// +2.6 ± 0.2 % of what is cached, and 8 ± 1 % in the worst region.
 #[test]
-fn a_tolerance_of_10_is_found_by_region() {
-    assert_eq!(verdict(Some(Broken::Tolerance), 0), [false, true, true, false]);
+fn a_tolerance_of_10_is_found() {
+    assert_eq!(verdict(Some(Broken::Tolerance), 0), [true, true, true, false]);
 }
 
 #[test]

@@ -49,14 +49,14 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
         Some(Connection { from: origin(incident.to_light), source, light, share })
     }
 
-    /// What of a connection arrives. Transmittance is marched: what ratio tracking adds in noise would rule pictures whose other parts have none.
-    pub(super) fn arrived(&self, connection: &Connection, rng: &mut Generator) -> Spectrum {
+    /// What of a connection arrives, marched with an `offset` in [0, 1): what ratio tracking adds in noise would rule pictures whose other parts have none.
+    pub(super) fn arrived(&self, connection: &Connection, offset: f32) -> Spectrum {
         let Connection { from, source, light, share } = *connection;
         let shadow = shadow_ray(from, &source);
         if self.world.scene.is_blocked(&shadow) {
             return Spectrum::ZERO;
         }
-        light * self.passed(&shadow, rng) / share
+        light * self.passed(&shadow, offset) / share
     }
 
     /// Light of one of the lights, chosen by `weight`, scattered once at `point` towards `to_eye`: radiance for each unit of scattering (W·m⁻²·sr⁻¹), unbiased but for
@@ -74,7 +74,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
     ) -> Spectrum {
         let Some(chosen) = self.world.lights.pick(weight, random.0) else { return Spectrum::ZERO };
         let offered = self.offered_by_medium((chosen, random.1), point, to_eye, phase);
-        let joined = offered.map_or(Spectrum::ZERO, |connection| self.arrived(&connection, rng));
+        let joined = offered.map_or(Spectrum::ZERO, |connection| self.arrived(&connection, uniform(rng)));
         joined + self.met(chosen, point, to_eye, phase, rng)
     }
 
@@ -129,13 +129,12 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
             return Spectrum::ZERO;
         }
         let share = mis::power(sample.pdf, light.pdf(point, ray.direction, distance, normal));
-        sample.weight * radiance * self.passed(&ray.with_length(distance), rng) * (share / chosen.probability)
+        sample.weight * radiance * self.passed(&ray.with_length(distance), uniform(rng)) * (share / chosen.probability)
     }
 
     /// What a ray lets pass.
-    fn passed(&self, ray: &Ray, rng: &mut Generator) -> Spectrum {
-        let marching = Marching { steps: self.walk.steps, offset: uniform(rng) };
-        transmittance(ray, self.world.medium, marching)
+    fn passed(&self, ray: &Ray, offset: f32) -> Spectrum {
+        transmittance(ray, self.world.medium, Marching { steps: self.walk.steps, offset })
     }
 }
 

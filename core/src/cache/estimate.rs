@@ -423,7 +423,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
         let weight = FromPoint { sky: with_sky, ..FromPoint::all(point) };
         let chosen = self.world.lights.pick(&weight, random.0);
         let offered = chosen.and_then(|chosen| self.offered_at((chosen, random.1), point, hit, None));
-        offered.map_or(Spectrum::ZERO, |connection| self.arrived(&connection, rng))
+        offered.map_or(Spectrum::ZERO, |connection| self.arrived(&connection, uniform(rng)))
     }
 
     /// A connection of a surface with a light that was chosen: of what arrives, or of what is reflected to an eye, but for light of a sky that a base of this albedo reflects.
@@ -491,7 +491,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
     ) -> Spectrum {
         let chosen = self.world.lights.pick(&FromPoint::all(point), random.0);
         let offered = chosen.and_then(|chosen| self.offered_at((chosen, random.1), point, hit, Some((to_eye, base))));
-        offered.map_or(Spectrum::ZERO, |connection| self.arrived(&connection, rng))
+        offered.map_or(Spectrum::ZERO, |connection| self.arrived(&connection, uniform(rng)))
     }
 
     /// Light of all lights but a sky, scattered once at `point` towards `to_eye`: one sample of each, or of those that stand

@@ -542,9 +542,14 @@ fn gathered<M: Medium + ?Sized, S: Scene + ?Sized>(
     in_scattered: bool,
     rng: &mut (impl Rng + ?Sized),
 ) -> CachedRadiance {
+    // The first numbers of a sequence are spread best. Where on a lamp a surface looks makes the most noise, where it marches on the way the least.
+    let seen_by_surface = uniform2(rng);
     let along = [uniform(rng), uniform(rng)];
-    let light = [uniform(rng), uniform(rng), uniform(rng)];
-    let surface = (uniform(rng), uniform2(rng));
+    let seen_by_medium = uniform2(rng);
+    let chosen = uniform2(rng);
+    let offset = uniform2(rng).x;
+    let light = [chosen.x, seen_by_medium.x, seen_by_medium.y];
+    let surface = (chosen.y, seen_by_surface);
     let mut gather = Gather {
         estimator,
         caches,
@@ -555,6 +560,7 @@ fn gathered<M: Medium + ?Sized, S: Scene + ?Sized>(
         along,
         light,
         surface,
+        offset,
         points: 0,
         basis: None,
         rng: Generator::child(rng),
@@ -581,6 +587,8 @@ struct Gather<'a, M: ?Sized, S: ?Sized> {
     along: [f32; 2],
     light: [f32; 3],
     surface: (f32, Vec2),
+    /// A random number for marching along connections.
+    offset: f32,
     /// Points so far.
     points: u32,
     /// Basis functions towards the eye, for the direction they belong to.
@@ -601,19 +609,20 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Gather<'_, M, S> {
     }
 
     /// Single scattering along a segment of one light within its near field.
-    fn near(&mut self, segment: &Ray, joint: &Joint<'_>) -> Option<Spectrum> {
+    fn near(&self, segment: &Ray, joint: &Joint<'_>, k: u32) -> Option<Spectrum> {
         let world = &self.estimator.world;
         let properties = world.medium.properties(joint.point);
         if properties.scattering.is_black() {
             return None;
         }
-        let LightSample { source, incident, .. } = joint.light(|| uniform2(&mut self.rng))?;
+        let LightSample { source, incident, .. } =
+            joint.light(|| Vec2::new(wrapped(self.light[1], 1, k), wrapped(self.light[2], 2, k)))?;
         let value = properties.phase.value(deflection(incident.to_light, -segment.direction));
         let shadow = shadow_ray(joint.point, &source);
         if world.scene.is_blocked(&shadow) {
             return None;
         }
-        let marching = Marching { steps: self.estimator.walk.steps, offset: uniform(&mut self.rng) };
+        let marching = Marching { steps: self.estimator.walk.steps, offset: wrapped(self.offset, 0, k) };
         let through = transmittance(&segment.with_length(joint.distance), world.medium, marching)
             * transmittance(&shadow.with_length(incident.distance), world.medium, marching);
         let light = properties.scattering * value * through * incident.irradiance / joint.pdf;
@@ -622,7 +631,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Gather<'_, M, S> {
 
     /// The mean of some connections from a surface, of what arrives or of what is reflected to an eye: of one where there is one light, for which of several was chosen is the
     /// most part of the noise.
-    fn several(&mut self, point: Vec3, hit: &Hit, to_eye: Option<(Vec3, Spectrum)>) -> Spectrum {
+    fn several(&self, point: Vec3, hit: &Hit, to_eye: Option<(Vec3, Spectrum)>) -> Spectrum {
         let (lights, (choice, at)) = (self.estimator.world.lights, self.surface);
         let count = if lights.len() > 1 { self.settings.connections.clamp(1, FROM_SURFACES) } else { 1 };
         let sky = to_eye.is_some() || !self.settings.indirect;
@@ -634,7 +643,8 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Gather<'_, M, S> {
             let at = Vec2::new(wrapped(at.x, 1, k), wrapped(at.y, 2, k));
             let chosen = survey.pick(choice).map(|chosen| (chosen, at));
             let offered = chosen.and_then(|chosen| self.estimator.offered_at(chosen, point, hit, to_eye));
-            sum += offered.map_or(Spectrum::ZERO, |connection| self.estimator.arrived(&connection, &mut self.rng));
+            sum += offered
+                .map_or(Spectrum::ZERO, |connection| self.estimator.arrived(&connection, wrapped(self.offset, 0, k)));
         }
         sum / count as f32
     }
@@ -671,11 +681,11 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Sight for Gather<'_, M, S> {
             many.along(segment, throughput, self.along, &mut self.rng);
             return;
         }
-        let few = NearLights::of(&self.estimator.world.lights, segment, &mut self.rng);
+        let few = NearLights::of(&self.estimator.world.lights, segment, Vec2::new(self.light[1], self.light[2]));
         let count = self.settings.connections.max(1);
         for k in 0..count {
             let u = (k as f32 + self.along[1]) / count as f32;
-            if let Some(light) = few.join(segment, u).and_then(|joint| self.near(segment, &joint)) {
+            if let Some(light) = few.join(segment, u).and_then(|joint| self.near(segment, &joint, k)) {
                 self.seen.medium_single += throughput * light / count as f32;
             }
         }

@@ -201,7 +201,7 @@ impl<'a, M: Medium + ?Sized, S: Scene + ?Sized> Offers<'a, M, S> {
                 (next, times) = (next + step, times + 1.0);
             }
             if times > 0.0 {
-                let light = self.estimator.arrived(connection, rng);
+                let light = self.estimator.arrived(connection, uniform(rng));
                 self.arrived[usize::from(*is_reflected)] += *weight * light * (times * step / guess);
             }
         }

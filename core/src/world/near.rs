@@ -6,7 +6,6 @@ use crate::light::{FromRay, Light, LightSample, Lights, Question, ShadowMap, Sou
 use crate::math::Ray;
 use crate::sampling::distance::Equiangular;
 use crate::sampling::uniform::ONE_MINUS_EPSILON;
-use crate::sampling::{Generator, uniform2};
 
 /// Up to so many lights are looked at each by itself. More: time for every ray; fewer: which light is joined to is left to chance earlier.
 const FEW: usize = ShadowMap::MOST_LIGHTS;
@@ -164,15 +163,13 @@ impl<'a> NearLights<'a> {
         lights.len() > FEW
     }
 
-    /// Of lights that are not [too many](Self::are_many). Where any is near, a point on it is drawn.
-    pub(crate) fn of(lights: &Lights<'a>, ray: &Ray, rng: &mut Generator) -> Self {
+    /// Of lights that are not [too many](Self::are_many). `on_light`, in the unit square, decides around which points of those that are near.
+    pub(crate) fn of(lights: &Lights<'a>, ray: &Ray, on_light: Vec2) -> Self {
         debug_assert!(!Self::are_many(lights));
         let mut all = heapless::Vec::new();
-        let mut on_light = None;
         let question = FromRay { ray: *ray, near: 0.0, far: ray.length, steep: true, until: None };
         for (index, light) in lights.all().iter().enumerate() {
             let Some(interval) = question.part(light) else { continue };
-            let on_light = *on_light.get_or_insert_with(|| uniform2(rng));
             let Some((pivot, anchor)) = light.anchor(on_light) else { continue };
             let Some(law) = Equiangular::new(ray.origin, ray.direction, pivot, interval.0, interval.1) else {
                 continue;
@@ -249,7 +246,7 @@ mod tests {
     use super::*;
     use crate::host::{Hit, Scene};
     use crate::light::{PointLight, SpotLight};
-    use crate::sampling::uniform;
+    use crate::sampling::{Generator, uniform, uniform2};
     use crate::spectrum::Spectrum;
     use crate::surface::Surface;
     use crate::world::shadow_ray;
@@ -273,7 +270,7 @@ mod tests {
         let mut sums = [0.0; 2];
         for i in 0..samples {
             let mut rng = Generator::new(u64::from(i));
-            let near = NearLights::of(lights, &ray, &mut rng);
+            let near = NearLights::of(lights, &ray, uniform2(&mut rng));
             let shift = uniform(&mut rng);
             let value = |k: u32| {
                 let joint = near.join(&ray, (k as f32 + shift) / 4.0)?;
