@@ -140,7 +140,12 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
 
 #[cfg(test)]
 mod tests {
+    use core::convert::Infallible;
+
+    use rand_core::TryRng;
+
     use super::*;
+    use crate::cache::{Caches, RaySettings, radiance};
     use crate::host::{Empty, Hit};
     use crate::light::{EnvironmentMap, FromPoint, Light, QuadLight};
     use crate::math::Mat3;
@@ -160,6 +165,66 @@ mod tests {
             let is_met = distance > 0.0 && distance < ray.length && at.x.abs() < 1.0 && at.y.abs() < 1.0;
             let normal = Vec3::NEG_Z;
             is_met.then_some(Hit { distance, normal, shading: normal, surface: Surface::BLACK, light: Some(0) })
+        }
+    }
+
+    /// The lamp, and a floor at height 0.
+    struct Lit;
+
+    impl Scene for Lit {
+        fn closest_hit(&self, ray: &Ray) -> Option<Hit> {
+            let distance = -ray.origin.z / ray.direction.z;
+            let surface = Surface::Lambert { reflectance: Spectrum::ONE };
+            let floor = Hit { distance, normal: Vec3::Z, shading: Vec3::Z, surface, light: None };
+            Lamp.closest_hit(ray).or((distance > 0.0 && distance < ray.length).then_some(floor))
+        }
+    }
+
+    /// Numbers that are ½, but for one.
+    struct Halves {
+        other: usize,
+        drawn: usize,
+    }
+
+    impl TryRng for Halves {
+        type Error = Infallible;
+
+        fn try_next_u32(&mut self) -> Result<u32, Infallible> {
+            self.drawn += 1;
+            Ok(if self.drawn - 1 == self.other { 1 << 29 } else { 1 << 31 })
+        }
+
+        fn try_next_u64(&mut self) -> Result<u64, Infallible> {
+            let (Ok(low), Ok(high)) = (self.try_next_u32(), self.try_next_u32());
+            Ok(u64::from(high) << 32 | u64::from(low))
+        }
+
+        fn try_fill_bytes(&mut self, bytes: &mut [u8]) -> Result<(), Infallible> {
+            bytes.fill(0x80);
+            Ok(())
+        }
+    }
+
+    /// Of a sequence they are spread best: decision 5.
+    #[test]
+    fn the_first_two_numbers_say_where_on_a_lamp_a_surface_looks() {
+        let quad = QuadLight::new(Vec3::new(-1.0, -1.0, 1.0), 2.0 * Vec3::Y, 2.0 * Vec3::X, Spectrum::ONE).unwrap();
+        let lights = [Light::Quad(quad)];
+        let world = World { medium: &Empty, scene: &Lit, lights: (&lights).into() };
+        let walk = multiple_scatter::Settings::new(Steps::Length(0.1));
+        let (paths, light_samples) = (path::Settings::default(), 1);
+        let estimator = Estimator { world, surfaces: None, photons: None, walk, paths, light_samples, finest: 0.0 };
+        let settings = RaySettings { indirect: false, ..RaySettings::default() };
+        let ray = Ray::new(Vec3::new(0.4, -0.3, 0.5), Vec3::new(0.2, 0.1, -1.0).normalize());
+        let seen = |other| {
+            let mut rng = Halves { other, drawn: 0 };
+            let seen = radiance(&ray, &estimator, &Caches::default(), &settings, &mut rng).surface_direct;
+            (seen, rng.drawn)
+        };
+        let (usual, drawn) = seen(usize::MAX);
+        assert!(usual[0] > 0.0 && drawn > 10);
+        for other in 0..drawn {
+            assert_eq!(seen(other).0 != usual, other < 2, "number {other}");
         }
     }
 

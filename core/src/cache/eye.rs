@@ -436,7 +436,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized, F: FnMut(Place)> Sight for Wanted<'_
 /// lights within whose [`Light::steep_field`](crate::light::Light::steep_field) it lies by equiangular connections along each segment. Of more than eight lights,
 /// connections are tried first, and those that are followed are drawn among them by what they would bring (resampled importance sampling, Talbot et al. 2005).
 /// Where a cache has no record at a point, one sample of what it would hold takes its place, so that
-/// gaps make noise and no holes. `estimator` brings the world; its surface cache is what such
+/// gaps make noise and no holes. Of a sequence of low discrepancy the first numbers are spread best: the first two say where on a lamp the surface looks. `estimator` brings the world; its surface cache is what such
 /// samples use. The ray ends where less than 10⁻⁵ of the light behind would be seen, and what is behind is left out.
 ///
 /// ```
