@@ -35,6 +35,7 @@ mod doubt;
 mod estimates;
 mod finer;
 mod glances;
+mod ground;
 mod pilot;
 mod shoot;
 mod smooth;
@@ -43,6 +44,7 @@ mod weigh;
 
 pub(super) use estimates::MOST_PARTS;
 
+use doubt::{OF_DIRECTIONS, OF_WALKS};
 use finer::Tighter;
 
 /// Eye rays of one job. More: jobs take longer than some milliseconds in dense worlds.
@@ -69,6 +71,10 @@ enum Round {
     Divide,
     /// Light at some places by one half of the photons, and by the other: how noisy are they?
     Doubt {
+        is_second: bool,
+    },
+    /// Light at some places by what surfaces are known to send, before that is estimated again and after: how noisy is it?
+    Ground {
         is_second: bool,
     },
     /// Sample all light along some eye rays: how much does each kind bring?
@@ -158,6 +164,8 @@ pub struct Filling<'s, F> {
     /// Of second estimates, how many times the usual samples, in sum, and how many there are.
     efforts: ByKind<[f64; 2]>,
     left: Option<f32>,
+    /// The noise that coarse irradiance leaves in the picture.
+    ground: f32,
     /// Rounds of more estimates so far.
     again: u32,
     /// How often [`Filling::refine`] was called.
@@ -248,6 +256,7 @@ impl<'s> RadianceCaches<'s> {
             more: ByKind([[0; REGIONS]; Kind::COUNT]),
             efforts: ByKind([[0.0; 2]; Kind::COUNT]),
             left: None,
+            ground: 0.0,
             again: 0,
             level: 0,
             tighter: ByKind([None; Kind::COUNT]),
@@ -308,11 +317,11 @@ impl<'s, F> Filling<'s, F> {
     }
 
     /// The relative noise that records leave in the picture, root of the mean of squares over its pixels, as eye rays have told it that read records
-    /// before and after they were estimated anew, and as halves of the photons have, whose noise all records share; `None` before that, and where no picture is asked for.
+    /// before and after they were estimated anew, and as halves of the photons and of what surfaces are known to send have, whose noise all records share; `None` before that, and where no picture is asked for.
     /// What samples of a pixel average is not in it: their spread tells of that.
     #[must_use]
     pub fn record_noise(&self) -> Option<f32> {
-        self.left.map(|left| float::hypot(left, self.memory.photons.noise()))
+        self.left.map(|left| float::hypot(left, float::hypot(self.memory.photons.noise(), self.ground)))
     }
 
     /// Walks and directions of all records of this fill.
@@ -334,7 +343,7 @@ impl<'s, F> Filling<'s, F> {
     fn at_hand(&self) -> Option<(Step, Effort)> {
         match *TURNS.get(self.step)? {
             Turn::Of(step) => Some((step, self.settings().effort(step.kind)?)),
-            Turn::Doubt | Turn::Glances { .. } => None,
+            Turn::Doubt | Turn::Ground { .. } | Turn::Glances { .. } => None,
         }
     }
 
@@ -456,6 +465,7 @@ impl<'s, F> Filling<'s, F> {
                 }
             }
             Round::Doubt { is_second } => self.take_doubt(is_second),
+            Round::Ground { is_second } => self.take_ground(is_second),
             Round::Weigh => {
                 self.take_shares();
                 self.begin(0);
@@ -531,7 +541,8 @@ where
             Round::Search => self.search(job, world, output),
             Round::Shoot => self.shoot(job, world, output),
             Round::Divide => self.divide(job, world, output),
-            Round::Doubt { .. } => self.doubt(job, world, output),
+            Round::Doubt { .. } => self.read_places(job, (Kind::Multiple, OF_WALKS), world, output),
+            Round::Ground { .. } => self.read_places(job, (Kind::Surface, OF_DIRECTIONS), world, output),
             Round::Weigh => self.weigh(job, world, output),
             Round::Look => self.look(job, output),
             Round::Make => self.make(job, world, output),
@@ -557,7 +568,7 @@ where
         if self.round == Round::Look {
             kept = kept.and(memory.still_open.extend_from_slice(output.open.as_slice()));
         }
-        if matches!(self.round, Round::Weigh | Round::Doubt { .. }) {
+        if matches!(self.round, Round::Weigh | Round::Doubt { .. } | Round::Ground { .. }) {
             kept = kept.and(memory.glances.extend_from_slice(&output.glances));
         }
         if let Round::Glance { is_second } = self.round {
@@ -579,6 +590,7 @@ where
             Round::Shoot | Round::Divide | Round::Doubt { .. } => "fill photons",
             Round::Done => "",
             Round::Weigh | Round::Glance { .. } => "fill glances",
+            Round::Ground { .. } => "fill irradiance",
             Round::Look | Round::Make | Round::Pilot { .. } | Round::Again { .. } | Round::Smooth { .. } => {
                 match self.at_hand().map_or(Kind::Multiple, |(step, _)| step.kind) {
                     Kind::Single => "fill single",

@@ -82,13 +82,13 @@ impl Places {
 pub(super) struct Row {
     name: &'static str,
     pub(super) places: Places,
-    /// Stream of random numbers of new records. Of estimates anew: [`Pass::Again`].
+    /// Stream of random numbers of new records. Of estimates anew: [`Pass::Anew`], [`Pass::Again`].
     pub(super) stream: u64,
     /// Relative variance of samples ([`Guide::relative_variance`](super::Guide::relative_variance)) up to which the usual
     /// number of them will do. Where fog fills a room the means are about 1 for light of surfaces, 5 for multiple scattering
     /// and 2 for irradiance; where light falls through windows ten times that. Smaller: more samples everywhere; larger: noise where light is hard to find.
     pub(super) spread: f32,
-    /// Whether all other records stand on these, so that the first of them get more samples.
+    /// Whether all other records stand on these, so that the first of them get more samples, and their noise is told by what others read of them.
     pub(super) is_ground: bool,
 }
 
@@ -108,7 +108,9 @@ const TABLE: [Row; Kind::COUNT] = {
 pub(super) enum Pass {
     /// New records wherever they are missing.
     Make,
-    /// All records of this fill estimated anew, with their radii held and random numbers of `stream`.
+    /// All records of this fill estimated anew, with their radii held and random numbers of `stream`. Nothing stays of what they were, lit by records that were not all there yet.
+    Anew { stream: u64 },
+    /// As [`Pass::Anew`], mixed with what they were.
     Again { stream: u64 },
     /// As [`Pass::Again`], as often as the noise of the picture asks for, and where estimates are in doubt.
     More { stream: u64 },
@@ -122,6 +124,11 @@ pub(super) enum Turn {
     Of(Step),
     /// Records are read by one half of the photons and by the other.
     Doubt,
+    /// Light at some places is estimated by what surfaces are known to send by then.
+    Ground {
+        /// After that has been estimated again.
+        is_second: bool,
+    },
     Glances {
         /// After records have been estimated anew.
         is_second: bool,
@@ -139,15 +146,18 @@ pub(super) struct Step {
 /// blindly: smaller, and it is wasted; larger, and its noise, which has a say in the radius, makes light too dark.
 pub(super) const FIRST_COUNTS: f32 = 0.5;
 
-/// Steps in their order: first coarse irradiance, by which surfaces light everything else, once more, from what it was revised to, and again where that is in doubt;
-/// then the final kinds, none of which needs another. What is to be averaged comes last.
-pub(super) const TURNS: [Turn; 18] = {
+/// Steps in their order: first coarse irradiance, by which surfaces light everything else, once more, in halves, from what it was revised to, and again as often as
+/// others need it and where it is in doubt; then the final kinds, none of which needs another. What is to be averaged comes last.
+pub(super) const TURNS: [Turn; 21] = {
     use Kind::{CoarseIrradiance, Irradiance, Multiple, Single, Surface};
     const fn make(kind: Kind) -> Turn {
         Turn::Of(Step { kind, pass: Pass::Make })
     }
     const fn smooth(kind: Kind) -> Turn {
         Turn::Of(Step { kind, pass: Pass::Smooth })
+    }
+    const fn anew(kind: Kind, stream: u64) -> Turn {
+        Turn::Of(Step { kind, pass: Pass::Anew { stream } })
     }
     const fn again(kind: Kind, stream: u64) -> Turn {
         Turn::Of(Step { kind, pass: Pass::Again { stream } })
@@ -158,7 +168,10 @@ pub(super) const TURNS: [Turn; 18] = {
     [
         make(CoarseIrradiance),
         Turn::Doubt,
-        again(CoarseIrradiance, 0),
+        anew(CoarseIrradiance, 0),
+        Turn::Ground { is_second: false },
+        again(CoarseIrradiance, 102),
+        Turn::Ground { is_second: true },
         more(CoarseIrradiance, 4000),
         smooth(CoarseIrradiance),
         make(Surface),

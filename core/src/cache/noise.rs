@@ -84,15 +84,15 @@ pub(super) fn dark(glances: &[Glance]) -> f64 {
 /// E[(A₁ − B₁)(A₂ − B₂) | photons] = (E[A − B | photons])² = 4 V((A + B)/2)   in the mean over photons
 /// ```
 ///
-/// As in [`Noise::add`] readings are independent given the photons, so that noise of their walks has no part in it.
-pub(super) fn of_halves(glances: &[Glance]) -> [f64; KINDS] {
+/// Light that is `dark`, over that of a usual place, counts as that bright. As in [`Noise::add`] readings are independent given the photons, so that noise of their walks has no part in it.
+pub(super) fn of_halves(glances: &[Glance], dark: f64) -> [f64; KINDS] {
     let half = glances.len() / 2;
     core::array::from_fn(|k| {
         let light = |glance: &Glance| f64::from(glance.kinds[k]);
         let (mut all, mut places, mut sum) = (0.0, 0.0, 0.0);
         // First how much light there is.
         for is_second in [false, true] {
-            let dark = DARK * all / places;
+            let dark = dark * all / places;
             for (a, b) in glances[..half].chunks_exact(READINGS).zip(glances[half..].chunks_exact(READINGS)) {
                 let mean = a.iter().chain(b).map(light).sum::<f64>() / (2 * READINGS) as f64;
                 if mean > 0.0 && is_second {
@@ -313,15 +313,15 @@ mod tests {
                 half[place] = [(); READINGS].map(|()| of(kind, 3.0 * (1.0 + of_half + 0.05 * sign())));
             }
         }
-        let [single, surface, multiple, irradiance] = of_halves(glances.as_flattened().as_flattened());
+        let [single, surface, multiple, irradiance] = of_halves(glances.as_flattened().as_flattened(), DARK);
         // A quarter of twice the variance of one half.
         let expected = 0.5 * 0.06_f64.powi(2) / (1.0 + DARK * DARK);
         assert!((multiple / expected - 1.0).abs() < 0.05, "{multiple} in place of {expected}");
         assert!(irradiance < 0.05 * expected && (single, surface) == (0.0, 0.0), "{irradiance}");
         // Neither nothing nor what is no number tells of noise.
-        assert_eq!(of_halves(&[]), [0.0; KINDS]);
+        assert_eq!(of_halves(&[], DARK), [0.0; KINDS]);
         let [none, some] = [f32::NAN, 1.0].map(|light| of(Kind::Multiple, light));
-        assert_eq!(of_halves(&[none, some, none, some]), [0.0; KINDS]);
+        assert_eq!(of_halves(&[none, some, none, some], DARK), [0.0; KINDS]);
     }
 
     #[test]

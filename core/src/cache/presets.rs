@@ -68,6 +68,12 @@ const FEWEST: f64 = 48.0;
 /// Part of the error asked for that noise of photons may have in a picture. All records of a place share it: larger is clouds of noise, smaller is time.
 const PHOTON_NOISE: f64 = 0.5;
 
+/// As [`PHOTON_NOISE`], of what surfaces are known to send to all records. It is cheap where records in the medium see many of them, as in even scattering, and what they see most of where it is sharp.
+const GROUND_NOISE: f64 = 0.25;
+
+/// How often it is estimated once more at most for that, as a few spots may make noise that is told by chance. More: time; fewer: spots of walls that shine on all fog before them.
+const MOST_OF_GROUND: u32 = 3;
+
 /// How many times as much noise must be told for more photons to be shot. Less: time for little; more: clouds of noise.
 const TOO_NOISY: f64 = 1.2;
 
@@ -149,6 +155,13 @@ pub(super) fn record_noise(error: f32) -> f64 {
 pub(super) fn more_photons(noise: f32, error: f32) -> Option<f64> {
     let over = f64::from(noise) / (PHOTON_NOISE * f64::from(error));
     (over > TOO_NOISY).then(|| (over * over).min(MOST_MORE))
+}
+
+/// How often coarse irradiance is estimated once more, whose noise in a picture has so much variance after its second estimate, where an error is asked for.
+pub(super) fn rounds_of_ground(variance: f64, error: f32) -> u32 {
+    let most = GROUND_NOISE * f64::from(error);
+    // Casts saturate, and take NaN to 0.
+    (libm::ceil(variance / (most * most) - 1.0) as u32).min(MOST_OF_GROUND)
 }
 
 /// Part of what is off in regions from which on a kind is to blame. Larger: what several kinds have wrong stays; smaller: records are made anew that are right.

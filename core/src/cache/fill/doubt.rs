@@ -1,4 +1,4 @@
-//! Rounds in which light is estimated by one half of the photons, and by the other: how noisy they are, and how many more it takes.
+//! Rounds in which light at some places is estimated twice, with the same random numbers, by what may be noisy: by one half of the photons, and by the other; how many more it takes.
 
 use super::{Filling, RAYS_PER_JOB, Round};
 use crate::cache::asked::Wanted;
@@ -15,29 +15,45 @@ use crate::sampling::{Generator, uniform};
 use crate::world::World;
 
 /// Readings by each half. Fewer: noise is told by chance; more: time.
-const DOUBTS: u32 = 1024;
+const BY_PHOTONS: u32 = 1024;
 
-/// Walks of a reading at least; it has half as many as an estimate of a record of multiple scattering, or where that is not cached of its own kind. As above, by the square.
-const WALKS: u32 = 8;
+/// Readings by what surfaces are known to send, of fewer samples: a few spots that are too bright or too dark make most of its noise, and few rays see them. As above.
+pub(super) const BY_GROUND: u32 = 4096;
+
+/// Walks or directions of a reading at least. As above, by the square.
+const LEAST: u32 = 8;
+
+/// Walks of an estimate of a record over those of a reading. As above.
+pub(super) const OF_WALKS: u32 = 2;
+
+/// The same of directions, of which a picture's light from surfaces needs fewer.
+pub(super) const OF_DIRECTIONS: u32 = 16;
 
 impl<F> Filling<'_, F> {
     /// Begins to tell the noise of photons, if it is not known.
     pub(super) fn begin_doubt(&mut self) -> bool {
-        let readings = DOUBTS.min(noise::readings(self.settings()) / 2);
-        let is_asked = self.settings().error > 0.0 && !self.memory.wanted.is_empty();
-        if !(is_asked && readings >= RAYS_PER_JOB && self.memory.photons.is_untold()) {
+        let jobs = self.jobs_of_places(BY_PHOTONS);
+        if jobs == 0 || !self.memory.photons.is_untold() {
             return false;
         }
         self.memory.glances.clear();
         self.memory.photons.turn(1.0);
-        self.enter(Round::Doubt { is_second: false }, readings / RAYS_PER_JOB);
+        self.enter(Round::Doubt { is_second: false }, jobs);
         true
     }
 
-    /// Light that is scattered more than once, or falls on surfaces, at two places of each of some eye rays.
-    pub(super) fn doubt<M: Medium + ?Sized, S: Scene + ?Sized>(
+    /// Jobs of so many readings by [`Filling::read_places`], none where nothing hangs on what they tell.
+    pub(super) fn jobs_of_places(&self, readings: u32) -> u32 {
+        let is_asked = self.settings().error > 0.0 && !self.memory.wanted.is_empty();
+        if is_asked { readings.min(noise::readings(self.settings()) / 2) / RAYS_PER_JOB } else { 0 }
+    }
+
+    /// Light that falls on surfaces, or is scattered in the medium, of a kind, at two places of each of some eye rays. Each has that part of the samples of a record of this kind,
+    /// or where it is not cached of its own.
+    pub(super) fn read_places<M: Medium + ?Sized, S: Scene + ?Sized>(
         &self,
         job: u32,
+        (in_medium, part): (Kind, u32),
         world: &World<'_, M, S>,
         output: &mut FilledRecords<'_>,
     ) {
@@ -49,7 +65,7 @@ impl<F> Filling<'_, F> {
             let from = u64::from(reading / READINGS as u32) * wanted.len() as u64 / u64::from(rays);
             let mut all = wanted.iter().skip(from as usize).chain(wanted);
             let Some(first) = all.find(|wanted| wanted.place.is_seen) else { return };
-            // The same for both halves, so that what differs between them is the photons.
+            // The same both times, so that what differs is what light is estimated by.
             let mut rng = Generator::new(mix(self.seed() ^ 0x_d0_0b_75) ^ u64::from(reading));
             // What two places of a ray share its pixel shows; the rest it averages.
             let [start, end] = [first.ray, first.ray + 1].map(|ray| wanted.partition_point(|wanted| wanted.ray < ray));
@@ -64,9 +80,9 @@ impl<F> Filling<'_, F> {
                 .find(is_alike)
                 .filter(|_| !reading.is_multiple_of(READINGS as u32));
             let place = found.unwrap_or(first).place;
-            let kind = if place.normal.is_some() { Kind::Irradiance } else { Kind::Multiple };
+            let kind = if place.normal.is_some() { Kind::Irradiance } else { in_medium };
             let Some(effort) = self.settings().effort(kind) else { continue };
-            let count = (self.settings().effort(Kind::Multiple).unwrap_or(effort).samples / 2).max(WALKS);
+            let count = (self.settings().effort(in_medium).unwrap_or(effort).samples / part).max(LEAST);
             let looks = Looks { count, guide: None, learnt: None, to_eye: place.to_eye };
             let mut estimate = Estimate { place, ..Estimate::default() };
             if self.estimate(Step { kind, pass: Pass::Make }, world, looks, &mut estimate, &mut rng, output) {
@@ -81,6 +97,12 @@ impl<F> Filling<'_, F> {
         }
     }
 
+    /// Variance of what halves tell, in the picture, as [`noise::of_halves`] has it.
+    pub(super) fn variance_of_places(&self, dark: f64) -> f64 {
+        let variances = noise::of_halves(self.memory.glances.as_slice(), dark).into_iter().zip(self.caches.shares);
+        variances.map(|(variance, share)| variance * share * share).sum()
+    }
+
     /// Goes on with the other half, or to more photons where both are too noisy.
     pub(super) fn take_doubt(&mut self, is_second: bool) {
         let photons = &mut self.memory.photons;
@@ -93,9 +115,8 @@ impl<F> Filling<'_, F> {
         if let Some((effort, seed)) = self.caches.photon_effort() {
             photons.finish(&effort, seed);
         }
-        let variances = noise::of_halves(self.memory.glances.as_slice()).into_iter().zip(self.caches.shares);
-        let noise = libm::sqrt(variances.map(|(variance, share)| variance * share * share).sum()) as f32;
-        photons.tell(noise);
+        let noise = libm::sqrt(self.variance_of_places(noise::DARK)) as f32;
+        self.memory.photons.tell(noise);
         self.memory.glances.clear();
         let settings = &mut self.caches.settings;
         let more = presets::more_photons(noise, settings.error);

@@ -158,10 +158,17 @@ impl<F> Filling<'_, F> {
         let varies = varies * float::sqrt(varies);
         let more = varies.max(brightness * float::sqrt(varies)).clamp(1.0, MOST_SAMPLES);
         // By the first of them noise is measured, of which little would be seen if they counted less than blind ones.
-        let more = if let Pass::More { .. } = step.pass { more * shown.max(LEAST_SEEN) } else { more };
-        let seen = guides.get(offset).map_or(1.0, |guide| guide.seen);
+        let guide = guides.get(offset);
+        let more = match step.pass {
+            Pass::More { .. } => more * shown.max(LEAST_SEEN),
+            Pass::Anew { .. } => 0.5 * more,
+            // As many as there are, because halves that count alike tell their noise.
+            Pass::Again { .. } if step.kind.row().is_ground => guide.map_or(0.5, |guide| guide.held),
+            _ => more,
+        };
+        let seen = guide.map_or(1.0, |guide| guide.seen);
         let count = samples(step.kind, &effort, record.radius, self.usual, seen) as f32 * more;
-        Some((around, more, count as u32))
+        Some((around, more, (count as u32).max(1)))
     }
 
     /// Whether a record is to be estimated once more: as often as the region asks for it that asks for most, and where samples around it have come to
@@ -207,7 +214,7 @@ impl<F> Filling<'_, F> {
     ) {
         let Some((step, effort)) = self.at_hand() else { return };
         let stream = match step.pass {
-            Pass::Again { stream, .. } => stream,
+            Pass::Anew { stream } | Pass::Again { stream } => stream,
             Pass::More { stream } => stream + u64::from(self.again),
             Pass::Make | Pass::Smooth => return,
         };
@@ -309,7 +316,7 @@ mod tests {
 }
 
 #[cfg(all(test, feature = "alloc"))]
-mod doubted {
+pub(super) mod doubted {
     use super::*;
     use crate::cache::kind::{TURNS, Turn};
     use crate::cache::{RadianceCaches, Settings};
@@ -324,7 +331,7 @@ mod doubted {
     use crate::world::Outline;
 
     /// A grey ball around the world, with a window to the sky.
-    struct Shell;
+    pub(in crate::cache::fill) struct Shell;
 
     impl Scene for Shell {
         fn closest_hit(&self, ray: &Ray) -> Option<Hit> {
@@ -351,6 +358,8 @@ mod doubted {
         let settings = Settings { seed, rays: 256, error: 0.0, photons: None, ..settings };
         let of_kind = |turn: &Turn| matches!(turn, Turn::Of(step) if step.kind == kind);
         let [_, again, more] = core::array::from_fn(|pass| {
+            // The part that comes first is held by the next.
+            let pass = pass + usize::from(kind.row().is_ground);
             TURNS.iter().enumerate().filter(|(_, turn)| of_kind(turn)).nth(pass).unwrap().0
         });
         let mut filling = RadianceCaches::new(settings).fill(Asked::anywhere_in(bounds));
@@ -359,9 +368,11 @@ mod doubted {
             assert!(work::step(&mut filling, &world, &mut output));
         }
         if is_spoiled {
+            // Of two halves one is spoiled for both.
+            let bright = if kind.row().is_ground { 2.0 * BRIGHT - 1.0 } else { BRIGHT };
             let first = &mut filling.memory.estimates.as_mut_slice()[0];
-            let value = first.sums.value.mean() * BRIGHT * SAMPLES as f32;
-            first.sums.value *= BRIGHT;
+            let value = first.sums.value.mean() * bright * SAMPLES as f32;
+            first.sums.value *= bright;
             first.learnt.add(Vec3::Z, value, 1.0, SAMPLES);
         }
         filling.is_cut |= is_cut;

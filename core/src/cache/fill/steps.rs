@@ -30,6 +30,11 @@ impl<F> Filling<'_, F> {
             if *turn == Turn::Doubt && self.begin_doubt() {
                 return;
             }
+            if let Turn::Ground { is_second } = *turn
+                && self.begin_ground(is_second)
+            {
+                return;
+            }
             let Some((step, effort)) = self.at_hand() else { continue };
             let slot = &self.caches.slots[step.kind];
             if slot.is_off() {
@@ -46,7 +51,7 @@ impl<F> Filling<'_, F> {
                         return;
                     }
                 }
-                Pass::Again { .. } | Pass::More { .. } => {
+                Pass::Anew { .. } | Pass::Again { .. } | Pass::More { .. } => {
                     let from = self.before[step.kind].min(slot.len());
                     self.again += u32::from(matches!(step.pass, Pass::More { .. }));
                     if self.begin_again((step, effort), from) {
@@ -194,9 +199,7 @@ impl<F> Filling<'_, F> {
             let offset = estimate.number as usize;
             let guide = self.memory.guides[step.kind].as_mut_slice().get_mut(offset);
             let held = guide.as_ref().map_or(FIRST_COUNTS, |guide| guide.held);
-            // Nothing stays of what was lit by records that were not all there yet.
-            let is_stale = step.kind.row().is_ground && matches!(step.pass, Pass::Again { .. });
-            let held = if is_stale { 0.0 } else { held };
+            let held = if let Pass::Anew { .. } = step.pass { 0.0 } else { held };
             let share = estimate.effort / (held + estimate.effort);
             if let Some(guide) = guide {
                 guide.held = held + estimate.effort;
