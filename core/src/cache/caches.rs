@@ -91,6 +91,8 @@ pub struct RadianceCaches<'s> {
     dropped_with_photons: u32,
     /// What part of a picture's light each kind brings, in the order of [`Kind::FINAL`], as far as that is known.
     pub(super) shares: [f64; Kind::FINAL.len()],
+    /// The relative noise that coarse irradiance leaves in a picture, 0 before it is told.
+    pub(super) ground: f32,
     /// The light in cells that the last complete shooting has left: of the world, not of a view.
     pub(super) photons: PhotonGrid<'s>,
 }
@@ -113,6 +115,7 @@ impl RadianceCaches<'static> {
             dropped: 0,
             dropped_with_photons: 0,
             shares: [1.0; Kind::FINAL.len()],
+            ground: 0.0,
             photons: PhotonGrid::none(),
         }
     }
@@ -167,6 +170,7 @@ impl<'s> RadianceCaches<'s> {
             dropped: 0,
             dropped_with_photons: 0,
             shares: [1.0; Kind::FINAL.len()],
+            ground: 0.0,
             photons: PhotonGrid::none(),
         }
     }

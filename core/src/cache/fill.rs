@@ -164,8 +164,6 @@ pub struct Filling<'s, F> {
     /// Of second estimates, how many times the usual samples, in sum, and how many there are.
     efforts: ByKind<[f64; 2]>,
     left: Option<f32>,
-    /// The noise that coarse irradiance leaves in the picture.
-    ground: f32,
     /// Rounds of more estimates so far.
     again: u32,
     /// How often [`Filling::refine`] was called.
@@ -256,7 +254,6 @@ impl<'s> RadianceCaches<'s> {
             more: ByKind([[0; REGIONS]; Kind::COUNT]),
             efforts: ByKind([[0.0; 2]; Kind::COUNT]),
             left: None,
-            ground: 0.0,
             again: 0,
             level: 0,
             tighter: ByKind([None; Kind::COUNT]),
@@ -321,7 +318,7 @@ impl<'s, F> Filling<'s, F> {
     /// What samples of a pixel average is not in it: their spread tells of that.
     #[must_use]
     pub fn record_noise(&self) -> Option<f32> {
-        self.left.map(|left| float::hypot(left, float::hypot(self.memory.photons.noise(), self.ground)))
+        self.left.map(|left| float::hypot(left, float::hypot(self.memory.photons.noise(), self.caches.ground)))
     }
 
     /// Walks and directions of all records of this fill.

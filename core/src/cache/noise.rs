@@ -78,13 +78,13 @@ pub(super) fn dark(glances: &[Glance]) -> f64 {
     if glances.is_empty() { 0.0 } else { DARK * sum / glances.len() as f64 }
 }
 
-/// Relative variance of what photons tell of each kind, in the order of [`Kind::FINAL`]: of [`READINGS`] along each ray by one half of them, each at a place of its own, and after all these as many by the other.
+/// Relative variance of what photons, or others that come in halves, tell of each kind, in the order of [`Kind::FINAL`]: of [`READINGS`] along each ray by one half of them, each at a place of its own, and after all these as many by the other.
 ///
 /// ```text
 /// E[(A₁ − B₁)(A₂ − B₂) | photons] = (E[A − B | photons])² = 4 V((A + B)/2)   in the mean over photons
 /// ```
 ///
-/// Light that is `dark`, over that of a usual place, counts as that bright. As in [`Noise::add`] readings are independent given the photons, so that noise of their walks has no part in it.
+/// `dark` is light, over that of a usual place, that is added to that of each in squares. As in [`Noise::add`] readings are independent given the photons, so that noise of their walks has no part in it.
 pub(super) fn of_halves(glances: &[Glance], dark: f64) -> [f64; KINDS] {
     let half = glances.len() / 2;
     core::array::from_fn(|k| {

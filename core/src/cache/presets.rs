@@ -68,10 +68,10 @@ const FEWEST: f64 = 48.0;
 /// Part of the error asked for that noise of photons may have in a picture. All records of a place share it: larger is clouds of noise, smaller is time.
 const PHOTON_NOISE: f64 = 0.5;
 
-/// As [`PHOTON_NOISE`], of what surfaces are known to send to all records. It is cheap where records in the medium see many of them, as in even scattering, and what they see most of where it is sharp.
+/// The same of coarse irradiance, which lights all records. Larger: spots of walls that shine on all sharply scattering fog before them; smaller: time.
 const GROUND_NOISE: f64 = 0.25;
 
-/// How often it is estimated once more at most for that, as a few spots may make noise that is told by chance. More: time; fewer: spots of walls that shine on all fog before them.
+/// How often it is estimated once more at most for that, as a few spots may make noise that is told by chance. More: time, where light is hard to find; fewer: noise of spots.
 const MOST_OF_GROUND: u32 = 3;
 
 /// How many times as much noise must be told for more photons to be shot. Less: time for little; more: clouds of noise.

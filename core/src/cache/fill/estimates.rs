@@ -358,7 +358,7 @@ pub(super) mod doubted {
         let settings = Settings { seed, rays: 256, error: 0.0, photons: None, ..settings };
         let of_kind = |turn: &Turn| matches!(turn, Turn::Of(step) if step.kind == kind);
         let [_, again, more] = core::array::from_fn(|pass| {
-            // The part that comes first is held by the next.
+            // Second estimates in halves: the second of them.
             let pass = pass + usize::from(kind.row().is_ground);
             TURNS.iter().enumerate().filter(|(_, turn)| of_kind(turn)).nth(pass).unwrap().0
         });

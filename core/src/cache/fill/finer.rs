@@ -117,7 +117,7 @@ impl<'s, F: Fn([f32; 2]) -> Ray> Filling<'s, F> {
         self.level += 1;
         self.are_more = false;
         self.view = self.asked.mark(&self.caches.settings);
-        (self.noise, self.dark, self.left, self.ground, self.again) = (Noise::default(), 0.0, None, 0.0, 0);
+        (self.noise, self.dark, self.left, self.again) = (Noise::default(), 0.0, None, 0);
         self.more = ByKind([[0; REGIONS]; Kind::COUNT]);
         self.efforts = ByKind([[0.0; 2]; Kind::COUNT]);
         self.all_computed = ByKind([0; Kind::COUNT]);

@@ -35,7 +35,10 @@ impl<F> Filling<'_, F> {
             let variance = 4.0 * self.variance_of_places(DARK);
             let rounds = presets::rounds_of_ground(variance, self.settings().error);
             self.more[Kind::CoarseIrradiance] = [rounds; REGIONS];
-            self.ground = libm::sqrt(variance / f64::from(1 + rounds)) as f32;
+            let left = libm::sqrt(variance / f64::from(1 + rounds)) as f32;
+            // Of few records that are new, what others have is not told again.
+            self.caches.ground =
+                if self.before[Kind::CoarseIrradiance] > 0 { left.max(self.caches.ground) } else { left };
             self.memory.glances.clear();
         }
         self.begin(self.step + 1);
@@ -93,7 +96,7 @@ mod tests {
             assert!(work::step(&mut filling, &world, &mut output));
         }
         let rounds = f64::from(filling.more[Kind::CoarseIrradiance][0]);
-        (f64::from(filling.ground).powi(2) * (1.0 + rounds), rounds, read)
+        (f64::from(filling.caches.ground).powi(2) * (1.0 + rounds), rounds, read)
     }
 
     /// How far what surfaces send to a ray differs from seed to seed is what halves of each tell. Sharp fog sees single spots of them, and asks for more.
