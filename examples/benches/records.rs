@@ -41,7 +41,7 @@ impl WithMedium for Job<'_> {
         let paths = path::Settings::default();
         let estimator =
             Estimator { world, surfaces: None, photons: None, walk, paths, light_samples: 16, finest: 0.02 };
-        let eye = RaySettings { density: 1.0, connections: 4, lights_visible: true, indirect: true };
+        let eye = RaySettings { density: 1.0, connections: 4, lamp_parts: 1, lights_visible: true, indirect: true };
         let camera = self.0.camera();
         let mut found: Vec<Place> = Vec::new();
         for i in 0..RAYS {

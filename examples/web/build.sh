@@ -21,7 +21,7 @@ module() {
         cargo rustc --quiet --locked --lib --crate-type cdylib --profile module --config "profile.module.package.fogbow.opt-level=$2" \
         -Zbuild-std=core,alloc,panic_abort -Zbuild-std-features=optimize_for_size --target wasm32-unknown-unknown --target-dir "$TARGET/$1"
     # In the first kilobyte of memory is the end of the stack, and nothing that has an address: so small offsets never wrap, and go into instructions.
-    wasm-opt --low-memory-unused -Os -Os --enable-simd --enable-bulk-memory --enable-sign-ext --enable-mutable-globals --enable-nontrapping-float-to-int \
+    wasm-opt --low-memory-unused --merge-similar-functions -Os -Oz --enable-simd --enable-bulk-memory --enable-sign-ext --enable-mutable-globals --enable-nontrapping-float-to-int \
         "$TARGET/$1/wasm32-unknown-unknown/module/fogbow_web.wasm" -o "$out/$1.wasm"
 }
 
@@ -31,7 +31,7 @@ mkdir -p "$out"
 module plain '"s"' "-Cllvm-args=-inline-threshold=5 -Cllvm-args=-inlinehint-threshold=50" &
 plain=$!
 # Instructions for vectors make shorter code: there is room to make it faster.
-module simd 2 "-Cllvm-args=-inline-threshold=10 -Cllvm-args=-inlinehint-threshold=30 -Ctarget-feature=+simd128"
+module simd 2 "-Cllvm-args=-inline-threshold=10 -Cllvm-args=-inlinehint-threshold=25 -Ctarget-feature=+simd128"
 wait $plain
 node scripts/pack.mjs "$out/package" "$out/plain.wasm" "$out/simd.wasm"
 node scripts/site.mjs "$out/page" "$out/package"

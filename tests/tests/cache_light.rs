@@ -133,7 +133,7 @@ fn eye_rays_without_caches_count_the_sky_once() {
     for origin in [Vec3::new(0.1, 0.2, 4.0), Vec3::new(0.9, 0.3, 4.0)] {
         let ray = Ray::new(origin, Vec3::NEG_Z);
         let make = estimator(&medium, &body, &lights);
-        let eye = RaySettings { density: 8.0, connections: 4, lights_visible: true, indirect: true };
+        let eye = RaySettings { density: 8.0, connections: 4, lamp_parts: 1, lights_visible: true, indirect: true };
         let all = estimate(8000, |rng| radiance(&ray, &make, &Caches::default(), &eye, rng).total());
         all.assert_is(SKY, 2e-4, &format!("all light from {origin}"));
 
@@ -314,7 +314,7 @@ fn eye_rays_see_what_the_caches_hold() {
         multiple: Some(Reader { cache: &multiple, reading }),
         ..Caches::default()
     };
-    let eye = RaySettings { density: 8.0, connections: 4, lights_visible: true, indirect: true };
+    let eye = RaySettings { density: 8.0, connections: 4, lamp_parts: 1, lights_visible: true, indirect: true };
     let seen = estimate(4000, |rng| {
         let direction = warp::uniform_sphere(uniform2(rng));
         radiance(&Ray::new(Vec3::ZERO, direction), &make, &caches, &eye, rng).total()
@@ -539,7 +539,7 @@ fn coated_surfaces_seen_by_eye_rays_are_as_bright_as_by_paths() {
         for lights in [&lights[..], &lights[..1]] {
             let scene = Corner(surface);
             let make = estimator(&medium, &scene, lights);
-            let eye = RaySettings { density: 4.0, connections: 2, lights_visible: true, indirect: true };
+            let eye = RaySettings { density: 4.0, connections: 2, lamp_parts: 1, lights_visible: true, indirect: true };
             let seen = estimate(40_000, |rng| radiance(&ray, &make, &Caches::default(), &eye, rng).total());
             let traced = estimate(160_000, |rng| path::radiance(&ray, &make.world, &make.paths, rng).total());
             for c in 0..3 {
@@ -553,4 +553,41 @@ fn coated_surfaces_seen_by_eye_rays_are_as_bright_as_by_paths() {
             }
         }
     }
+}
+
+/// A white floor at z = 0; half-way up to a lamp at z = 10 m a screen hides what lies beyond 1 cm to the right.
+struct HalfHidden;
+
+impl Scene for HalfHidden {
+    fn closest_hit(&self, ray: &Ray) -> Option<Hit> {
+        let distance = -ray.origin.z / ray.direction.z;
+        let surface = Surface::Lambert { reflectance: Spectrum::ONE };
+        let hit = Hit { distance, normal: Vec3::Z, shading: Vec3::Z, surface, light: None };
+        (distance > 0.0 && distance < ray.length).then_some(hit)
+    }
+    fn is_blocked(&self, ray: &Ray) -> bool {
+        let to_screen = (5.0 - ray.origin.z) / ray.direction.z;
+        to_screen > 0.0 && to_screen < ray.length && ray.at(to_screen).x > 0.01
+    }
+}
+
+/// Of a lamp 10 cm wide seven tenths are seen. Of its four parts two are seen, and two in four of ten cases: `V = (0.4 · 0.6/8)` in place of `0.7 · 0.3`.
+#[test]
+fn parts_of_a_lamp_are_looked_at_evenly() {
+    let (medium, scene) = (fog(0.0, 0.0, Phase::ISOTROPIC), HalfHidden);
+    let (corner, side) = (Vec3::new(-0.05, -0.05, 10.0), 0.1);
+    let lights = [Light::Quad(QuadLight::new(corner, side * Vec3::Y, side * Vec3::X, Spectrum::ONE).unwrap())];
+    let make = estimator(&medium, &scene, &lights);
+    let ray = Ray::new(2.0 * Vec3::Z, Vec3::NEG_Z);
+    let [whole, parts] = [1, 4].map(|lamp_parts| {
+        let eye = RaySettings { lamp_parts, indirect: false, ..RaySettings::default() };
+        estimate(40_000, |rng| radiance(&ray, &make, &Caches::default(), &eye, rng).surface_direct)
+    });
+    // E/π, E = L A/d² but for the lamp's extent.
+    let truth = 0.7 * f64::from(side * side) / 100.0 / f64::from(PI);
+    for seen in [whole, parts] {
+        seen.assert_is([truth; 3], 1e-4, "light of a lamp half hidden");
+    }
+    let gain = (whole.error[0] / parts.error[0]).powi(2);
+    assert!((gain / (0.7 * 0.3 / (0.4 * 0.6 / 8.0)) - 1.0).abs() < 0.05, "variance falls to 1/{gain}");
 }

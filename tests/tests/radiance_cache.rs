@@ -27,7 +27,8 @@ use fogbow_std::threads::{Ending, Threads, run};
 use fogbow_std::tiles;
 use fogbow_tests::hosts::{Ball, Body, Filled};
 
-const EYE: RaySettings = RaySettings { density: 6.0, connections: 4, lights_visible: true, indirect: true };
+const EYE: RaySettings =
+    RaySettings { density: 6.0, connections: 4, lamp_parts: 1, lights_visible: true, indirect: true };
 /// About the angle between pixels of an image of 16 × 16 (rad).
 const PIXEL: f32 = 0.06;
 

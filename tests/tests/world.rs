@@ -85,7 +85,7 @@ fn null_interfaces_change_no_light() {
         Light::Point(PointLight::new(Vec3::new(0.5, 0.2, 4.0), Spectrum::splat(3.0)).unwrap()),
     ];
     let ray = Ray::new(Vec3::new(0.2, 0.1, 3.0), Vec3::new(0.0, 0.6, -0.8));
-    let eye = RaySettings { density: 8.0, connections: 1, lights_visible: true, indirect: true };
+    let eye = RaySettings { density: 8.0, connections: 1, lamp_parts: 1, lights_visible: true, indirect: true };
     for light in &lights {
         let light = core::slice::from_ref(light);
         let [plain, sheets] = [0, MANY].map(|count| {
@@ -162,7 +162,7 @@ fn rays_that_never_get_past_an_interface_end_as_at_a_black_wall() {
     let seen = path::radiance(&ray, &world, &Settings::default(), &mut Generator::new(1));
     assert_eq!(seen.total(), Spectrum::ZERO);
     let make = estimator(&Empty, &scene, &sky);
-    let eye = RaySettings { density: 8.0, connections: 1, lights_visible: true, indirect: true };
+    let eye = RaySettings { density: 8.0, connections: 1, lamp_parts: 1, lights_visible: true, indirect: true };
     let seen = radiance(&ray, &make, &Caches::default(), &eye, &mut Generator::new(1));
     assert_eq!(seen.total(), Spectrum::ZERO);
 }
@@ -196,7 +196,7 @@ fn lamps_on_null_interfaces_are_seen() {
     let ray = Ray::new(Vec3::ZERO, Vec3::Z);
     for lights_visible in [true, false] {
         let settings = Settings { lights_visible, ..Settings::default() };
-        let eye = RaySettings { density: 8.0, connections: 1, lights_visible, indirect: true };
+        let eye = RaySettings { density: 8.0, connections: 1, lamp_parts: 1, lights_visible, indirect: true };
         let by_paths = path::radiance(&ray, &world, &settings, &mut Generator::new(1)).total();
         let by_caches = radiance(&ray, &make, &Caches::default(), &eye, &mut Generator::new(1)).total();
         assert_eq!(

@@ -421,7 +421,7 @@ impl RadianceCaches<'_> {
         let (settings, slots) = (&self.settings, &mut self.slots);
         let asked = Asked::View { ray, pixel: 0.0 };
         for number in (0..settings.rays).filter(|number| wrong(Asked::at(*number))) {
-            asked.visit(number, world, settings, |place, _| {
+            asked.visit(number, world, settings, &mut |place, _| {
                 if place.is_seen {
                     kinds()
                         .filter(|kind| kind.row().places.hold(&place))

@@ -29,6 +29,8 @@ pub struct RaySettings {
     /// Connections per segment of a ray to lights in whose near field it runs; as many, but four at most, from a surface where there are several lights. Of more than eight
     /// lights, several times as many are tried, from points in the medium as well, and as many as both together are followed (32 and 4 at most).
     pub connections: u32,
+    /// Parts of a single light with extent that each surface looks at, four at most. More: less noise in each sample where smoke hides some parts and not others, for a connection each.
+    pub lamp_parts: u32,
     /// Whether eye rays see area lights and the environment.
     pub lights_visible: bool,
     /// Whether light is followed beyond its first scattering.
@@ -36,10 +38,10 @@ pub struct RaySettings {
 }
 
 impl Default for RaySettings {
-    /// Eight points where fog is opaque, eight connections to near lights, all light. More of both: less noise in each sample, for
+    /// Eight points where fog is opaque, eight connections to near lights, lamps as a whole, all light. More of both: less noise in each sample, for
     /// more time; fewer, and samples are spent on rays that bring little.
     fn default() -> Self {
-        Self { density: 8.0, connections: 8, lights_visible: true, indirect: true }
+        Self { density: 8.0, connections: 8, lamp_parts: 1, lights_visible: true, indirect: true }
     }
 }
 
@@ -310,7 +312,9 @@ impl Onward {
             let value = hit.value(to_eye, sample.to_light) - known;
             rest = value * (hit.cosine(sample.to_light).abs() / sample.pdf);
         }
-        let ray = Ray::new(leave(point, hit.normal, sample.to_light, hit.distance), sample.to_light);
+        // Between curved mirrors what a direction is longer or shorter than 1 by grows with every bounce.
+        let to_light = sample.to_light.normalize();
+        let ray = Ray::new(leave(point, hit.normal, to_light, hit.distance), to_light);
         Some(Self { ray, last, of_lights: sample.weight, rest })
     }
 
@@ -360,7 +364,7 @@ pub struct Place {
 /// # use fogbow::world::World;
 /// let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::ONE, Phase::ISOTROPIC)?;
 /// let world = World { medium: &fog, scene: &Empty, lights: (&[]).into() };
-/// let settings = RaySettings { density: 8.0, connections: 1, lights_visible: true, indirect: true };
+/// let settings = RaySettings { density: 8.0, connections: 1, lamp_parts: 1, lights_visible: true, indirect: true };
 /// let (ray, mut found) = (Ray::between(Vec3::ZERO, core::f32::consts::LN_2 * Vec3::X), Vec::new());
 /// places(&ray, &world, &settings, &mut Generator::new(1), |place| found.push(place));
 /// assert_eq!(found.len(), 4);   // half of what is seen is fog
@@ -383,7 +387,7 @@ pub(super) fn places_around<M: Medium + ?Sized, S: Scene + ?Sized>(
     point: Vec3,
     direction: Vec3,
     world: &World<'_, M, S>,
-    mut visit: impl FnMut(Place),
+    visit: &mut dyn FnMut(Place),
 ) {
     if world.medium.properties(point).scattering.is_black() {
         return;
@@ -455,7 +459,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized, F: FnMut(Place)> Sight for Wanted<'_
 /// let record = Record { position: Vec3::ZERO, radius: 50.0, value: Spectrum::ONE, gradient: Gradient::ZERO };
 /// cache.insert(record, &[])?;
 /// let caches = Caches { single: Some(Reader { cache: &cache, reading: Reading::new(0.5) }), ..Caches::default() };
-/// let settings = RaySettings { density: 64.0, connections: 1, lights_visible: true, indirect: true };
+/// let settings = RaySettings { density: 64.0, connections: 1, lamp_parts: 1, lights_visible: true, indirect: true };
 /// let ray = Ray::new(Vec3::ZERO, Vec3::X);
 /// let seen = radiance(&ray, &estimator, &caches, &settings, &mut Generator::new(1));
 /// assert!((seen.medium_single[0] - 1.0).abs() < 0.02 && seen.misses == 0);   // so opaque fog looks like 1
@@ -486,7 +490,7 @@ pub fn radiance<M: Medium + ?Sized, S: Scene + ?Sized>(
 /// # let walk = multiple_scatter::Settings::new(Steps::Length(0.1));
 /// # let (paths, light_samples) = (path::Settings::default(), 1);
 /// # let estimator = Estimator { world, surfaces: None, photons: None, walk, paths, light_samples, finest: 1e-3 };
-/// let settings = RaySettings { density: 8.0, connections: 1, lights_visible: true, indirect: true };
+/// let settings = RaySettings { density: 8.0, connections: 1, lamp_parts: 1, lights_visible: true, indirect: true };
 /// let ray = Ray::new(-5.0 * Vec3::X, Vec3::X);
 /// let seen = radiance_beyond(&ray, &estimator, &Caches::default(), &settings, &mut Generator::new(1));
 /// assert!((seen.emitted[0] - (-2.0_f32).exp()).abs() < 1e-6);
@@ -629,18 +633,26 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Gather<'_, M, S> {
         light.is_finite().then_some(light)
     }
 
-    /// The mean of some connections from a surface, of what arrives or of what is reflected to an eye: of one where there is one light, for which of several was chosen is the
-    /// most part of the noise.
+    /// The mean of some connections from a surface, of what arrives or of what is reflected to an eye: which of several lights was chosen, or, behind smoke that lets more of one part
+    /// of a lamp through than of another, which part, is most of the noise. Elsewhere samples of a pixel average that as well.
     fn several(&self, point: Vec3, hit: &Hit, to_eye: Option<(Vec3, Spectrum)>) -> Spectrum {
         let (lights, (choice, at)) = (self.estimator.world.lights, self.surface);
-        let count = if lights.len() > 1 { self.settings.connections.clamp(1, FROM_SURFACES) } else { 1 };
+        let count = match &lights[..] {
+            [light] if light.is_delta() => 1,
+            [_] => self.settings.lamp_parts.clamp(1, FROM_SURFACES),
+            _ => self.settings.connections.clamp(1, FROM_SURFACES),
+        };
+        // As many parts of a lamp, each by an even sequence of its own.
+        let columns = 2 - count % 2;
+        let rows = count / columns;
         let sky = to_eye.is_some() || !self.settings.indirect;
         let question = FromPoint { sky, ..FromPoint::all(point) };
         let survey = lights.survey(&question);
         let mut sum = Spectrum::ZERO;
         for k in 0..count {
             let choice = wrapped(choice + k as f32 / count as f32, 0, 0);
-            let at = Vec2::new(wrapped(at.x, 1, k), wrapped(at.y, 2, k));
+            let part = Vec2::new((k % columns) as f32, (k / columns) as f32);
+            let at = ((at + part) / Vec2::new(columns as f32, rows as f32)).min(Vec2::splat(1.0 - f32::EPSILON));
             let chosen = survey.pick(choice).map(|chosen| (chosen, at));
             let offered = chosen.and_then(|chosen| self.estimator.offered_at(chosen, point, hit, to_eye));
             sum += offered

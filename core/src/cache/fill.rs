@@ -385,7 +385,7 @@ impl<'s, F> Filling<'s, F> {
         for ray in from..(from + RAYS_PER_JOB).min(self.settings().rays) {
             // Surfaces that light a place come right after it, and are of no use if nothing is made there.
             let mut is_open = false;
-            self.asked.visit(ray, world, self.settings(), |place, distance| {
+            self.asked.visit(ray, world, self.settings(), &mut |place, distance| {
                 if place.is_seen {
                     is_open = !self.is_known(&place);
                 }

@@ -25,7 +25,7 @@ const ALONG: u32 = 2;
 /// Tried from a point, and from a surface for each that would be followed where lights are few. More: less noise of the light that was chosen; fewer: time.
 const TRIED: u32 = 4;
 
-/// Connections from a surface at most, where lights are several. More: shadow rays for what samples of a pixel average as well; fewer: the choice of one light makes most of the noise.
+/// Connections from a surface at most, where one is not as good as several. More: shadow rays for what samples of a pixel average as well; fewer: which light, and which part of it, makes most of the noise.
 pub(super) const FROM_SURFACES: u32 = 4;
 
 /// The golden ratio and the plastic numbers: multiples of them, wrapped, fill the unit interval and square evenly.

@@ -1,5 +1,6 @@
 //! Every tuned number of radiance caching, from an outline of the world.
 
+use super::eye::RaySettings;
 use super::kind::Kind;
 use super::lobe;
 use super::photons::PhotonEffort;
@@ -96,6 +97,9 @@ const FINEST: f32 = 0.01;
 
 /// Samples of all lights with extent together, for a record of single scattering, and the most of one.
 const LIGHT_SAMPLES: [u32; 2] = [128, 16];
+
+/// Parts of a lamp that surfaces look at where the medium varies: see [`RaySettings::lamp_parts`]. More: time; fewer: grain where smoke dims a part of the lamp.
+const LAMP_PARTS: u32 = 4;
 
 /// Steps of marching over the resolution of the medium. Longer: rays see less of what varies, and transmittance is slightly too bright; shorter: time.
 const STEP: f32 = 3.0;
@@ -318,6 +322,7 @@ impl Settings {
                 ..multiple_scatter::Settings::new(Steps::Length(step * outline.resolution))
             },
             pixels: Self::default().pixels.map(|pixels| pixels * rougher),
+            eye: RaySettings { lamp_parts: if outline.is_constant { 1 } else { LAMP_PARTS }, ..RaySettings::default() },
             light_samples: (LIGHT_SAMPLES[0] / outline.lights.all.max(1) as u32).clamp(1, LIGHT_SAMPLES[1]),
             finest: FINEST * size * rougher,
             ..Self::default()
