@@ -571,7 +571,8 @@ impl Scene for HalfHidden {
     }
 }
 
-/// Of a lamp 10 cm wide seven tenths are seen. Of its four parts two are seen, and two in four of ten cases: `V = (0.4 · 0.6/8)` in place of `0.7 · 0.3`.
+/// Of a lamp 10 cm wide seven tenths are seen. Of its four parts, each looked at where the others are, two are seen, and two in four of ten cases: `V = 0.4 · 0.6/4` in place of
+/// `0.7 · 0.3`.
 #[test]
 fn parts_of_a_lamp_are_looked_at_evenly() {
     let (medium, scene) = (fog(0.0, 0.0, Phase::ISOTROPIC), HalfHidden);
@@ -589,5 +590,5 @@ fn parts_of_a_lamp_are_looked_at_evenly() {
         seen.assert_is([truth; 3], 1e-4, "light of a lamp half hidden");
     }
     let gain = (whole.error[0] / parts.error[0]).powi(2);
-    assert!((gain / (0.7 * 0.3 / (0.4 * 0.6 / 8.0)) - 1.0).abs() < 0.05, "variance falls to 1/{gain}");
+    assert!((gain / (0.7 * 0.3 / (0.4 * 0.6 / 4.0)) - 1.0).abs() < 0.05, "variance falls to 1/{gain}");
 }

@@ -642,7 +642,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Gather<'_, M, S> {
             [_] => self.settings.lamp_parts.clamp(1, FROM_SURFACES),
             _ => self.settings.connections.clamp(1, FROM_SURFACES),
         };
-        // As many parts of a lamp, each by an even sequence of its own.
+        // As many parts of a lamp, each by the same even sequence.
         let columns = 2 - count % 2;
         let rows = count / columns;
         let sky = to_eye.is_some() || !self.settings.indirect;
