@@ -31,7 +31,7 @@ mkdir -p "$out"
 module plain '"s"' "-Cllvm-args=-inline-threshold=5 -Cllvm-args=-inlinehint-threshold=50" &
 plain=$!
 # Instructions for vectors make shorter code: there is room to make it faster.
-module simd 2 "-Cllvm-args=-inline-threshold=10 -Cllvm-args=-inlinehint-threshold=25 -Ctarget-feature=+simd128"
+module simd 2 "-Cllvm-args=-inline-threshold=10 -Cllvm-args=-inlinehint-threshold=20 -Ctarget-feature=+simd128"
 wait $plain
 node scripts/pack.mjs "$out/package" "$out/plain.wasm" "$out/simd.wasm"
 node scripts/site.mjs "$out/page" "$out/package"
