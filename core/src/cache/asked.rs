@@ -53,7 +53,7 @@ const STRAIGHT: f32 = 1.0 - 1e-6;
 /// Cosine of the greatest angle between normals of what may be one surface.
 const SAME_SIDE: f32 = 0.9;
 
-/// Whether a ray comes to a surface, so far from where it begins (m), by a mirror or through glass.
+/// Whether a place, so far from where a ray begins (m), is on a surface to which mirrors or glass have bent the ray.
 fn is_mirrored(place: &Place, ray: &Ray, distance: f32) -> bool {
     let along = (place.point - ray.origin).dot(ray.direction);
     place.is_seen && place.normal.is_some() && along < STRAIGHT * distance
@@ -135,6 +135,7 @@ impl<F: Fn([f32; 2]) -> Ray> Asked<F> {
         match self {
             Self::View { ray, .. } => {
                 let at @ [x, y] = Asked::at(number);
+                // The ray beside goes first, and only where there is a mirror; by the same random numbers, so that both are sent on alike.
                 let next = ray([if x < 0.5 { x + BESIDE } else { x - BESIDE }, y]);
                 let rays = [next, ray(at)];
                 let is_mirror = nearest_surface(&rays[1], world.scene).is_some_and(|hit| hit.surface.is_followed());
@@ -148,6 +149,7 @@ impl<F: Fn([f32; 2]) -> Ray> Asked<F> {
                             } else if let Some(Place { point, normal, .. }) = beside.take()
                                 && normal.unwrap_or_default().dot(place.normal.unwrap_or_default()) > SAME_SIDE
                             {
+                                // NaN, where both rays are the same, is not the greater.
                                 let apart = ray.direction.distance(next.direction);
                                 distance = distance.max(place.point.distance(point) / apart);
                             }
