@@ -8,6 +8,7 @@
     FOGBOW_REFERENCE=FOLDER python3 tests/acceptance/cache.py determinism [SCENE...]
     FOGBOW_REFERENCE=FOLDER python3 tests/acceptance/cache.py cost        [SCENE...]
     FOGBOW_REFERENCE=FOLDER python3 tests/acceptance/cache.py levels      [SCENE...] [--plot FILE.svg]
+    FOGBOW_REFERENCE=FOLDER python3 tests/acceptance/cache.py asked       [SCENE...] [--seed N]
 
 FOLDER and what must be built and installed: see ground.py. SCENE is a name in public/. CPU seconds are those of all
 phases of filling and of the rendering, without reading, building the tree and writing. --store keeps long renders.
@@ -32,10 +33,12 @@ determinism  the same bytes of .pfm and .exr with 1, 2 and 7 threads, and from a
 cost         CPU time of a record and of a look-up, their ratio (100 to 1000 in Jarosz et al. 2008), and the share of
              look-ups in the render. A look-up is what the render takes more than one of --max-depth 2, which marches to
              the same points and connects the same lights, divided by the number of look-ups.
-
-Exit status 1 when a line fails.
 levels       error after --time 0.5 to 64 on one thread: it falls, and is 15 % at most after 2 s. On a machine that others use the clock is not
              processor time.
+asked        --error E of 0.1, 0.05, 0.02 and 0.01: the error lies between 0.4 E and 1.2 E in at least 9 of 10 cases. Scenes: six references and six
+             of the matrix (its make.py is run), of which truth is known as in `speed`.
+
+Exit status 1 when a line fails; of `asked`, when too few are met.
 """
 import argparse, os, subprocess, sys, tempfile
 import numpy as np
@@ -46,6 +49,10 @@ from plot import plot
 CACHED = ("--method", "radiance-cache")
 SHARP = ("spot-shafts", "nave-shafts", "lantern")  # borders of light no wider than a pixel, heavy tails
 CORNELL = [f"cornell-{medium}-{phase}" for medium in ("homog", "hetero") for phase in ("iso", "hg06")]
+
+# Of which the error is compared with what was asked for.
+ASKED = ["cornell-homog-iso", "cornell-hetero-hg06", "point-homog-iso-lo", "room-plume", "statue-g06", "lantern"]
+ASKED_OF_MATRIX = ["thickness-2", "thickness-8", "g-08", "centimetre", "sky", "spot"]
 
 # What --error is asked for; the cheapest first.
 LADDER = (0.03, 0.025, 0.02, 0.015, 0.01)
@@ -126,11 +133,19 @@ def climb(scene, truth, size, goal):
     return seconds
 
 
+def truth_of(scene, arguments):
+    """Of a scene of the references what is stored, of any other file two path traced pictures."""
+    if not scene.endswith(".xml"):
+        return Stored(scene)
+    name = os.path.splitext(os.path.basename(scene))[0]
+    return Halves(*halves(arguments.store, name, scene, arguments.spp))
+
+
 def speed(scenes, arguments):
     failures, goal = 0, 0.02
     for scene in scenes or CORNELL:
         name, is_stored = os.path.splitext(os.path.basename(scene))[0], not scene.endswith(".xml")
-        truth = Stored(scene) if is_stored else Halves(*halves(arguments.store, name, scene, arguments.spp))
+        truth = truth_of(scene, arguments)
         image, statistics = render(scene, "--method", "path", "--spp", arguments.samples, "--seed", 100)
         path = truth.relative_square(image) * cpu(statistics) / goal**2
         peer = np.inf
@@ -248,6 +263,24 @@ def levels(scenes, arguments):
     return failures
 
 
+def asked(scenes, arguments):
+    if not scenes:
+        folder = os.path.join(arguments.store, "matrix")
+        maker = os.path.join(common.REFERENCE, "matrix", "make.py")
+        subprocess.run([sys.executable, maker, folder], check=True, stdout=subprocess.DEVNULL)
+        scenes = ASKED + [os.path.join(folder, name + ".xml") for name in ASKED_OF_MATRIX]
+    met = []
+    for scene in scenes:
+        truth = truth_of(scene, arguments)
+        for goal in (0.1, 0.05, 0.02, 0.01):
+            image, statistics = render(scene, *CACHED, "--error", goal, "--seed", arguments.seed)
+            times = np.sqrt(max(truth.relative_square(image), 0)) / goal
+            met.append(0.4 <= times <= 1.2)
+            print(f"{os.path.basename(scene):24s} {verdict(met[-1])} --error {goal}: {times:.2f} of it in {cpu(statistics, ['fill', 'audit', 'render']):.1f} CPU s", flush=True)
+    print(f"{sum(met)} of {len(met)} between 0.4 and 1.2 of what was asked")
+    return sum(met) < 0.9 * len(met)
+
+
 def cost(scenes, _):
     for scene in scenes or CORNELL + ["spot-shafts", "room-plume", "nave-shafts"]:
         # As many samples for both: by default there are more where nothing is cached.
@@ -265,7 +298,7 @@ def cost(scenes, _):
 
 
 if __name__ == "__main__":
-    what = {f.__name__: f for f in (accuracy, speed, flicker, reuse, determinism, cost, levels)}
+    what = {f.__name__: f for f in (accuracy, speed, flicker, reuse, determinism, cost, levels, asked)}
     parser = argparse.ArgumentParser(usage=__doc__)
     parser.add_argument("what", choices=what)
     parser.add_argument("scenes", nargs="*", metavar="SCENE")
