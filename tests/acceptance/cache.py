@@ -299,7 +299,7 @@ def cost(scenes, _):
 
 if __name__ == "__main__":
     what = {f.__name__: f for f in (accuracy, speed, flicker, reuse, determinism, cost, levels, asked)}
-    parser = argparse.ArgumentParser(usage=__doc__)
+    parser = argparse.ArgumentParser(usage=__doc__.replace("%", "%%"))
     parser.add_argument("what", choices=what)
     parser.add_argument("scenes", nargs="*", metavar="SCENE")
     parser.add_argument("--size")
