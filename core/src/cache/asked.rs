@@ -1,6 +1,6 @@
 //! Where light is asked for: along the eye rays of a picture, or anywhere in a box.
 
-use super::eye::{Place, places, places_around};
+use super::places::{Place, places, places_around};
 use super::settings::Settings;
 use crate::bytes::Crc;
 use crate::host::{Medium, Scene};

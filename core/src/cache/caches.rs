@@ -3,12 +3,13 @@
 use super::asked::Asked;
 use super::audit::{Deviation, Findings};
 use super::bias_map::BiasMap;
-use super::eye::{CachedRadiance, Caches, Last, Reader, radiance, radiance_beyond, straight};
+use super::eye::{Last, straight};
 use super::kind::Kind;
 use super::photons::{PhotonEffort, PhotonGrid};
 use super::presets::{MENDED, finer_by};
 use super::record::Record;
 use super::room::{chunks_of, stride_of};
+use super::seen::{CachedRadiance, Caches, Reader, radiance, radiance_beyond};
 use super::settings::Settings;
 use super::slot::{ByKind, Slot};
 use super::{Estimator, SurfaceCache, VolumeCache};

@@ -1,6 +1,6 @@
 //! The kinds of caches: what each holds, where it has records, what lights it, and in which order they are made.
 
-use super::eye::Place;
+use super::places::Place;
 
 /// What a cache holds. A further kind is a variant, a row of the table of kinds and the steps that make it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]

@@ -1,12 +1,12 @@
 //! What a fill of caches remembers, and what its jobs leave: growing, or lent.
 
 use super::asked::Wanted;
-use super::eye::Place;
 use super::fill::RAYS_PER_JOB;
 use super::guide::Guide;
 use super::noise::Glance;
 use super::photons::{PhotonDeposit, PhotonGrid};
 use super::pilots::Pilots;
+use super::places::Place;
 use super::radius::Limits;
 use super::record::Facing;
 use super::room::Slots;

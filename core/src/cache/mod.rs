@@ -44,7 +44,7 @@
 //! | `estimate` | [`Estimator`]: what records are made of |
 //! | `connect` | connections of points to lights, for records and for eye rays |
 //! | `evidence` | how far gradients can be believed; edges of the sky |
-//! | `eye` | [`places`] and [`radiance`] of eye rays |
+//! | `eye`, `places`, `seen` | eye rays: where they go; where they ask ([`places`]); what they see ([`radiance`]) |
 //! | `offers` | their connections to many lights: more are tried than are followed |
 //! | `agreement` | whether gradients of records agree with the records around them |
 //! | `audit`, `bias_map` | [`Audit`]: how far pictures from caches are off; [`BiasMap`]: where |
@@ -79,6 +79,7 @@ mod offers;
 mod output_bytes;
 mod photons;
 mod pilots;
+mod places;
 mod presets;
 mod radius;
 mod readers;
@@ -86,6 +87,7 @@ mod record;
 mod refine;
 mod resolved;
 mod room;
+mod seen;
 mod set_bytes;
 mod settings;
 mod shares;
@@ -99,7 +101,7 @@ pub use bias_map::{AuditedRegion, BiasMap, MeanLight};
 pub use caches::RadianceCaches;
 pub use estimate::Estimator;
 pub use extrapolate::{Blend, Extrapolation, exponent_limit, weight};
-pub use eye::{CachedRadiance, Caches, Place, RaySettings, Reader, places, radiance, radiance_beyond};
+pub use eye::RaySettings;
 pub use fill::Filling;
 pub use guide::{Guide, Guided, Looks};
 pub use index::{Block, Index, IndexNode};
@@ -108,12 +110,14 @@ pub use lookup::{Basis, Reading, TURNING_DEGREE, TurningBasis};
 pub use memory::{Estimate, FilledRecords, FillingMemory};
 pub use noise::Glance;
 pub use photons::{PhotonCell, PhotonDeposit, PhotonEffort, PhotonGrid};
+pub use places::{Place, places};
 pub use presets::{ERROR_BOUNDS, MOST_REPAIRS, MOST_SAMPLES, USUAL_ERROR};
 pub use radius::{Limits, clamp_gradient, clearance, log_gradient_radius, neighbour_clamped, valid_radius};
 pub use readers::ScatteredLight;
 pub use record::{Attachment, Facing, Record};
 pub use refine::{LevelPicture, Refinement};
 pub use room::{Room, Slots, room_for};
+pub use seen::{CachedRadiance, Caches, Reader, radiance, radiance_beyond};
 pub use set_bytes::CachesError;
 pub use settings::{Effort, Settings};
 pub use store::{Cache, InsertError, SurfaceCache, VolumeCache};

@@ -7,9 +7,9 @@
 //! weighs much, for its light or for how hard it is to find, is estimated anew more often; one that the picture hardly shows is not. So it is region by region:
 //! what is dark is seen by itself, and its records go on when those of what is bright are good enough.
 
-use super::eye::CachedRadiance;
 use super::kind::{FIRST_COUNTS, Kind};
 use super::presets;
+use super::seen::CachedRadiance;
 use super::settings::Settings;
 use crate::sent::packed;
 use crate::spectrum::Spectrum;

@@ -1,12 +1,12 @@
 //! What jobs of a fill leave, as bytes: for workers that share no memory.
 
 use super::asked::Wanted;
-use super::eye::Place;
 use super::guide::Guide;
 use super::memory::{Estimate, FilledRecords};
 use super::noise::Glance;
 use super::photons::PhotonDeposit;
 use super::pilots::Pilots;
+use super::places::Place;
 use super::radius::Limits;
 use super::record::Facing;
 use crate::sent::{JobBytesError, Packed, Received, Sending, byte_count, packed};

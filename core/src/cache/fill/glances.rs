@@ -2,11 +2,11 @@
 
 use super::{Filling, RAYS_PER_JOB, Round};
 use crate::cache::asked::Asked;
-use crate::cache::eye::radiance;
 use crate::cache::kind::Kind;
 use crate::cache::memory::FilledRecords;
 use crate::cache::noise::{self, Glance, READINGS, rounds_for};
 use crate::cache::presets;
+use crate::cache::seen::radiance;
 use crate::host::{Medium, Scene};
 use crate::math::Ray;
 use crate::sampling::independent;

@@ -3,10 +3,10 @@
 use super::{Filling, RAYS_PER_JOB, Round};
 use crate::cache::Caches;
 use crate::cache::asked::Asked;
-use crate::cache::eye::radiance;
 use crate::cache::kind::Kind;
 use crate::cache::memory::FilledRecords;
 use crate::cache::noise::Glance;
+use crate::cache::seen::radiance;
 use crate::cache::shares::{self, SCATTERINGS};
 use crate::host::{Medium, Scene};
 use crate::math::Ray;
