@@ -14,7 +14,6 @@ use super::resolved::MAX_DEGREE;
 use crate::host::{Medium, Scene};
 use crate::light::Light;
 use crate::math::{Bounds, Ray, Vec3};
-use crate::phase::Phase;
 use crate::photon::{Event, trace_split};
 use crate::sampling::uniform::mix;
 use crate::sampling::{Generator, uniform};
@@ -472,7 +471,7 @@ mod tests {
     use crate::light::PointLight;
     use crate::medium::{Homogeneous, Placed, Region};
     use crate::path;
-    use crate::phase::Lobe;
+    use crate::phase::{Lobe, Phase};
     use crate::surface::Surface;
 
     const BOX: Bounds = Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE };
