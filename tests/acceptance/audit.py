@@ -183,7 +183,7 @@ def broken(scenes, arguments):
 
 if __name__ == "__main__":
     what = {f.__name__: f for f in (truth, broken)}
-    parser = argparse.ArgumentParser(usage=__doc__)
+    parser = argparse.ArgumentParser(usage=__doc__.replace("%", "%%"))
     parser.add_argument("what", choices=what)
     parser.add_argument("scenes", nargs="*", metavar="SCENE")
     parser.add_argument("--error", type=float, default=0.05)
