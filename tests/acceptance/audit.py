@@ -15,7 +15,7 @@ broken: caches that were saved are spoiled in the file and read again: light of 
 import argparse, lzma, os, shutil, struct, subprocess, sys, tempfile
 import numpy as np
 import common
-from common import compare, cpu, path_of, render, verdict
+from common import compare, cpu, matrix, path_of, render, verdict
 
 CACHED = ("--method", "radiance-cache")
 KINDS = ("single", "surface", "multiple", "irradiance", "coarse irradiance")
@@ -23,13 +23,6 @@ BROKEN = ["cornell-homog-iso", "cornell-hetero-hg06"]
 
 # A picture whose error is so many times that of right caches is off; repaired, it must be less, or near the error asked for.
 WORSE = 1.5
-
-
-def matrix(folder):
-    maker = os.path.join(common.REFERENCE, "matrix", "make.py")
-    subprocess.run([sys.executable, maker, folder], check=True, stdout=subprocess.DEVNULL)
-    with open(os.path.join(folder, "names.txt")) as file:
-        return [os.path.join(folder, name + ".xml") for name in file.read().split()]
 
 
 def traced(scene, seconds, store):

@@ -8,7 +8,7 @@
     FOGBOW_REFERENCE=FOLDER python3 tests/acceptance/cache.py determinism [SCENE...]
     FOGBOW_REFERENCE=FOLDER python3 tests/acceptance/cache.py cost        [SCENE...]
     FOGBOW_REFERENCE=FOLDER python3 tests/acceptance/cache.py levels      [SCENE...] [--plot FILE.svg]
-    FOGBOW_REFERENCE=FOLDER python3 tests/acceptance/cache.py asked       [SCENE...] [--seed N]
+    FOGBOW_REFERENCE=FOLDER python3 tests/acceptance/cache.py asked       [SCENE...] [--seed N] [--spp N]
 
 FOLDER and what must be built and installed: see ground.py. SCENE is a name in public/. CPU seconds are those of all
 phases of filling and of the rendering, without reading, building the tree and writing. --store keeps long renders.
@@ -42,7 +42,7 @@ Exit status 1 when a line fails; of `asked`, when too few are met.
 """
 import argparse, os, subprocess, sys, tempfile
 import numpy as np
-from common import Halves, Stored, compare, cpu, every_scene, halves, peer_run, render, verdict
+from common import Halves, Stored, compare, cpu, every_scene, halves, matrix, peer_run, render, verdict
 import common
 from plot import plot
 
@@ -265,10 +265,8 @@ def levels(scenes, arguments):
 
 def asked(scenes, arguments):
     if not scenes:
-        folder = os.path.join(arguments.store, "matrix")
-        maker = os.path.join(common.REFERENCE, "matrix", "make.py")
-        subprocess.run([sys.executable, maker, folder], check=True, stdout=subprocess.DEVNULL)
-        scenes = ASKED + [os.path.join(folder, name + ".xml") for name in ASKED_OF_MATRIX]
+        of_matrix = matrix(os.path.join(arguments.store, "matrix"))
+        scenes = ASKED + [file for file in of_matrix if os.path.basename(file)[:-4] in ASKED_OF_MATRIX]
     met = []
     for scene in scenes:
         truth = truth_of(scene, arguments)

@@ -15,6 +15,14 @@ def every_scene():
     return sorted(name[:-4] for name in os.listdir(PUBLIC) if name.endswith(".xml"))
 
 
+def matrix(folder):
+    """Makes the scenes of the matrix in a folder -> their files"""
+    maker = os.path.join(REFERENCE, "matrix", "make.py")
+    subprocess.run([sys.executable, maker, folder], check=True, stdout=subprocess.DEVNULL)
+    with open(os.path.join(folder, "names.txt")) as file:
+        return [os.path.join(folder, name + ".xml") for name in file.read().split()]
+
+
 def path_of(scene):
     """A scene of the references by its name, any other by its path."""
     return scene if scene.endswith(".xml") else os.path.join(PUBLIC, scene + ".xml")

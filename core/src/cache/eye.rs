@@ -46,7 +46,7 @@ const INVISIBLE: f32 = 1e-5;
 
 /// What an eye ray meets.
 pub(super) trait Sight {
-    /// A segment of it, the throughput at its start, and a sample's random numbers for it.
+    /// A segment of it, and the throughput at its start.
     fn segment(&mut self, _segment: &Ray, _throughput: Spectrum) {}
     /// A point in the medium: in-scattered radiance counts by `weight`.
     fn scatter(&mut self, point: Vec3, to_eye: Vec3, properties: &Properties, weight: Spectrum);
