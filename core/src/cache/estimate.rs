@@ -47,6 +47,9 @@ const ELSEWHERE: f32 = 0.25;
 /// Less: more records than they mend.
 const LEAST_BREADTH: f32 = 0.1;
 
+/// Surfaces that send rays on, one after the other, behind which light is still looked up; behind more of them a path is traced. More: deeper calls, where mirrors face each other.
+const MOST_MIRRORS: u32 = 4;
+
 /// Light in cells, at which a walk ends.
 struct Cells<'a> {
     photons: Option<&'a PhotonGrid<'a>>,
@@ -233,7 +236,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
                 let ray = Ray::new(point, to_light);
                 let end = nearest_surface(&ray, self.world.scene);
                 let collision = walk.first(&ray, end.as_ref(), third(j, offset), false, rng).collision;
-                let incoming = self.walked(&walk, &Start { ray, end, pdf, collision }, rng) * share;
+                let incoming = self.walked(&walk, &Start { ray, end, pdf, collision }, MOST_MIRRORS, rng) * share;
                 if let Some(learnt) = &mut learnt {
                     let found = incoming.irradiance.mean() * counts(eye, to_light);
                     learnt.add(to_light, found * count as f32, pdf, count);
@@ -263,9 +266,9 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
     }
 
     /// Light scattered in the medium along a ray, by one walk that ends where caches know the rest.
-    fn walked(&self, walk: &Walk<'_, M, S>, start: &Start, rng: &mut impl Rng) -> Incoming {
+    fn walked(&self, walk: &Walk<'_, M, S>, start: &Start, mirrors: u32, rng: &mut impl Rng) -> Incoming {
         let mut child = Generator::child(rng);
-        let outgoing = |ray: &Ray, hit: &Hit| self.outgoing(ray, hit, &mut child);
+        let outgoing = |ray: &Ray, hit: &Hit| self.sent_back(ray, hit, mirrors, &mut child);
         let mut cells = Cells { photons: self.photons, sharp: 1.0 };
         self.steadied(walk.along(start, outgoing, &mut cells, rng))
     }
@@ -333,7 +336,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
             }
             openings.add_surface(end.as_ref(), pdf / cosine);
             let start = Start { ray, end, pdf: 1.0, collision: flown.collision };
-            let light = tilted(&self.walked(&walk, &start, rng), tilt) * weight;
+            let light = tilted(&self.walked(&walk, &start, MOST_MIRRORS, rng), tilt) * weight;
             scattered.add(to_light, &light);
             total += light;
             if let Some(learnt) = &mut learnt {
@@ -368,6 +371,11 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
 
     /// Radiance (W·m⁻²·sr⁻¹) that a surface sends back along a ray, but for its own emission.
     pub fn outgoing(&self, ray: &Ray, hit: &Hit, rng: &mut Generator) -> Spectrum {
+        self.sent_back(ray, hit, MOST_MIRRORS, rng)
+    }
+
+    /// The same, past so many more surfaces that send rays on.
+    fn sent_back(&self, ray: &Ray, hit: &Hit, mirrors: u32, rng: &mut Generator) -> Spectrum {
         let point = ray.at(hit.distance);
         let Surface::Lambert { reflectance } = hit.surface else {
             // What glows on the way of a path is in none of its parts alone.
@@ -375,7 +383,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
                 let before = leave(point, hit.normal, -ray.direction, hit.distance);
                 return self.traced(&Ray { origin: before, ..*ray }, rng);
             }
-            return self.sent_on(point, hit, -ray.direction, rng);
+            return self.sent_on((point, hit, -ray.direction), mirrors, rng);
         };
         // One-sided: black from behind.
         if reflectance.is_black() || !hit.faces(-ray.direction) {
@@ -387,8 +395,8 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
         lambert::value(reflectance) * (direct + indirect)
     }
 
-    /// Radiance (W·m⁻²·sr⁻¹) that a surface which is not Lambertian sends `to_eye`, but for its own emission: by a connection, what is known of its diffuse base, and a path.
-    fn sent_on(&self, point: Vec3, hit: &Hit, to_eye: Vec3, rng: &mut Generator) -> Spectrum {
+    /// Radiance (W·m⁻²·sr⁻¹) that a surface which is not Lambertian sends `to_eye`, but for its own emission: by a connection, what is known of its diffuse base, and a ray that goes on.
+    fn sent_on(&self, (point, hit, to_eye): (Vec3, &Hit, Vec3), mirrors: u32, rng: &mut Generator) -> Spectrum {
         let base = known_base(hit, to_eye);
         let look_up = || self.surfaces.and_then(|(cache, reading)| cache.lookup(point, hit.shading, &reading));
         let known = if base.is_black() { None } else { look_up() };
@@ -401,7 +409,19 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
         let (choice, turn) = (uniform(rng), uniform2(rng));
         let Some(onward) = Onward::draw((point, hit, to_eye), base, choice, turn) else { return light };
         light += onward.straight(&self.world, Marching { steps: self.walk.steps, offset: uniform(rng) });
-        light + onward.rest * self.traced(&onward.ray, rng)
+        light + onward.rest * self.seen_along(&onward.ray, mirrors, rng)
+    }
+
+    /// Radiance at the origin of a ray but for light straight from the lights and a sky: from the surface at its end and from the medium, or, past all `mirrors`, by one path.
+    fn seen_along(&self, ray: &Ray, mirrors: u32, rng: &mut Generator) -> Spectrum {
+        let Some(mirrors) = mirrors.checked_sub(1) else { return self.traced(ray, rng) };
+        let (walk, end) = (self.walker(), nearest_surface(ray, self.world.scene));
+        let flown = walk.first(ray, end.as_ref(), uniform(rng), end.is_some(), rng);
+        let start = Start { ray: *ray, end, pdf: 1.0, collision: flown.collision };
+        let scattered = self.walked(&walk, &start, mirrors, rng).irradiance;
+        let Some(hit) = &end else { return scattered };
+        let through = flown.whole.unwrap_or_default().value.transmitted();
+        scattered + through * self.sent_back(ray, hit, mirrors, rng)
     }
 
     /// Irradiance (W·m⁻²) from the lights but a sky, by one connection.
@@ -521,7 +541,7 @@ impl<M: Medium + ?Sized, S: Scene + ?Sized> Estimator<'_, M, S> {
         let ray = Ray::new(point, sample.to_light);
         let end = nearest_surface(&ray, self.world.scene);
         let collision = walk.first(&ray, end.as_ref(), uniform(rng), false, rng).collision;
-        let incoming = self.walked(&walk, &Start { ray, end, pdf: sample.pdf, collision }, rng);
+        let incoming = self.walked(&walk, &Start { ray, end, pdf: sample.pdf, collision }, MOST_MIRRORS, rng);
         incoming.scatter(to_eye, phase).radiance
     }
 

@@ -240,25 +240,20 @@ impl<'s> LightTree<'s> {
         if u32::try_from(count).map_or(true, |count| count >= LEAF / 2) {
             return Err(Full);
         }
-        for _ in 0..2 * count {
+        for _ in 0..3 * count {
             nodes.push(LightNode::EMPTY)?;
         }
-        for (i, light) in lights.iter().enumerate() {
-            nodes.push(LightNode::of(i, light))?;
-        }
         let (nodes_of_tree, items) = nodes.as_mut_slice().split_at_mut(2 * count);
-        let kind = |node: &LightNode| node.leaf().map(|i| Kind::of(&lights[i]));
-        items.sort_unstable_by_key(|node| (kind(node), node.below));
         let mut builder = Builder { lights, nodes: nodes_of_tree, used: 0 };
-        let (mut roots, mut rest) = ([NONE; KINDS], items);
+        let mut roots = [NONE; KINDS];
         for (root, wanted) in roots.iter_mut().zip(Kind::ALL) {
-            let (own, others) = rest.split_at_mut(rest.iter().take_while(|node| kind(node) == Some(wanted)).count());
-            if !own.is_empty() {
+            let own = lights.iter().enumerate().filter(|(_, light)| Kind::of(light) == wanted);
+            let count = items.iter_mut().zip(own).map(|(item, (i, light))| *item = LightNode::of(i, light)).count();
+            if count > 0 {
                 *root = builder.used as u32;
                 builder.used += 1;
-                builder.divide(own, *root, NONE);
+                builder.divide(&mut items[..count], *root, NONE);
             }
-            rest = others;
         }
         nodes.truncate(2 * count);
         Ok(Self { nodes, roots })
