@@ -657,4 +657,58 @@ mod tests {
         let (sums, facing) = estimator.irradiance(Vec3::ZERO, Vec3::Z, 8, &mut Generator::new(1));
         assert!(sums.gradient.is_finite() && facing.turn.is_finite());
     }
+
+    /// Two mirrors, at x = ±1, between a floor and a ceiling, at z = ±1.
+    struct Corridor;
+
+    impl Scene for Corridor {
+        fn closest_hit(&self, ray: &Ray) -> Option<Hit> {
+            let plane = |axis: Vec3, surface: Surface| {
+                let along = axis.dot(ray.direction);
+                let normal = -axis * along.signum();
+                let distance = (along.signum() - axis.dot(ray.origin)) / along;
+                (distance > 0.0).then_some(Hit { distance, normal, shading: normal, surface, light: None })
+            };
+            let mirror = plane(Vec3::X, Surface::Mirror { reflectance: Spectrum::splat(0.9) });
+            let wall = plane(Vec3::Z, Surface::Lambert { reflectance: Spectrum::splat(0.6) });
+            let nearest = mirror.into_iter().chain(wall).min_by(|a, b| a.distance.total_cmp(&b.distance));
+            nearest.filter(|hit| hit.distance < ray.length)
+        }
+    }
+
+    /// Of light that comes by few mirrors and by many, and of what fog scatters on the way.
+    #[test]
+    fn light_past_mirrors_is_that_of_paths_and_varies_less() {
+        let fog =
+            crate::medium::Homogeneous::new(Spectrum::splat(0.1), Spectrum::splat(0.3), Phase::ISOTROPIC).unwrap();
+        let lamp = crate::light::SphereLight::new(Vec3::new(0.3, 0.5, 0.6), 0.1, Spectrum::splat(10.0)).unwrap();
+        let lights = [Light::Sphere(lamp)];
+        let world = World { medium: &fog, scene: &Corridor, lights: (&lights).into() };
+        let walk = multiple_scatter::Settings::new(crate::transmittance::thickness::Steps::Length(0.1));
+        let paths = path::Settings::default();
+        let estimator = Estimator { world, surfaces: None, photons: None, walk, paths, light_samples: 1, finest: 0.0 };
+        let mut rng = Generator::new(7);
+        let (mut varies, mut of_paths) = (0.0, 0.0);
+        for steepness in [2.0, 0.3, 0.05] {
+            let ray = Ray::new(Vec3::ZERO, Vec3::new(1.0, 0.1, -steepness).normalize());
+            let (hit, count) = (Corridor.closest_hit(&Ray::new(ray.origin, Vec3::X)).unwrap(), 20_000);
+            let hit = Hit { distance: hit.distance / ray.direction.x, ..hit };
+            let before = leave(ray.at(hit.distance), hit.normal, -ray.direction, hit.distance);
+            let mut of = |sample: &mut dyn FnMut(&mut Generator) -> Spectrum| {
+                let (mut sum, mut squares) = (0.0, 0.0);
+                for _ in 0..count {
+                    let light = f64::from(sample(&mut rng).mean());
+                    (sum, squares) = (sum + light, squares + light * light);
+                }
+                let mean = sum / f64::from(count);
+                (mean, squares / f64::from(count) - mean * mean)
+            };
+            let (found, variance) = of(&mut |rng| estimator.outgoing(&ray, &hit, rng));
+            let (traced, by_paths) = of(&mut |rng| estimator.traced(&Ray { origin: before, ..ray }, rng));
+            let error = ((variance + by_paths) / f64::from(count)).sqrt();
+            assert!((found - traced).abs() < 3.5 * error && error < 0.04 * traced, "{found} {traced} ± {error}");
+            (varies, of_paths) = (varies + variance, of_paths + by_paths);
+        }
+        assert!(varies < 0.7 * of_paths, "{varies} {of_paths}");
+    }
 }

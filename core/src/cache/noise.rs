@@ -215,14 +215,17 @@ pub(super) fn variance_after(left: &[Left; KINDS], rounds: [u32; KINDS]) -> f64 
 
 /// How often each kind should be estimated once more, so that variances sum to `most`: always the one whose noise falls by most for its
 /// cost, as long as noise falls faster than the work that was `spent` grows. Of kinds that are made coarsely (`coarser`) a round is as much cheaper, and
-/// there may be as many more.
+/// there may be as many more. Where the most rounds would not do by far, there are fewer.
 pub(super) fn rounds_for(
     left: &[Left; KINDS],
     (costs, coarser): ([f64; KINDS], [f32; KINDS]),
     most: f64,
     spent: f64,
 ) -> [u32; KINDS] {
-    let limits = coarser.map(|factor| (presets::MOST_ROUNDS as f32 * factor * factor) as u32);
+    // Rounds that would do go like the square of noise.
+    let hope = presets::HOPELESS * most / variance_after(left, [0; KINDS]);
+    let limit = presets::MOST_ROUNDS as f32 * (hope as f32).clamp(presets::LEAST_HOPE, 1.0);
+    let limits = coarser.map(|factor| (limit * factor * factor) as u32);
     let (mut rounds, mut work) = ([0; KINDS], spent);
     loop {
         let sum = variance_after(left, rounds);
@@ -353,7 +356,12 @@ mod tests {
         let shared = rounds([0.0, 2.0, 2.0, 2.0], [1.0, 1.0, 4.0, 1.0]);
         assert!(shared[1] == shared[3] && shared[2] < shared[1] && shared[0] == 0, "{shared:?}");
         assert!(variance_after(&of([0.0, 2.0, 2.0, 2.0]), shared) < 3.5);
-        assert_eq!(rounds([0.0, 1e9, 0.0, 0.0], [1.0; 4]), [0, presets::MOST_ROUNDS, 0, 0], "but not for ever");
+        assert_eq!(rounds([0.0, 32.0, 0.0, 0.0], [1.0; 4]), [0, presets::MOST_ROUNDS, 0, 0], "but not for ever");
+        assert_eq!(
+            rounds([0.0, 1e9, 0.0, 0.0], [1.0; 4]),
+            [0, presets::MOST_ROUNDS / 8, 0, 0],
+            "the less, the less it helps"
+        );
         assert_eq!(rounds([0.0, 1.2, 0.0, 0.0], [1e6; 4]), [0; 4], "nor where it does not pay");
         assert_eq!(rounds([0.0, 5.0, 0.0, 0.0], [0.0; 4]), [0; 4], "nor what has no records");
     }

@@ -139,6 +139,13 @@ pub(super) const SMOOTHED: f64 = 0.7;
 /// How often records are estimated once more at most. More: time; fewer: noise where light is hard to find.
 pub(super) const MOST_ROUNDS: u32 = 32;
 
+/// Variance over what is asked for beyond which a part of a picture gets fewer rounds, in inverse proportion: somewhat more than the most rounds take away. More:
+/// minutes for what stays grain; fewer: grain where patience would have helped.
+pub(super) const HOPELESS: f64 = 32.0;
+
+/// Part of the most rounds that there is at least.
+pub(super) const LEAST_HOPE: f32 = 0.125;
+
 /// Part of the noise of a picture by which it falls at least, over the part by which work grows. Less: long fills for little; more: noise.
 pub(super) const PAYS: f64 = 0.5;
 
