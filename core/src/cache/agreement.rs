@@ -32,7 +32,7 @@ pub(super) fn of_gradients(slot: &Slot<'_>) -> Option<Deviation> {
     for (number, here) in records.iter().enumerate().step_by(step) {
         let normal = slot.place(number)?.normal;
         let [mut of_c, mut of_f] = [0.0; 2];
-        slot.visit(here.position, |other, _| {
+        slot.visit(here.position, &mut |other, _| {
             let there = &records[other];
             let is_aside = || {
                 let normals = normal.zip(slot.place(other).and_then(|place| place.normal));

@@ -180,6 +180,15 @@ impl VolumeCache<'_> {
         blend.value().or_else(|| self.gap(point, basis, reading)).map(|light| light.max(Spectrum::ZERO))
     }
 
+    /// Calls `visit(number, weight)` for the records that [`VolumeCache::lookup`] mixes.
+    pub(super) fn visit_mixed(&self, point: Vec3, basis: &Basis, reading: &Reading, visit: &mut dyn FnMut(usize, f32)) {
+        self.visit(point, |i, record, share| {
+            if let Some((d, ..)) = self.expanded(i, record, share + reading.margin, basis) {
+                visit(i as usize, weight(d));
+            }
+        });
+    }
+
     /// The coefficients of a record, and its lobe.
     #[inline]
     fn parts(&self, number: u32) -> (&[Coefficient], Option<Lobe>) {

@@ -99,6 +99,14 @@ impl<'s> Slot<'s> {
         }
     }
 
+    /// Calls `visit(number, weight)` for records that reach a place: of those with lobes, for those that [`Slot::lookup`] mixes there.
+    pub(super) fn visit_read(&self, point: Vec3, basis: &Basis, reading: &Reading, visit: &mut dyn FnMut(usize, f32)) {
+        match self {
+            Self::Volume(cache) => cache.visit_mixed(point, basis, reading, visit),
+            _ => self.visit(point, visit),
+        }
+    }
+
     /// What a record tells of its own place, in the direction of `basis`.
     pub(super) fn told_by(&self, number: usize, basis: &Basis) -> Option<Spectrum> {
         let value = self.records().get(number)?.value;
@@ -134,7 +142,7 @@ impl<'s> Slot<'s> {
     }
 
     /// Calls `visit(number, weight)` for the records that reach `point`.
-    pub(super) fn visit(&self, point: Vec3, mut visit: impl FnMut(usize, f32)) {
+    pub(super) fn visit(&self, point: Vec3, visit: &mut dyn FnMut(usize, f32)) {
         let mut each = |number: u32, _: &Record, share: f32| visit(number as usize, 1.0 - share);
         match self {
             Self::Off => {}
@@ -144,7 +152,7 @@ impl<'s> Slot<'s> {
     }
 
     /// Calls `visit(number)` for the records that reach `point`, or would if they reached twice as far.
-    pub(super) fn visit_wide(&self, point: Vec3, mut visit: impl FnMut(usize)) {
+    pub(super) fn visit_wide(&self, point: Vec3, visit: &mut dyn FnMut(usize)) {
         let mut each = |number: u32, _: &Record, _| visit(number as usize);
         match self {
             Self::Off => {}
@@ -284,7 +292,7 @@ impl<T> core::ops::IndexMut<Kind> for ByKind<T> {
 /// Guides of the records from a number on, those made or estimated anew by the fill at hand, that reach a point: the nearer, the more they count.
 pub(super) fn learnt_near(slot: &Slot<'_>, guides: &[Guide], from: usize, point: Vec3) -> Guide {
     let mut around = Guide::default();
-    slot.visit(point, |number, weight| {
+    slot.visit(point, &mut |number, weight| {
         if let Some(guide) = number.checked_sub(from).and_then(|i| guides.get(i)) {
             around.merge(guide, weight);
         }
@@ -298,7 +306,7 @@ pub(super) fn learnt_near(slot: &Slot<'_>, guides: &[Guide], from: usize, point:
 /// as it is. So all that might have met it are asked together.
 pub(super) fn learnt_around(slot: &Slot<'_>, guides: &[Guide], from: usize, point: Vec3) -> Guide {
     let mut around = Guide::default();
-    slot.visit_wide(point, |number| {
+    slot.visit_wide(point, &mut |number| {
         if let Some(guide) = number.checked_sub(from).and_then(|i| guides.get(i)) {
             around.merge(guide, 1.0);
         }
@@ -309,6 +317,8 @@ pub(super) fn learnt_around(slot: &Slot<'_>, guides: &[Guide], from: usize, poin
 #[cfg(all(test, feature = "alloc"))]
 mod tests {
     use super::*;
+    use crate::cache::lobe::Lobe;
+    use crate::spectrum::Gradient;
 
     /// What one of two records within reach of each other has met is told of both as well, wherever it lies; one far off knows nothing of it.
     #[test]
@@ -334,5 +344,32 @@ mod tests {
         assert!(here > 5.0 && here == beside && far == 0.0, "{here} {beside} {far}");
         let [alone, untouched, _] = varies(learnt_near);
         assert!(alone > 5.0 && untouched == 0.0, "{alone} {untouched}");
+    }
+
+    /// What a look-up tells is the mean of what the records tell of their own places where their light is even, by the weights that they are visited with:
+    /// those that have another eye in mind count less, or nothing.
+    #[test]
+    fn records_are_weighed_as_they_are_read() {
+        let mut cache: VolumeCache = Cache::growing(5);
+        let eyes = [Vec3::Z, Vec3::new(0.28, 0.0, 0.96), Vec3::X];
+        for (i, (to_eye, value)) in eyes.into_iter().zip([1.0, 3.0, 20.0]).enumerate() {
+            let value = Spectrum::splat(value);
+            let lobe = Lobe { to_eye, sharpness: 9.0, value, gradient: Gradient::ZERO, turn: Gradient::ZERO };
+            let mut attached = [Coefficient::ZERO; 5];
+            attached[3..].copy_from_slice(&lobe.attached());
+            let position = Vec3::X * (0.02 * i as f32);
+            let record = Record { position, radius: 0.1, value: Spectrum::ONE, ..Record::default() };
+            cache.insert(record, &attached).unwrap();
+        }
+        cache.finish().unwrap();
+        let (slot, basis, reading) = (Slot::Volume(cache), Basis::new(Vec3::Z, 1), Reading::new(0.5));
+        let place = Place { point: Vec3::ZERO, to_eye: Some(Vec3::Z), ..Place::default() };
+        let (mut visited, mut sum, mut total) = (0, Spectrum::ZERO, 0.0);
+        slot.visit_read(place.point, &basis, &reading, &mut |number, weight| {
+            sum += slot.told_by(number, &basis).unwrap() * weight;
+            (visited, total) = (visited + 1, total + weight);
+        });
+        let told = slot.lookup(&place, &basis, &reading).unwrap();
+        assert!(visited == 2 && (sum[0] / total - told[0]).abs() < 1e-5, "{visited}: {sum:?} {total} {told:?}");
     }
 }

@@ -64,8 +64,9 @@ impl<F> Filling<'_, F> {
             output.higher.clear();
             // Records have been estimated once by now: one that is too bright by chance reaches less far, so that what is read is too dark
             // whatever the radii. By how much is told by one of those that are read, estimated anew where it is.
+            // By the weights of what is read, or what records far from this direction tell of it would not cancel.
             let (mut sum, mut chosen) = (0.0, None);
-            slot.visit(place.point, |number, weight| {
+            slot.visit_read(place.point, &basis, &reading, &mut |number, weight| {
                 sum += weight;
                 if uniform(&mut rng) * sum < weight {
                     chosen = Some(number);
