@@ -143,7 +143,7 @@ pub(super) const MOST_ROUNDS: u32 = 32;
 /// minutes for what stays grain; fewer: grain where patience would have helped.
 pub(super) const HOPELESS: f64 = 32.0;
 
-/// Part of the most rounds that there is at least.
+/// Part of the most rounds that there is at least. As [`HOPELESS`].
 pub(super) const LEAST_HOPE: f32 = 0.125;
 
 /// Part of the noise of a picture by which it falls at least, over the part by which work grows. Less: long fills for little; more: noise.

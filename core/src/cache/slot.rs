@@ -99,7 +99,7 @@ impl<'s> Slot<'s> {
         }
     }
 
-    /// Calls `visit(number, weight)` for records that reach a place: of those with lobes, for those that [`Slot::lookup`] mixes there.
+    /// Calls `visit(number, weight)` for records of a volume as [`Slot::lookup`] mixes them at a point, and for all of surfaces that reach it, whatever their normals.
     pub(super) fn visit_read(&self, point: Vec3, basis: &Basis, reading: &Reading, visit: &mut dyn FnMut(usize, f32)) {
         match self {
             Self::Volume(cache) => cache.visit_mixed(point, basis, reading, visit),

@@ -15,7 +15,7 @@ pub(super) const NONE: u32 = u32::MAX;
 pub(super) const DEPTH: usize = 33;
 
 /// Lights that are asked for together; each kind has a tree of its own.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Kind {
     /// Without extent: the near field is all of space.
     Lamp,
@@ -248,11 +248,11 @@ impl<'s> LightTree<'s> {
         let mut roots = [NONE; KINDS];
         for (root, wanted) in roots.iter_mut().zip(Kind::ALL) {
             let own = lights.iter().enumerate().filter(|(_, light)| Kind::of(light) == wanted);
-            let count = items.iter_mut().zip(own).map(|(item, (i, light))| *item = LightNode::of(i, light)).count();
-            if count > 0 {
+            let found = items.iter_mut().zip(own).map(|(item, (i, light))| *item = LightNode::of(i, light)).count();
+            if found > 0 {
                 *root = builder.used as u32;
                 builder.used += 1;
-                builder.divide(&mut items[..count], *root, NONE);
+                builder.divide(&mut items[..found], *root, NONE);
             }
         }
         nodes.truncate(2 * count);
