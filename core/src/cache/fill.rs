@@ -31,6 +31,7 @@ use crate::spectrum::Spectrum;
 use crate::work::Rounds;
 use crate::world::World;
 
+mod clash;
 mod doubt;
 mod estimates;
 mod finer;
@@ -157,6 +158,8 @@ pub struct Filling<'s, F> {
     pilots: Pilots,
     shrunk: u32,
     off: f64,
+    /// How often records that contradict each other were parted.
+    parted: u32,
     /// What glances have found: the noise of records, light that is dark, how often each kind is to be estimated once more in each region, and what noise is left then.
     noise: Noise,
     dark: f64,
@@ -249,6 +252,7 @@ impl<'s> RadianceCaches<'s> {
             pilots: Pilots::default(),
             shrunk: 0,
             off: 0.0,
+            parted: 0,
             noise: Noise::default(),
             dark: 0.0,
             more: ByKind([[0; REGIONS]; Kind::COUNT]),

@@ -61,6 +61,7 @@ mod audited;
 mod bias_map;
 pub mod bytes;
 mod caches;
+mod clashes;
 mod connect;
 mod estimate;
 mod evidence;

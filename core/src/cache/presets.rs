@@ -67,7 +67,7 @@ const ENOUGH: u32 = 80;
 const FEWEST: f64 = 48.0;
 
 /// Part of the error asked for that noise of photons may have in a picture. All records of a place share it: larger is clouds of noise, smaller is time.
-const PHOTON_NOISE: f64 = 0.5;
+const PHOTON_NOISE: f64 = 0.45;
 
 /// The same of coarse irradiance, which lights all records. Larger: spots of walls that shine on all sharply scattering fog before them; smaller: time.
 const GROUND_NOISE: f64 = 0.25;

@@ -434,6 +434,12 @@ impl<'s, E: Attachment> Cache<'s, E> {
         self.finish()
     }
 
+    /// Lets each record reach no farther than `limit` (m) says of it and of another that it reaches, by their numbers and themselves. How often it reached farther.
+    pub(super) fn limit(&mut self, limit: &dyn Fn([usize; 2], [&Record; 2]) -> f32) -> Result<u32, Full> {
+        let count = limited(self.records.as_mut_slice(), &self.index, limit);
+        self.finish().map(|()| count)
+    }
+
     /// Marks the records whose spheres contain `point`, for [`Cache::drop_doubted`]: they are no longer valid.
     pub(super) fn doubt(&mut self, point: Vec3) {
         let Self { records, index, .. } = self;
@@ -552,6 +558,23 @@ impl<E: Attachment> Cache<'_, E> {
             coefficients: coefficients_of(stride),
         }
     }
+}
+
+/// See [`Cache::limit`]: the index knows the records by the radii that they had.
+fn limited(records: &mut [Record], index: &Index<'_>, limit: &dyn Fn([usize; 2], [&Record; 2]) -> f32) -> u32 {
+    let mut count = 0;
+    for other in 0..records.len() {
+        let there = records[other];
+        index.visit(there.position, |number, _| {
+            let number = number as usize;
+            let Some(here) = records.get_mut(number).filter(|_| number != other) else { return };
+            let most = limit([number, other], [here, &there]);
+            if most < here.radius {
+                (here.radius, count) = (most, count + 1);
+            }
+        });
+    }
+    count
 }
 
 #[cfg(all(test, feature = "alloc"))]

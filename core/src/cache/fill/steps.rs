@@ -46,7 +46,7 @@ impl<F> Filling<'_, F> {
                     let slot = &self.caches.slots[step.kind];
                     // Records added later must not share the random numbers of the first.
                     (self.computed, self.first) = (0, if slot.len() == 0 { 0 } else { mix(slot.len() as u64) });
-                    (self.batch, self.shrunk) = ([0, 0], 0);
+                    (self.batch, self.shrunk, self.parted) = ([0, 0], 0, 0);
                     if self.open_batch() {
                         return;
                     }
@@ -71,10 +71,15 @@ impl<F> Filling<'_, F> {
         self.complete();
     }
 
-    /// The next batch of places; after the last of them pilots, and the next step.
+    /// The next batch of places; after the last of them those that are open once records are parted, then pilots, and the next step.
     pub(super) fn next_batch(&mut self) {
-        if !self.open_batch() && !self.send_pilots() {
-            self.begin(self.step + 1);
+        while !self.open_batch() {
+            if !self.part_clashing() {
+                if !self.send_pilots() {
+                    self.begin(self.step + 1);
+                }
+                return;
+            }
         }
     }
 
