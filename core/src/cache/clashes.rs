@@ -51,9 +51,9 @@ mod tests {
         assert_eq!(reach(&record(0.0, 1.0, 18.0), &record(0.5, 10.0, 0.0), 0.0), f32::INFINITY);
         assert_eq!(reach(&record(0.0, 1.0, 0.0), &record(0.5, 10.0, 0.0), 0.0), 0.35);
         assert_eq!(reach(&record(0.0, 10.0, 0.0), &record(0.5, 1.0, 0.0), 0.0), 0.35);
-        // Twice as bright is no border, and five times as bright none where either varies by half.
+        // Twice as bright is no border, and five times as bright none where they vary that much.
         assert_eq!(reach(&record(0.0, 2.0, 0.0), &record(0.5, 1.0, 0.0), 0.0), f32::INFINITY);
-        assert_eq!(reach(&record(0.0, 5.0, 0.0), &record(0.5, 1.0, 0.0), 0.5), f32::INFINITY);
+        assert_eq!(reach(&record(0.0, 5.0, 0.0), &record(0.5, 1.0, 0.0), 1.5), f32::INFINITY);
         assert_eq!(reach(&record(0.0, 0.0, 0.0), &record(0.5, 0.0, 0.0), 0.0), f32::INFINITY);
         // What is foretold to be less than nothing is dark.
         assert_eq!(reach(&record(0.0, 1.0, -18.0), &record(0.5, 0.0, 0.0), 0.0), f32::INFINITY);

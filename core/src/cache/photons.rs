@@ -38,6 +38,9 @@ pub(super) const DEPOSITS_OF_JOB: usize = 2048 * PATHS_PER_JOB as usize;
 /// longer there, and directions make more of its noise. More: what is told of cells is noise of points; fewer: time. Decision 114.
 const CELLS_BETWEEN: f32 = 2.0;
 
+/// The same of photons that are only counted. More: cells with little fog are not seen to scatter; fewer: time.
+const COUNTED_IN: f32 = 0.5;
+
 fn cells_between(degree: usize) -> f32 {
     CELLS_BETWEEN * float::sqrt(1.0 + 0.5 * degree as f32)
 }
@@ -355,7 +358,7 @@ impl<'s> PhotonGrid<'s> {
         let mut along = Generator::child(&mut rng);
         let (mut flights, mut kept, bounds) = (0, Ok(()), self.bounds());
         let is_counted = self.lit.is_none();
-        let spacing = self.side * if is_counted { 1.0 } else { cells_between(self.degree) };
+        let spacing = self.side * if is_counted { COUNTED_IN } else { cells_between(self.degree) };
         // How far it flies until it next leaves something: begun anywhere, every point of its way is as likely.
         let mut left = spacing * uniform(&mut along);
         // What walks connect to is no business of cells.
@@ -598,7 +601,7 @@ mod tests {
         let ball = Placed::new(fog, Region::sphere(Vec3::ZERO, 0.15).unwrap());
         let sky = [Light::Constant(Spectrum::ONE)];
         let world = World { medium: &ball, scene: &crate::host::Empty, lights: (&sky).into() };
-        let effort = PhotonEffort { cells: 11, ..effort(20_000) };
+        let effort = PhotonEffort { cells: 11, ..effort(100_000) };
         let cells = PhotonGrid::lit(&world, &effort, &path::Settings::default(), 1);
         let at = |i: u32| cells.scattered(Vec3::X * (2.0 / 11.0 * i as f32), Vec3::Z, &fog.properties(Vec3::ZERO));
         assert_eq!([0, 1, 2, 3, 4, 5].map(|i| at(i).is_some()), [true, true, true, false, false, false]);
