@@ -15,7 +15,7 @@ use super::record::Record;
 const CONTRAST: f32 = 0.8;
 
 /// `k` above. Larger: nothing is seen in noise; smaller: noise makes records small.
-const SURE: f32 = 1.0;
+const SURE: f32 = 2.0;
 
 /// How near the other a record may reach that contradicts it. Larger: it is still mixed in halfway; smaller: more records.
 const HALFWAY: f32 = 0.7;
