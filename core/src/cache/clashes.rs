@@ -17,8 +17,8 @@ const CONTRAST: f32 = 0.8;
 /// `k` above. Larger: nothing is seen in noise; smaller: noise makes records small.
 const SURE: f32 = 2.0;
 
-/// How near the other a record may reach that contradicts it. Larger: it is still mixed in halfway; smaller: more records.
-const HALFWAY: f32 = 0.7;
+/// How much of the way to the other a record may reach that contradicts it. Larger: it is still mixed in close to it; smaller: more records.
+const OF_THE_WAY: f32 = 0.7;
 
 /// How often records are parted: those that fill what is left open may contradict others. More: time; fewer: what is left.
 pub(super) const ROUNDS: u32 = 2;
@@ -30,7 +30,7 @@ pub(super) fn reach(here: &Record, there: &Record, variance: f32) -> f32 {
     let contrast = 2.0 * (foretold - found) / (foretold + found);
     // Written so that NaN, of two that are black, agrees.
     let is_clash = contrast * contrast > CONTRAST * CONTRAST + SURE * SURE * variance;
-    if is_clash { HALFWAY * way.length() } else { f32::INFINITY }
+    if is_clash { OF_THE_WAY * way.length() } else { f32::INFINITY }
 }
 
 #[cfg(all(test, feature = "alloc"))]
@@ -51,9 +51,10 @@ mod tests {
         assert_eq!(reach(&record(0.0, 1.0, 18.0), &record(0.5, 10.0, 0.0), 0.0), f32::INFINITY);
         assert_eq!(reach(&record(0.0, 1.0, 0.0), &record(0.5, 10.0, 0.0), 0.0), 0.35);
         assert_eq!(reach(&record(0.0, 10.0, 0.0), &record(0.5, 1.0, 0.0), 0.0), 0.35);
-        // Twice as bright is no border, and five times as bright none where they vary that much.
+        // Twice as bright is no border, and five times as bright none where their variances are a half in sum.
         assert_eq!(reach(&record(0.0, 2.0, 0.0), &record(0.5, 1.0, 0.0), 0.0), f32::INFINITY);
-        assert_eq!(reach(&record(0.0, 5.0, 0.0), &record(0.5, 1.0, 0.0), 1.5), f32::INFINITY);
+        assert_eq!(reach(&record(0.0, 5.0, 0.0), &record(0.5, 1.0, 0.0), 0.5), f32::INFINITY);
+        assert_eq!(reach(&record(0.0, 5.0, 0.0), &record(0.5, 1.0, 0.0), 0.2), 0.35);
         assert_eq!(reach(&record(0.0, 0.0, 0.0), &record(0.5, 0.0, 0.0), 0.0), f32::INFINITY);
         // What is foretold to be less than nothing is dark.
         assert_eq!(reach(&record(0.0, 1.0, -18.0), &record(0.5, 0.0, 0.0), 0.0), f32::INFINITY);
@@ -74,7 +75,7 @@ mod tests {
             let across =
                 cache.records().iter().map(|other| other.position.x).filter(|other| (*other < 0.9) != (x < 0.9));
             let nearest = across.map(|other| (other - x).abs()).fold(f32::INFINITY, f32::min);
-            let expected = if nearest < 1.0 { HALFWAY * nearest } else { 1.0 };
+            let expected = if nearest < 1.0 { OF_THE_WAY * nearest } else { 1.0 };
             assert!((record.radius - expected).abs() < 1e-6, "{x}: {} instead of {expected}", record.radius);
         }
         // The index knows it.

@@ -25,7 +25,8 @@ impl<F> Filling<'_, F> {
         };
         let parted = cache.limit(&limit);
         self.is_cut |= parted.is_err();
-        let is_parted = parted.is_ok_and(|count| count > 0);
+        // Without room for the index, too, places may be left open.
+        let is_parted = parted != Ok(0);
         if is_parted {
             self.batch = [0, 0];
         }
