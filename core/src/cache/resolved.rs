@@ -17,9 +17,12 @@ pub(super) const MAX_DEGREE: usize = TURNING_DEGREE;
 
 /// How much of what cells do not resolve by direction may be left where walks end: each scattering blurs it. More: what is scattered
 /// sharply forward lands in the wrong place, by some 5 % of a picture at 0.5; less: memory for cells, and longer walks.
-pub(super) const SHARPEST: f32 = 0.3;
+pub(super) const SHARPEST: f32 = 0.4;
 
-/// The same for what does not even go straight on, up to which cells have higher degrees, as far as there are any: light that was scattered forward and goes on to the side or
+/// The same where cells have a degree lower than the highest. More: lamps in sharp fog have too bright a glow; less: memory for cells, and photons.
+const SHARP: f32 = 0.3;
+
+/// The same as [`SHARP`] for what does not even go straight on, up to which cells have higher degrees, as far as there are any: light that was scattered forward and goes on to the side or
 /// back is weak, and what an expansion leaves out is as large there. More: what is lit from behind, or from beside, is some per cent too bright (decision 74); less: memory for cells.
 const RESOLVED: f32 = 0.1;
 
@@ -50,17 +53,18 @@ pub(super) fn straight(phase: &Phase, degree: usize) -> f32 {
 /// The least degree of cells at which light may be scattered unevenly at all.
 const LEAST_DEGREE: usize = 2;
 
-/// The degree of cells where none resolves enough: walks are scattered some more times instead (decision 81). Lower: noisier walks; higher: memory, and photons.
-const ELSE_DEGREE: usize = 5;
+/// Degree up to which cells resolve no more than what [`SHARP`] asks for. Higher: memory, and photons; lower: light from beside and behind that is too bright.
+const USUAL_DEGREE: usize = 5;
 
-/// The least degree of cells at which walks may end at once, beyond [`ELSE_DEGREE`] only if they may not end there; and that degree where there is none.
+/// The least degree of cells at which walks may end at once, beyond [`USUAL_DEGREE`] only if they may not end there; and the highest where none leaves so little: there
+/// walks end at once all the same, or after one scattering more (decision 116).
 pub(super) fn degree_for(phase: &Phase) -> usize {
     if phase.is_isotropic() {
         return 0;
     }
-    let ends = |degree| unresolved(phase, degree) <= SHARPEST;
-    let mut degrees = if ends(ELSE_DEGREE) { LEAST_DEGREE..ELSE_DEGREE } else { ELSE_DEGREE + 1..MAX_DEGREE + 1 };
-    degrees.find(|&degree| ends(degree) && left_out(phase, degree) <= RESOLVED).unwrap_or(ELSE_DEGREE)
+    let ends = |degree| unresolved(phase, degree) <= SHARP;
+    let [first, last] = if ends(USUAL_DEGREE) { [LEAST_DEGREE, USUAL_DEGREE] } else { [USUAL_DEGREE + 1, MAX_DEGREE] };
+    (first..last).find(|&degree| ends(degree) && left_out(phase, degree) <= RESOLVED).unwrap_or(last)
 }
 
 #[cfg(test)]
@@ -87,16 +91,18 @@ mod tests {
         assert_eq!((straight(&Phase::ISOTROPIC, 0), degree_for(&Phase::ISOTROPIC)), (0.0, 0));
     }
 
-    /// Cells resolve what walks ask for, up to where none does; then these are scattered once more.
+    /// Cells resolve what walks ask for; where not even the highest degree does, these are scattered once more.
     #[test]
     fn cells_are_as_sharp_as_walks_that_end_in_them() {
         let cells = [0.1, 0.6, 0.8, 0.9, 0.93, -0.3, -0.6, -0.7].map(|g| (g, degree_for(&fog(g))));
         assert_eq!(cells, [(0.1, 2), (0.6, 2), (0.8, 3), (0.9, 5), (0.93, 7), (-0.3, 2), (-0.6, 4), (-0.7, 5)]);
-        assert!(cells.into_iter().all(|(g, degree)| unresolved(&fog(g), degree) <= SHARPEST));
-        for g in [0.95, -0.9] {
-            let (phase, degree) = (fog(g), degree_for(&fog(g)));
-            let once = unresolved(&phase, degree);
-            assert!(degree == ELSE_DEGREE && once > SHARPEST && once * once <= SHARPEST, "{g}: {once}");
+        assert!(cells.into_iter().all(|(g, degree)| unresolved(&fog(g), degree) <= SHARP));
+        let left = |g: f32| (degree_for(&fog(g)), unresolved(&fog(g), MAX_DEGREE));
+        for g in [0.95, 0.98, -0.85, -0.9] {
+            assert!(matches!(left(g), (MAX_DEGREE, once) if once <= SHARPEST), "{g}");
+        }
+        for g in [0.99, -0.95] {
+            assert!(matches!(left(g), (MAX_DEGREE, once) if once > SHARPEST && once * once <= SHARPEST), "{g}");
         }
     }
 }
