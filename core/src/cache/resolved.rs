@@ -53,7 +53,7 @@ pub(super) fn straight(phase: &Phase, degree: usize) -> f32 {
 /// The least degree of cells at which light may be scattered unevenly at all.
 const LEAST_DEGREE: usize = 2;
 
-/// Degree up to which cells resolve no more than what [`SHARP`] asks for. Higher: memory, and photons; lower: light from beside and behind that is too bright.
+/// The highest degree of cells where that is enough for [`SHARP`], though perhaps not for [`RESOLVED`]. Higher: memory, and photons; lower: what is lit from behind, or from beside, is too bright.
 const USUAL_DEGREE: usize = 5;
 
 /// The least degree of cells at which walks may end at once, beyond [`USUAL_DEGREE`] only if they may not end there; and the highest where none leaves so little: there
