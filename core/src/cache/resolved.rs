@@ -16,10 +16,10 @@ use crate::spectrum::Spectrum;
 pub(super) const MAX_DEGREE: usize = TURNING_DEGREE;
 
 /// How much of what cells do not resolve by direction may be left where walks end: each scattering blurs it. More: what is scattered
-/// sharply forward lands in the wrong place, by some 5 % of a picture at 0.5; less: memory for cells, and longer walks.
+/// sharply forward lands in the wrong place, by some 5 % of a picture at 0.5; less: longer walks, whose every turn is noise.
 pub(super) const SHARPEST: f32 = 0.4;
 
-/// The same where cells have a degree lower than the highest. More: lamps in sharp fog have too bright a glow; less: memory for cells, and photons.
+/// The same, by which degrees below the highest are chosen. More: lamps in sharp fog have too bright a glow; less: memory for cells, and photons.
 const SHARP: f32 = 0.3;
 
 /// The same as [`SHARP`] for what does not even go straight on, up to which cells have higher degrees, as far as there are any: light that was scattered forward and goes on to the side or
