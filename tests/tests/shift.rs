@@ -344,7 +344,7 @@ const FORWARDS: Lobe = Lobe::HenyeyGreenstein { g: 0.6 };
 
 #[test]
 fn light_scattered_in_a_closed_room_changes_as_its_gradient_says() {
-    check_samples(Lobe::Isotropic, 64, 4096);
+    check_samples(Lobe::Isotropic, 64, 2048);
 }
 
 /// Scattered forwards, twice: walks that end at the first vertex, as where caches know the rest.
@@ -355,12 +355,12 @@ fn light_scattered_forwards_in_a_closed_room_changes_as_its_gradient_says() {
 
 #[test]
 fn estimates_of_records_in_a_closed_room_change_as_their_gradients_say() {
-    check_estimates(Lobe::Isotropic, 64, 4096);
+    check_estimates(Lobe::Isotropic, 64, 2048);
 }
 
 #[test]
 fn estimates_of_records_of_forward_fog_in_a_closed_room_change_as_their_gradients_say() {
-    check_estimates(FORWARDS, 1, 6144);
+    check_estimates(FORWARDS, 1, 3072);
 }
 
 #[test]
@@ -377,17 +377,17 @@ fn irradiance_of_forward_fog_beside_an_edge_changes_as_its_gradient_says() {
 
 #[test]
 fn light_scattered_forwards_often_changes_as_its_gradient_says() {
-    check_samples(FORWARDS, 3, 16384);
+    check_samples(FORWARDS, 3, 8192);
 }
 
 #[test]
 fn estimates_of_light_scattered_forwards_often_change_as_their_gradients_say() {
-    check_estimates(FORWARDS, 64, 8192);
+    check_estimates(FORWARDS, 64, 4096);
 }
 
 #[test]
 fn irradiance_of_light_scattered_forwards_often_changes_as_its_gradient_says() {
-    check_irradiance(FORWARDS, 64, 8192);
+    check_irradiance(FORWARDS, 64, 4096);
 }
 
 #[test]

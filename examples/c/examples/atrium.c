@@ -8,7 +8,7 @@
 
 int main(int count, char **names) {
     /* Rougher than usual, so that this takes seconds. */
-    const fogbow_settings settings = {.size = sizeof settings, .rays = 64, .walks = 16};
+    const fogbow_settings settings = {.size = sizeof settings, .error = 0.1f, .rays = 64, .walks = 16};
     fogbow_world *world;
     check(atrium(&world));
     print_digests(world, &settings, &atrium_camera);

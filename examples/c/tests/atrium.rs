@@ -1,6 +1,6 @@
 //! The atrium through the interface, in Rust alone, and in C (`examples/atrium.c`): the same bits.
 
-use fogbow::cache::{Asked, FilledRecords, RadianceCaches, Settings, USUAL_ERROR};
+use fogbow::cache::{Asked, FilledRecords, RadianceCaches, Settings};
 use fogbow::host::{Hit, Scene};
 use fogbow::light::{Light, Sun};
 use fogbow::math::{Bounds, Ray, Vec3, float};
@@ -16,6 +16,7 @@ use super::smoke_box::{film_point, line, picture};
 /// What `examples/atrium.c` prints. Where the core's pictures change for a reason, this does.
 const DIGESTS: &str = include_str!("../examples/atrium.txt");
 
+const ERROR: f32 = 0.1;
 const RAYS: u32 = 64;
 const WALKS: u32 = 16;
 const TAG: u64 = 1;
@@ -133,7 +134,7 @@ fn the_atrium_in_c_has_the_bits_of_the_core() {
     let lights = [Light::Sun(sun), Light::Constant(Spectrum::new(0.4, 0.6, 1.0))];
     let scene = Atrium(panels());
     let world = World { medium: &haze, scene: &scene, lights: (&lights).into() };
-    let settings = Settings::for_outline(&Outline::of(&world, bounds), USUAL_ERROR).with_walks(WALKS);
+    let settings = Settings::for_outline(&Outline::of(&world, bounds), ERROR).with_walks(WALKS);
     let settings = Settings { rays: RAYS, ..settings };
     let mut filling = RadianceCaches::new(settings).fill(Asked::View { ray: camera_ray, pixel: 0.01 });
     work::finish(&mut filling, &world, &mut FilledRecords::default());

@@ -483,13 +483,15 @@ fn frames_keep_what_has_not_changed_since_the_one_before() {
         (&["plume-01.xml", "--after", "fog-still.bake", "--per-light"], "cannot be used with"),
         (&["plume-01.xml", "./plume-01.xml"], "two scenes are called plume-01"),
         (&["plume-01.xml", "still.xml", "--per-light"], "--per-light is for one scene"),
-        (&["plume-01.xml", "gone.xml"], "gone.xml"),
+        (&["plume-01.xml", "gone.xml"], "gone.xml: cannot be read"),
     ] {
         let output =
             folder.run(&[&["bake", "-o", "no.bake", "--passes", "2", "--basis", "fluence"], arguments].concat());
         assert_eq!(output.status.code(), Some(2), "{arguments:?}: {}", said(&output));
         assert!(said(&output).contains(reason), "{arguments:?}: {}", said(&output));
     }
+    // Nor are those made that come before one which is not there.
+    assert!(!folder.0.join("no-plume-01.bake").exists());
 }
 
 /// Killed without a word, at any time: what is there is a whole file, and is gone on with to the same bytes.

@@ -87,7 +87,7 @@ fn means(name: &str, world: &World, samples: &str, options: &[&str]) -> [f64; 2]
     let folder = Folder::new(&format!("edge-{name}"));
     std::fs::write(folder.0.join("scene.xml"), world.text()).unwrap();
     let cached =
-        picture(&folder, "radiance-cache", &[&["--paths", "1024", "--seed", "3"], &UNAUDITED[..], options].concat());
+        picture(&folder, "radiance-cache", &[&["--paths", "512", "--seed", "3"], &UNAUDITED[..], options].concat());
     // Path tracing has nothing to do with how single scattering is cached.
     let at = options.iter().position(|option| *option == "--single").unwrap_or(options.len());
     let traced = picture(&folder, "path", &[&["--spp", samples], &options[..at]].concat());

@@ -39,7 +39,7 @@ pub(super) fn earlier(arguments: &BakeArguments) -> Result<Option<Earlier>, Fail
 /// Bakes all frames, one after the other.
 ///
 /// # Errors
-/// Options that are for one scene, scenes of the same name, and what stands in the way of a frame.
+/// Options that are for one scene, scenes of the same name or that are not there, and what stands in the way of a frame.
 pub(super) fn run(arguments: &BakeArguments, scenes: &[PathBuf]) -> Result<Ending, Failure> {
     let option = [
         ("--per-light", arguments.per_light),
@@ -52,6 +52,10 @@ pub(super) fn run(arguments: &BakeArguments, scenes: &[PathBuf]) -> Result<Endin
     let names: Vec<String> = scenes.iter().map(|scene| name(scene)).collect();
     if let Some(twice) = names.iter().enumerate().find_map(|(i, name)| names[..i].contains(name).then_some(name)) {
         return Err(format!("two scenes are called {twice}, and would have the same files").into());
+    }
+    // A name that is mistyped is told before hours go into the frames before it.
+    for scene in scenes {
+        std::fs::File::open(scene).map_err(|error| format!("{}: cannot be read: {error}", scene.display()))?;
     }
     let mut earlier = earlier(arguments)?;
     for (scene, name) in scenes.iter().zip(&names) {
