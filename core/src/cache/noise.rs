@@ -78,34 +78,55 @@ pub(super) fn dark(glances: &[Glance]) -> f64 {
     if glances.is_empty() { 0.0 } else { DARK * sum / glances.len() as f64 }
 }
 
-/// Relative variance of what photons, or others that come in halves, tell of each kind, in the order of [`Kind::FINAL`]: of [`READINGS`] along each ray by one half of them, each at a place of its own, and after all these as many by the other.
+/// Relative variance in a picture of what photons, or others that come in halves, tell: of [`READINGS`] along each ray by one half of them, each at a place of its own, and after all these as many by the other.
 ///
 /// ```text
 /// E[(A₁ − B₁)(A₂ − B₂) | photons] = (E[A − B | photons])² = 4 V((A + B)/2)   in the mean over photons
 /// ```
 ///
-/// `dark` is light, over that of a usual place, that is added to that of each in squares. As in [`Noise::add`] readings are independent given the photons, so that noise of their walks has no part in it.
-pub(super) fn of_halves(glances: &[Glance], dark: f64) -> [f64; KINDS] {
-    let half = glances.len() / 2;
-    core::array::from_fn(|k| {
-        let light = |glance: &Glance| f64::from(glance.kinds[k]);
-        let (mut all, mut places, mut sum) = (0.0, 0.0, 0.0);
-        // First how much light there is.
-        for is_second in [false, true] {
-            let dark = dark * all / places;
-            for (a, b) in glances[..half].chunks_exact(READINGS).zip(glances[half..].chunks_exact(READINGS)) {
-                let mean = a.iter().chain(b).map(light).sum::<f64>() / (2 * READINGS) as f64;
-                if mean > 0.0 && is_second {
-                    let product: f64 = a.iter().zip(b).map(|(a, b)| light(a) - light(b)).product();
-                    sum += product / (4.0 * places * (mean * mean + dark * dark));
-                } else if mean > 0.0 {
-                    (all, places) = (all + mean, places + 1.0);
-                }
+/// As in [`Noise::add`] readings are independent given the photons, so that noise of their walks has no part in it. `shares` are those of light of each kind in the picture, and `region` says in which
+/// region of it a ray is. What differs is told over the light of that region, to which `dark`, over the light of a usual one, is added in squares: in a dark one all light is, and a place that is dark to an eye
+/// may be seen with what is bright.
+pub(super) fn of_halves(glances: &[Glance], region: impl Fn(usize) -> usize, shares: [f64; KINDS], dark: f64) -> f64 {
+    let (first, second) = glances.split_at(glances.len() / 2);
+    let rays = || {
+        let pairs = first.as_chunks::<READINGS>().0.iter().zip(second.as_chunks::<READINGS>().0);
+        pairs.enumerate().map(|(ray, (a, b))| (region(ray).min(REGIONS - 1), a, b))
+    };
+    // Light of each kind in each region, and of how many rays.
+    let mut read = [[(0.0, 0.0); KINDS]; REGIONS];
+    for (region, a, b) in rays() {
+        for (k, read) in read[region].iter_mut().enumerate() {
+            let light = a.iter().chain(b).map(|glance| f64::from(glance.kinds[k])).sum::<f64>();
+            if light > 0.0 {
+                *read = (read.0 + light / (2 * READINGS) as f64, read.1 + 1.0);
             }
         }
-        // Neither no places nor a sum that chance made negative tell of noise.
-        sum.max(0.0)
-    })
+    }
+    let all: [(f64, f64); KINDS] =
+        core::array::from_fn(|k| read.iter().fold((0.0, 0.0), |sum, of| (sum.0 + of[k].0, sum.1 + of[k].1)));
+    let usual = all.map(|(light, rays)| light / rays);
+    // How bright each region is, by the kinds that are read there.
+    let bright = read.map(|read| {
+        let kinds = || (0..KINDS).filter(|&k| read[k].1 > 0.0);
+        let light: f64 = kinds().map(|k| shares[k] * read[k].0 / (read[k].1 * usual[k])).sum();
+        light / kinds().map(|k| shares[k]).sum::<f64>()
+    });
+    let mut sums = [0.0; KINDS];
+    for (region, a, b) in rays() {
+        let over = bright[region] * bright[region] + dark * dark;
+        for (k, sum) in sums.iter_mut().enumerate() {
+            let product: f64 = a.iter().zip(b).map(|(a, b)| f64::from(a.kinds[k] - b.kinds[k])).product();
+            let share = shares[k] / usual[k];
+            let relative = share * share * product / (4.0 * all[k].1 * over);
+            // Written so that what is no number counts as nothing.
+            if relative.is_finite() {
+                *sum += relative;
+            }
+        }
+    }
+    // Neither no rays nor a sum that chance made negative tell of noise.
+    sums.iter().map(|sum| f64::max(*sum, 0.0)).sum()
 }
 
 /// The noise of a kind.
@@ -146,7 +167,7 @@ struct Sums {
 }
 
 /// The number of the region of a picture in which a point of the film lies.
-fn region_of(at: [f32; 2]) -> usize {
+pub(super) fn region_of(at: [f32; 2]) -> usize {
     // Casts saturate, and take NaN to 0.
     let [x, y] = at.map(|x| ((x * SIDE as f32) as usize).min(SIDE - 1));
     y * SIDE + x
@@ -316,15 +337,45 @@ mod tests {
                 half[place] = [(); READINGS].map(|()| of(kind, 3.0 * (1.0 + of_half + 0.05 * sign())));
             }
         }
-        let [single, surface, multiple, irradiance] = of_halves(glances.as_flattened().as_flattened(), DARK);
+        let glances = glances.as_flattened().as_flattened();
+        let [multiple, irradiance] =
+            [[0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]].map(|shares| of_halves(glances, |_| 0, shares, DARK));
         // A quarter of twice the variance of one half.
         let expected = 0.5 * 0.06_f64.powi(2) / (1.0 + DARK * DARK);
         assert!((multiple / expected - 1.0).abs() < 0.05, "{multiple} in place of {expected}");
-        assert!(irradiance < 0.05 * expected && (single, surface) == (0.0, 0.0), "{irradiance}");
+        assert!(irradiance < 0.05 * expected, "{irradiance}");
+        // Of what is a half of the picture's light, a quarter.
+        let half = of_halves(glances, |_| 0, [0.0, 0.0, 0.5, 0.5], DARK);
+        assert!((half / expected - 0.25).abs() < 0.02, "{half}");
         // Neither nothing nor what is no number tells of noise.
-        assert_eq!(of_halves(&[], DARK), [0.0; KINDS]);
+        let shares = [0.25; KINDS];
+        assert_eq!(of_halves(&[], |_| 0, shares, DARK), 0.0);
         let [none, some] = [f32::NAN, 1.0].map(|light| of(Kind::Multiple, light));
-        assert_eq!(of_halves(&[none, some, none, some], DARK), [0.0; KINDS]);
+        assert_eq!(of_halves(&[none, some, none, some], |_| 0, shares, DARK), 0.0);
+        assert_eq!(of_halves(&[some, some, none, none], |_| REGIONS, [0.0; KINDS], DARK), 0.0);
+    }
+
+    /// Every other ray has a tenth of the light, and as much noise in proportion.
+    #[test]
+    fn what_halves_differ_by_counts_over_the_light_of_its_region() {
+        const RAYS: usize = 4096;
+        let mut glances = [[[Glance::default(); READINGS]; RAYS]; 2];
+        for ray in 0..RAYS {
+            let light = if ray % 2 == 0 { 1.0 } else { 0.1 };
+            for (half, off) in glances.iter_mut().zip([0.06, -0.06]) {
+                half[ray] = [Glance::of(Kind::Multiple, Spectrum::splat(light * (1.0 + off))); READINGS];
+            }
+        }
+        let told = |region: fn(usize) -> usize| {
+            of_halves(glances.as_flattened().as_flattened(), region, [0.0, 0.0, 1.0, 0.0], DARK) / 0.06_f64.powi(2)
+        };
+        // A dark part of the picture has its noise like a bright one, but for the light that is added.
+        let apart = |light: f64| light * light / (light * light + DARK * DARK);
+        let expected = 0.5 * (apart(1.0 / 0.55) + apart(0.1 / 0.55));
+        assert!((told(|ray| ray % 2) - expected).abs() < 1e-3, "{} {expected}", told(|ray| ray % 2));
+        // Dark places among bright ones do not.
+        let expected = 0.5 * (1.0 + 0.01) / (0.55 * 0.55) / (1.0 + DARK * DARK);
+        assert!((told(|_| 0) - expected).abs() < 1e-3, "{} {expected}", told(|_| 0));
     }
 
     #[test]

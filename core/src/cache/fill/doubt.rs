@@ -1,12 +1,12 @@
 //! Rounds in which light at some places is estimated twice, with the same random numbers, by what may be noisy: by one half of the photons, and by the other; how many more it takes.
 
 use super::{Filling, RAYS_PER_JOB, Round};
-use crate::cache::asked::Wanted;
+use crate::cache::asked::{Asked, Wanted};
 use crate::cache::guide::Looks;
 use crate::cache::kind::{Kind, Pass, Step};
 use crate::cache::lookup::Basis;
 use crate::cache::memory::{Estimate, FilledRecords};
-use crate::cache::noise::{self, Glance, READINGS};
+use crate::cache::noise::{self, Glance, READINGS, region_of};
 use crate::cache::presets;
 use crate::host::{Medium, Scene};
 use crate::math::Vec3;
@@ -14,13 +14,7 @@ use crate::sampling::uniform::mix;
 use crate::sampling::{Generator, uniform};
 use crate::world::World;
 
-/// Readings by each half. Fewer: noise is told by chance; more: time.
-const BY_PHOTONS: u32 = 1024;
-
-/// Readings by what surfaces are known to send, of fewer samples: a few spots that are too bright or too dark make most of its noise, and few rays see them. As above.
-pub(super) const BY_GROUND: u32 = 4096;
-
-/// Walks or directions of a reading at least. As above, by the square.
+/// Walks or directions of a reading at least. Fewer: noise is told by chance, by the square; more: time.
 const LEAST: u32 = 8;
 
 /// Walks of an estimate of a record over those of a reading. As above.
@@ -32,7 +26,7 @@ pub(super) const OF_DIRECTIONS: u32 = 16;
 impl<F> Filling<'_, F> {
     /// Begins to tell the noise of photons, if it is not known.
     pub(super) fn begin_doubt(&mut self) -> bool {
-        let jobs = self.jobs_of_places(BY_PHOTONS);
+        let jobs = self.jobs_of_places();
         if jobs == 0 || !self.memory.photons.is_untold() {
             return false;
         }
@@ -42,10 +36,11 @@ impl<F> Filling<'_, F> {
         true
     }
 
-    /// Jobs of so many readings by [`Filling::read_places`], none where nothing hangs on what they tell.
-    pub(super) fn jobs_of_places(&self, readings: u32) -> u32 {
+    /// Jobs of readings by [`Filling::read_places`], none where nothing hangs on what they tell. By each half there are half as many as of a picture: a few spots of it make most of its noise, and few rays see
+    /// them.
+    pub(super) fn jobs_of_places(&self) -> u32 {
         let is_asked = self.settings().error > 0.0 && !self.memory.wanted.is_empty();
-        if is_asked { readings.min(noise::readings(self.settings()) / 2) / RAYS_PER_JOB } else { 0 }
+        if is_asked { noise::readings(self.settings()) / 2 / RAYS_PER_JOB } else { 0 }
     }
 
     /// Light that falls on surfaces, or is scattered in the medium, of a kind, at two places of each of some eye rays. Each has that part of the samples of a record of this kind,
@@ -58,13 +53,10 @@ impl<F> Filling<'_, F> {
         output: &mut FilledRecords<'_>,
     ) {
         let wanted = self.memory.wanted.as_slice();
-        let rays = self.jobs * RAYS_PER_JOB / READINGS as u32;
         output.glances = Default::default();
         for i in 0..RAYS_PER_JOB {
             let reading = job * RAYS_PER_JOB + i;
-            let from = u64::from(reading / READINGS as u32) * wanted.len() as u64 / u64::from(rays);
-            let mut all = wanted.iter().skip(from as usize).chain(wanted);
-            let Some(first) = all.find(|wanted| wanted.place.is_seen) else { return };
+            let Some(first) = self.first_of(reading) else { return };
             // The same both times, so that what differs is what light is estimated by.
             let mut rng = Generator::new(mix(self.seed() ^ 0x_d0_0b_75) ^ u64::from(reading));
             // What two places of a ray share its pixel shows; the rest it averages.
@@ -97,10 +89,19 @@ impl<F> Filling<'_, F> {
         }
     }
 
+    /// What the reading of a number, and all of its ray, begin with.
+    fn first_of(&self, reading: u32) -> Option<&Wanted> {
+        let wanted = self.memory.wanted.as_slice();
+        let rays = self.jobs * RAYS_PER_JOB / READINGS as u32;
+        let from = u64::from(reading / READINGS as u32) * wanted.len() as u64 / u64::from(rays);
+        wanted.iter().skip(from as usize).chain(wanted).find(|wanted| wanted.place.is_seen)
+    }
+
     /// Variance of what halves tell, in the picture, as [`noise::of_halves`] has it.
     pub(super) fn variance_of_places(&self, dark: f64) -> f64 {
-        let variances = noise::of_halves(self.memory.glances.as_slice(), dark).into_iter().zip(self.caches.shares);
-        variances.map(|(variance, share)| variance * share * share).sum()
+        let region =
+            |ray: usize| self.first_of((ray * READINGS) as u32).map_or(0, |first| region_of(Asked::at(first.ray)));
+        noise::of_halves(self.memory.glances.as_slice(), region, self.caches.shares, dark)
     }
 
     /// Goes on with the other half, or to more photons where both are too noisy.

@@ -1,6 +1,5 @@
 //! Rounds that tell how noisy what surfaces are known to send is in the light of all records, and how often it is estimated once more.
 
-use super::doubt::BY_GROUND;
 use super::{Filling, Round};
 use crate::cache::kind::Kind;
 use crate::cache::noise::REGIONS;
@@ -13,7 +12,7 @@ impl<F> Filling<'_, F> {
     /// Begins a round that tells it.
     pub(super) fn begin_ground(&mut self, is_second: bool) -> bool {
         let kind = Kind::CoarseIrradiance;
-        let (jobs, is_new) = (self.jobs_of_places(BY_GROUND), self.caches.slots[kind].len() > self.before[kind]);
+        let (jobs, is_new) = (self.jobs_of_places(), self.caches.slots[kind].len() > self.before[kind]);
         if jobs == 0 || !is_new || (is_second && self.memory.glances.is_empty()) {
             return false;
         }
