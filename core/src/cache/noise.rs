@@ -87,38 +87,44 @@ pub(super) fn dark(glances: &[Glance]) -> f64 {
 /// As in [`Noise::add`] readings are independent given the photons, so that noise of their walks has no part in it. `shares` are those of light of each kind in the picture, and `region` says in which
 /// region of it a ray is. What differs is told over the light of that region, to which `dark`, over the light of a usual one, is added in squares: in a dark one all light is, and a place that is dark to an eye
 /// may be seen with what is bright.
-pub(super) fn of_halves(glances: &[Glance], region: impl Fn(usize) -> usize, shares: [f64; KINDS], dark: f64) -> f64 {
+pub(super) fn of_halves(glances: &[Glance], region: &dyn Fn(usize) -> usize, shares: [f64; KINDS], dark: f64) -> f64 {
     let (first, second) = glances.split_at(glances.len() / 2);
     let rays = || {
         let pairs = first.as_chunks::<READINGS>().0.iter().zip(second.as_chunks::<READINGS>().0);
         pairs.enumerate().map(|(ray, (a, b))| (region(ray).min(REGIONS - 1), a, b))
     };
-    // Light of each kind in each region, and of how many rays.
-    let mut read = [[(0.0, 0.0); KINDS]; REGIONS];
+    // Light of each kind in each region, and after them in all, and of how many rays.
+    let mut read = [[[0.0; 2]; KINDS]; REGIONS + 1];
     for (region, a, b) in rays() {
-        for (k, read) in read[region].iter_mut().enumerate() {
+        (0..KINDS).for_each(|k| {
             let light = a.iter().chain(b).map(|glance| f64::from(glance.kinds[k])).sum::<f64>();
             if light > 0.0 {
-                *read = (read.0 + light / (2 * READINGS) as f64, read.1 + 1.0);
+                for place in [region, REGIONS] {
+                    read[place][k][0] += light / (2 * READINGS) as f64;
+                    read[place][k][1] += 1.0;
+                }
+            }
+        });
+    }
+    let usual = read[REGIONS].map(|[light, rays]| light / rays);
+    // How bright a region is, by the kinds that are read there.
+    let bright = |region: usize| {
+        let (mut light, mut share) = (0.0, 0.0);
+        for (k, [of_kind, rays]) in read[region].into_iter().enumerate() {
+            if rays > 0.0 {
+                (light, share) = (light + shares[k] * of_kind / (rays * usual[k]), share + shares[k]);
             }
         }
-    }
-    let all: [(f64, f64); KINDS] =
-        core::array::from_fn(|k| read.iter().fold((0.0, 0.0), |sum, of| (sum.0 + of[k].0, sum.1 + of[k].1)));
-    let usual = all.map(|(light, rays)| light / rays);
-    // How bright each region is, by the kinds that are read there.
-    let bright = read.map(|read| {
-        let kinds = || (0..KINDS).filter(|&k| read[k].1 > 0.0);
-        let light: f64 = kinds().map(|k| shares[k] * read[k].0 / (read[k].1 * usual[k])).sum();
-        light / kinds().map(|k| shares[k]).sum::<f64>()
-    });
+        light / share
+    };
     let mut sums = [0.0; KINDS];
     for (region, a, b) in rays() {
-        let over = bright[region] * bright[region] + dark * dark;
+        let bright = bright(region);
+        let over = bright * bright + dark * dark;
         for (k, sum) in sums.iter_mut().enumerate() {
             let product: f64 = a.iter().zip(b).map(|(a, b)| f64::from(a.kinds[k] - b.kinds[k])).product();
             let share = shares[k] / usual[k];
-            let relative = share * share * product / (4.0 * all[k].1 * over);
+            let relative = share * share * product / (4.0 * read[REGIONS][k][1] * over);
             // Written so that what is no number counts as nothing.
             if relative.is_finite() {
                 *sum += relative;
@@ -339,20 +345,20 @@ mod tests {
         }
         let glances = glances.as_flattened().as_flattened();
         let [multiple, irradiance] =
-            [[0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]].map(|shares| of_halves(glances, |_| 0, shares, DARK));
+            [[0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]].map(|shares| of_halves(glances, &|_| 0, shares, DARK));
         // A quarter of twice the variance of one half.
         let expected = 0.5 * 0.06_f64.powi(2) / (1.0 + DARK * DARK);
         assert!((multiple / expected - 1.0).abs() < 0.05, "{multiple} in place of {expected}");
         assert!(irradiance < 0.05 * expected, "{irradiance}");
         // Of what is a half of the picture's light, a quarter.
-        let half = of_halves(glances, |_| 0, [0.0, 0.0, 0.5, 0.5], DARK);
+        let half = of_halves(glances, &|_| 0, [0.0, 0.0, 0.5, 0.5], DARK);
         assert!((half / expected - 0.25).abs() < 0.02, "{half}");
         // Neither nothing nor what is no number tells of noise.
         let shares = [0.25; KINDS];
-        assert_eq!(of_halves(&[], |_| 0, shares, DARK), 0.0);
+        assert_eq!(of_halves(&[], &|_| 0, shares, DARK), 0.0);
         let [none, some] = [f32::NAN, 1.0].map(|light| of(Kind::Multiple, light));
-        assert_eq!(of_halves(&[none, some, none, some], |_| 0, shares, DARK), 0.0);
-        assert_eq!(of_halves(&[some, some, none, none], |_| REGIONS, [0.0; KINDS], DARK), 0.0);
+        assert_eq!(of_halves(&[none, some, none, some], &|_| 0, shares, DARK), 0.0);
+        assert_eq!(of_halves(&[some, some, none, none], &|_| REGIONS, [0.0; KINDS], DARK), 0.0);
     }
 
     /// Every other ray has a tenth of the light, and as much noise in proportion.
@@ -367,7 +373,7 @@ mod tests {
             }
         }
         let told = |region: fn(usize) -> usize| {
-            of_halves(glances.as_flattened().as_flattened(), region, [0.0, 0.0, 1.0, 0.0], DARK) / 0.06_f64.powi(2)
+            of_halves(glances.as_flattened().as_flattened(), &region, [0.0, 0.0, 1.0, 0.0], DARK) / 0.06_f64.powi(2)
         };
         // A dark part of the picture has its noise like a bright one, but for the light that is added.
         let apart = |light: f64| light * light / (light * light + DARK * DARK);
