@@ -17,7 +17,7 @@ use crate::world::World;
 /// Walks or directions of a reading at least. Fewer: noise is told by chance, by the square; more: time.
 const LEAST: u32 = 8;
 
-/// Walks of an estimate of a record over those of a reading. As above.
+/// Walks of an estimate of a record over those of a reading. More: noise is told by chance; fewer: time.
 pub(super) const OF_WALKS: u32 = 2;
 
 /// The same of directions, of which a picture's light from surfaces needs fewer.

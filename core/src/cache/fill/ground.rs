@@ -5,7 +5,7 @@ use crate::cache::kind::Kind;
 use crate::cache::noise::REGIONS;
 use crate::cache::presets;
 
-/// Light (over that of usual places) that is added in squares: where surfaces send little, other light is most of what is seen. Larger: noise in the dark; smaller: time for what nobody sees.
+/// Light (over that of a usual region of the picture) that is added in squares: where surfaces send little, other light is most of what is seen. Larger: noise in the dark; smaller: time for what nobody sees.
 const DARK: f64 = 0.5;
 
 impl<F> Filling<'_, F> {
