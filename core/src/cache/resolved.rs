@@ -23,8 +23,9 @@ pub(super) const SHARPEST: f32 = 0.4;
 const SHARP: f32 = 0.3;
 
 /// The same as [`SHARP`] for what does not even go straight on, up to which cells have higher degrees, as far as there are any: light that was scattered forward and goes on to the side or
-/// back is weak, and what an expansion leaves out is as large there. More: what is lit from behind, or from beside, is some per cent too bright (decision 74); less: memory for cells.
-const RESOLVED: f32 = 0.1;
+/// back is weak, and what an expansion leaves out is as large there. More: what is lit from behind, or from beside, is some per cent too bright (decision 74), and dark corners of dense fog some per cent too dark
+/// (decision 118); less: memory for cells.
+const RESOLVED: f32 = 0.05;
 
 /// How much of what counts as going straight on is taken to land in the wrong place (decision 92). More: longer walks; less: lamps in sharp fog have too bright a glow, and
 /// what faces away from them is too bright.
@@ -95,7 +96,7 @@ mod tests {
     #[test]
     fn cells_are_as_sharp_as_walks_that_end_in_them() {
         let cells = [0.1, 0.6, 0.8, 0.9, 0.93, -0.3, -0.6, -0.7].map(|g| (g, degree_for(&fog(g))));
-        assert_eq!(cells, [(0.1, 2), (0.6, 2), (0.8, 3), (0.9, 5), (0.93, 7), (-0.3, 2), (-0.6, 4), (-0.7, 5)]);
+        assert_eq!(cells, [(0.1, 2), (0.6, 4), (0.8, 5), (0.9, 5), (0.93, 7), (-0.3, 2), (-0.6, 5), (-0.7, 5)]);
         assert!(cells.into_iter().all(|(g, degree)| unresolved(&fog(g), degree) <= SHARP));
         let left = |g: f32| (degree_for(&fog(g)), unresolved(&fog(g), MAX_DEGREE));
         for g in [0.95, 0.98, -0.85, -0.9] {
