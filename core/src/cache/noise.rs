@@ -82,9 +82,10 @@ pub(super) fn dark(glances: &[Glance]) -> f64 {
 ///
 /// ```text
 /// E[(A₁ − B₁)(A₂ − B₂) | photons] = (E[A − B | photons])² = 4 V((A + B)/2)   in the mean over photons
+/// V = Σ_k max(0, ⟨(S_k/L_k)² (A₁ − B₁)(A₂ − B₂)/(4 (b² + dark²))⟩_k)
 /// ```
 ///
-/// As in [`Noise::add`] readings are independent given the photons, so that noise of their walks has no part in it. `shares` are those of light of each kind in the picture, and `region` says in which
+/// `S_k` is the share of a kind, `L_k` its mean light, `b` how bright a region is, 1 in the mean, and `⟨⟩_k` the mean over the rays that read the kind. As in [`Noise::add`] readings are independent given the photons, so that noise of their walks has no part in it. `shares` are those of light of each kind in the picture, and `region` says in which
 /// region of it a ray is. What differs is told over the light of that region, to which `dark`, over the light of a usual one, is added in squares: in a dark one all light is, and a place that is dark to an eye
 /// may be seen with what is bright.
 pub(super) fn of_halves(glances: &[Glance], region: &dyn Fn(usize) -> usize, shares: [f64; KINDS], dark: f64) -> f64 {

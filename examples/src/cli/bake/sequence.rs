@@ -55,7 +55,7 @@ pub(super) fn run(arguments: &BakeArguments, scenes: &[PathBuf]) -> Result<Endin
     }
     // A name that is mistyped is told before hours go into the frames before it.
     for scene in scenes {
-        std::fs::File::open(scene).map_err(|error| format!("{}: cannot be read: {error}", scene.display()))?;
+        read_file(scene)?;
     }
     let mut earlier = earlier(arguments)?;
     for (scene, name) in scenes.iter().zip(&names) {
