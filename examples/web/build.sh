@@ -15,10 +15,10 @@ linker=$(rustc --print sysroot)/lib/rustlib/$(rustc --print host-tuple)/bin/rust
 # nobody prints with `{:?}`, and the library's own sorting is the small one, whose results are the same. What the core has made of a generic function is not made again.
 flags="-Cllvm-args=-unroll-threshold=40 -Cllvm-args=-unroll-runtime=0 -Cllvm-args=-unroll-allow-partial=0 -Cno-vectorize-loops
     -Zshare-generics=y -Zunstable-options -Cpanic=immediate-abort -Zfmt-debug=none -Zlocation-detail=none"
-# module NAME OPT-LEVEL-OF-THE-CORE FLAGS
+# module NAME FLAGS
 module() {
-    env RUSTC=/usr/bin/rustc RUSTDOC=/usr/bin/rustdoc RUSTC_BOOTSTRAP=1 CARGO_TARGET_WASM32_UNKNOWN_UNKNOWN_LINKER="$linker" RUSTFLAGS="$flags $3" \
-        cargo rustc --quiet --locked --lib --crate-type cdylib --profile module --config "profile.module.package.fogbow.opt-level=$2" \
+    env RUSTC=/usr/bin/rustc RUSTDOC=/usr/bin/rustdoc RUSTC_BOOTSTRAP=1 CARGO_TARGET_WASM32_UNKNOWN_UNKNOWN_LINKER="$linker" RUSTFLAGS="$flags $2" \
+        cargo rustc --quiet --locked --lib --crate-type cdylib --profile module \
         -Zbuild-std=core,alloc,panic_abort -Zbuild-std-features=optimize_for_size --target wasm32-unknown-unknown --target-dir "$TARGET/$1"
     # In the first kilobyte of memory is the end of the stack, and nothing that has an address: so small offsets never wrap, and go into instructions.
     wasm-opt --low-memory-unused --merge-similar-functions -Os -Oz --enable-simd --enable-bulk-memory --enable-sign-ext --enable-mutable-globals --enable-nontrapping-float-to-int \
@@ -28,10 +28,10 @@ module() {
 rm -rf "$out"
 mkdir -p "$out"
 # Most of either is one thread that optimises everything together.
-module plain '"s"' "-Cllvm-args=-inline-threshold=5 -Cllvm-args=-inlinehint-threshold=50" &
+module plain "-Cllvm-args=-inline-threshold=5 -Cllvm-args=-inlinehint-threshold=40" &
 plain=$!
-# Instructions for vectors make shorter code: there is room to make it faster.
-module simd 2 "-Cllvm-args=-inline-threshold=10 -Cllvm-args=-inlinehint-threshold=20 -Ctarget-feature=+simd128"
+# Instructions for vectors make shorter code: there is room to inline more.
+module simd "-Cllvm-args=-inline-threshold=10 -Cllvm-args=-inlinehint-threshold=50 -Ctarget-feature=+simd128"
 wait $plain
 node scripts/pack.mjs "$out/package" "$out/plain.wasm" "$out/simd.wasm"
 node scripts/site.mjs "$out/page" "$out/package"

@@ -148,16 +148,14 @@ impl<'s> Photons<'s> {
                 Event::Met { .. } => is_due = parts.surfaces,
                 Event::Flew { reach, distance, power } if is_due => {
                     let Some((near, far)) = settings.bounds.intersect(reach) else { return };
-                    let (begin, end) = (near.max(0.0), far.min(*distance));
-                    if begin < end {
-                        let flight = PhotonFlight {
-                            origin: reach.at(begin),
-                            direction: reach.direction,
-                            length: end - begin,
-                            power: *power,
-                        };
-                        result = result.and(flights.push(flight));
-                    }
+                    photon::for_each_piece(world.medium, reach, *distance, *power, &mut |from, to, power| {
+                        let (begin, end) = (near.max(from), far.min(to));
+                        if begin < end {
+                            let (origin, length) = (reach.at(begin), end - begin);
+                            let flight = PhotonFlight { origin, direction: reach.direction, length, power };
+                            result = result.and(flights.push(flight));
+                        }
+                    });
                 }
                 Event::Flew { .. } => {}
             });

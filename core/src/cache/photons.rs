@@ -14,7 +14,7 @@ use super::resolved::MAX_DEGREE;
 use crate::host::{Medium, Scene};
 use crate::light::Light;
 use crate::math::{Bounds, Ray, Vec3, float};
-use crate::photon::{Event, trace_split};
+use crate::photon::{Event, for_each_piece, trace_split};
 use crate::sampling::uniform::mix;
 use crate::sampling::{Generator, uniform};
 use crate::sent::packed;
@@ -370,25 +370,28 @@ impl<'s> PhotonGrid<'s> {
                 flights += 1;
                 let straight = core::mem::replace(&mut is_straight, false);
                 let Some((near, far)) = bounds.intersect(reach).filter(|_| !straight) else { return };
-                let (near, far) = (near.max(0.0), far.min(distance));
-                let length = far - near;
-                if !(length > 0.0) {
-                    return;
-                }
-                let mut flown = left;
-                while flown < length {
-                    let at = reach.at(near + flown);
-                    flown += spacing;
-                    let Some(cell) = self.cell_of(at).map(|cell| self.number(cell)) else { continue };
-                    let is_lit = || self.cells.as_slice().get(cell as usize).is_some_and(|cell| cell.is_lit);
-                    let direction = match is_counted {
-                        true if world.medium.properties(at).scattering == Spectrum::ZERO => Vec3::ZERO,
-                        false if !is_lit() => continue,
-                        _ => reach.direction,
-                    };
-                    kept = kept.and(deposits.push(PhotonDeposit { cell, path, at, direction, light: power * spacing }));
-                }
-                left = flown - length;
+                for_each_piece(world.medium, reach, distance, power, &mut |from, to, power| {
+                    let (near, far) = (near.max(from), far.min(to));
+                    let length = far - near;
+                    if !(length > 0.0) {
+                        return;
+                    }
+                    let mut flown = left;
+                    while flown < length {
+                        let at = reach.at(near + flown);
+                        flown += spacing;
+                        let Some(cell) = self.cell_of(at).map(|cell| self.number(cell)) else { continue };
+                        let is_lit = || self.cells.as_slice().get(cell as usize).is_some_and(|cell| cell.is_lit);
+                        let direction = match is_counted {
+                            true if world.medium.properties(at).scattering == Spectrum::ZERO => Vec3::ZERO,
+                            false if !is_lit() => continue,
+                            _ => reach.direction,
+                        };
+                        let deposit = PhotonDeposit { cell, path, at, direction, light: power * spacing };
+                        kept = kept.and(deposits.push(deposit));
+                    }
+                    left = flown - length;
+                });
             }
             Event::Collided { .. } | Event::Met { .. } => {}
         });
@@ -520,6 +523,22 @@ mod tests {
         let cells = PhotonGrid::lit(&world, &effort(4000), &path::Settings::default(), 1);
         let known = |z: f32| cells.scattered(Vec3::new(0.1, 0.1, z), Vec3::X, &fog.properties(Vec3::ZERO)).is_some();
         assert_eq!([-0.8, -0.4, 0.0, 0.15, 0.4].map(known), [true, true, false, false, false]);
+    }
+
+    /// White fog whose extinction is coloured, under an even sky of 1: as much light everywhere, in every channel.
+    #[test]
+    fn cells_of_coloured_fog_hold_the_light_of_every_channel() {
+        let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::new(0.5, 1.5, 4.0), Phase::ISOTROPIC).unwrap();
+        let ball = Placed::new(fog, Region::sphere(Vec3::ZERO, 1.0).unwrap());
+        let sky = [Light::Constant(Spectrum::ONE)];
+        let world = World { medium: &ball, scene: &crate::host::Empty, lights: (&sky).into() };
+        let cells = PhotonGrid::lit(&world, &effort(200_000), &path::Settings::default(), 1);
+        let properties = ball.properties(Vec3::ZERO);
+        for point in [Vec3::ZERO, Vec3::splat(0.3), Vec3::new(0.0, -0.4, 0.1)] {
+            let (light, _) = cells.scattered(point, Vec3::Z, &properties).unwrap();
+            let off = (light.radiance - Spectrum::ONE).map(f32::abs).max_element();
+            assert!(off < 0.05, "{point}: {light:?}");
+        }
     }
 
     /// What flows one way is scattered on by the phase function, as far as the degree of cells goes; light straight from a

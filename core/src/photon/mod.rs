@@ -3,6 +3,7 @@
 //! | file | holds |
 //! |---|---|
 //! | `mod` | [`Event`]: what happens to a photon |
+//! | `pieces` | [`for_each_piece`]: power along a flight, also where extinction is coloured |
 //! | [`trace`](mod@trace) | [`trace()`]: the walk; [`trace_split`]: in parts, by weight windows |
 //!
 //! One walk serves all methods that send light out instead of fetching it (covariance tracing, photon
@@ -11,9 +12,12 @@
 //!
 //! Directions in events are those of *travel*, as light flies.
 
+mod pieces;
 pub mod trace;
 
 use glam::Vec3;
+
+pub use pieces::for_each_piece;
 
 pub use trace::{trace, trace_split};
 
@@ -41,7 +45,7 @@ pub enum Event<'a> {
         reach: &'a Ray,
         /// How far it came (m): to its collision, to the surface, or to the ray's end.
         distance: f32,
-        /// Power (W) at the start.
+        /// Power (W) at the start. Where extinction is grey, that is what it stands for along the whole way; where it is coloured, [`for_each_piece`] tells.
         power: Spectrum,
     },
     /// It collided with the medium.

@@ -41,6 +41,7 @@ const MOST_POWER: f32 = 100.0;
 /// ∫ f Φ dV  =  E Σ_flights power ∫₀^distance f dt  =  E Σ_collisions power f/σₜ        Φ fluence (W·m⁻²)
 /// ```
 ///
+/// * Where extinction is coloured, `power` along a flight is what [`for_each_piece`](super::for_each_piece) tells.
 /// * Light that is scattered to an eye at the end of a flight was scattered at most
 ///   [`Settings::max_scatterings`] times: a walk has fewer scatterings by one, and with 0 there is none.
 /// * Refraction changes radiance by `η²`, but no power; surfaces have geometric normals only, so no other

@@ -320,7 +320,7 @@ fn by_photons<M: Medium, S: Scene>(settings: BakeSettings, world: &World<'_, M, 
 #[test]
 fn photons_bring_the_light_that_paths_find() {
     // Before and behind a leaning floor, in a ball of coloured fog that is not all of the box; a lamp beside, a sky around.
-    let scattering = Spectrum::new(0.5, 0.7, 0.9);
+    let scattering = Spectrum::new(0.3, 0.7, 3.0);
     let fog = Homogeneous::new(Spectrum::splat(0.1), scattering, Lobe::HenyeyGreenstein { g: 0.4 }).unwrap();
     let ball = Placed::new(fog, Region::sphere(Vec3::ZERO, 1.3).unwrap());
     let lights = [lamp(Vec3::new(1.4, 0.3, 0.2), Spectrum::ONE), Light::Constant(Spectrum::splat(0.02))];
