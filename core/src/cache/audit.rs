@@ -176,6 +176,8 @@ pub struct Findings {
     pub all: Deviation,
     /// Of the light that is cached, as a part of all light, against estimates without caches at the same points: better known.
     pub cached: Deviation,
+    /// The same in each channel, as a part of the mean of all channels: colours may be wrong where all light together is right.
+    pub channels: [Deviation; 3],
     /// The error of the picture that comes from records, blotches that have no mean included, as a part of its light (root of the mean of squares):
     /// against estimates as records are made of, which end in cells that photons have lit ([`Settings::photons`](super::Settings::photons)), if these are there.
     pub squared: Squared,
@@ -301,13 +303,15 @@ pub struct Compared {
     truth: f64,
     all: f64,
     parts: [f64; 4],
+    channels: [f64; 3],
     /// The rays one by one, of which `rays` are set.
     samples: [Sample; GROUP as usize],
 }
 
 impl Default for Compared {
     fn default() -> Self {
-        Self { rays: 0, truth: 0.0, all: 0.0, parts: [0.0; 4], samples: [Sample::default(); GROUP as usize] }
+        let samples = [Sample::default(); GROUP as usize];
+        Self { rays: 0, truth: 0.0, all: 0.0, parts: [0.0; 4], channels: [0.0; 3], samples }
     }
 }
 
@@ -365,6 +369,7 @@ struct Sums {
     all: Moments,
     cached: Moments,
     parts: [Moments; 4],
+    channels: [Moments; 3],
 }
 
 impl<'c, 's, F: Fn([f32; 2]) -> Ray> Audit<'c, 's, F> {
@@ -434,7 +439,7 @@ impl<'c, 's, F: Fn([f32; 2]) -> Ray> Audit<'c, 's, F> {
     /// What was found so far.
     #[must_use]
     pub fn findings(&self) -> Findings {
-        let Sums { rays, truth: [t, tt], all, cached, parts: of_kinds } = self.sums;
+        let Sums { rays, truth: [t, tt], all, cached, parts: of_kinds, channels } = self.sums;
         let groups = f64::from(self.taken - self.first);
         let mut parts = ByKind([None; Kind::COUNT]);
         for (kind, moments) in Kind::FINAL.into_iter().zip(&of_kinds) {
@@ -442,8 +447,9 @@ impl<'c, 's, F: Fn([f32; 2]) -> Ray> Audit<'c, 's, F> {
             parts[kind] = is_cached.then(|| moments.deviation(t, tt, groups));
         }
         let [all, cached] = [all, cached].map(|moments| moments.deviation(t, tt, groups));
+        let channels = channels.map(|moments| moments.deviation(t, tt, groups));
         let (squared, squared_parts) = self.regions.squared();
-        Findings { rays, all, cached, squared, squared_parts, gradients: self.gradients, parts }
+        Findings { rays, all, cached, channels, squared, squared_parts, gradients: self.gradients, parts }
     }
 }
 
@@ -500,11 +506,13 @@ where
             // All estimate what is not cached, each with noise of its own.
             let is_cached = Kind::FINAL.map(|kind| settings.effort(kind).is_some());
             let told = told.by_kind();
-            let beyond = |other: [Spectrum; 4]| -> [f64; 4] {
-                let difference = |k: usize| f64::from(told[k].mean()) - f64::from(other[k].mean());
-                core::array::from_fn(|k| if is_cached[k] { difference(k) } else { 0.0 })
+            let beyond = |other: [Spectrum; 4]| -> [Spectrum; 4] {
+                core::array::from_fn(|k| if is_cached[k] { told[k] - other[k] } else { Spectrum::ZERO })
             };
-            let (parts, near) = (beyond(known.by_kind()), beyond(near.by_kind()));
+            let means = |of: [Spectrum; 4]| of.map(|difference| f64::from(difference.mean()));
+            let (known, near) = (beyond(known.by_kind()), means(beyond(near.by_kind())));
+            let (parts, channels) = (means(known), known.into_iter().sum::<Spectrum>());
+            output.channels.iter_mut().zip(channels.0).for_each(|(sum, channel)| *sum += f64::from(channel));
             output.parts.iter_mut().zip(parts).for_each(|(sum, part)| *sum += part);
             let cached = parts.iter().sum();
             output.samples[output.rays as usize] = Sample { at, told: all, traced: truth, cached, parts, near };
@@ -523,7 +531,8 @@ where
         sums.truth[1] += output.truth * output.truth;
         sums.all.add(output.all, output.truth);
         sums.cached.add(output.parts.iter().sum(), output.truth);
-        for (moments, part) in sums.parts.iter_mut().zip(output.parts) {
+        let moments = sums.parts.iter_mut().chain(&mut sums.channels);
+        for (moments, part) in moments.zip(output.parts.into_iter().chain(output.channels)) {
             moments.add(part, output.truth);
         }
         self.regions.add_group(&output.samples[..output.rays as usize]);

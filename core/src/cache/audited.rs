@@ -11,7 +11,7 @@ use crate::light::{Light, PointLight};
 use crate::math::{Bounds, Ray, Vec3};
 use crate::medium::{Homogeneous, Placed, Region};
 use crate::phase::Phase;
-use crate::spectrum::Spectrum;
+use crate::spectrum::{Gradient, Spectrum};
 use crate::work::finish;
 use crate::world::{Outline, World};
 
@@ -97,6 +97,25 @@ fn what_is_right_is_found_right() {
     assert!(found.all.error < 0.04 && found.cached.error < 0.005, "{found:?}");
     assert!(!found.all.exceeds(0.02) && !found.cached.exceeds(0.02), "{found:?}");
     assert!(found.of(Kind::Irradiance).is_some() && found.of(Kind::CoarseIrradiance).is_none());
+}
+
+/// A fifth too red is no brighter, and told all the same.
+#[test]
+fn colours_that_are_off_are_told() {
+    let tinted = |caches: &mut RadianceCaches<'_>| {
+        let tint = |light: Spectrum| light * Spectrum::new(1.2, 1.0, 0.8);
+        each(caches, Kind::Multiple, |record| {
+            let gradient = record.gradient;
+            let gradient = Gradient { x: tint(gradient.x), y: tint(gradient.y), z: tint(gradient.z) };
+            Record { value: tint(record.value), gradient, ..record }
+        });
+    };
+    let [right, off] = [audited(|settings| settings, |_| {}), audited(|settings| settings, tinted)];
+    assert!(right.channels.iter().all(|found| !found.exceeds(0.01)), "{right:?}");
+    assert!(!off.cached.exceeds(0.01), "{off:?}");
+    let [red, green, blue] = off.channels;
+    assert!(red.exceeds(0.02) && !green.exceeds(0.01) && blue.exceeds(0.02), "{off:?}");
+    assert!(red.bias > 0.0 && blue.bias < 0.0);
 }
 
 #[test]

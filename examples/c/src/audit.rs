@@ -131,6 +131,8 @@ pub struct fogbow_findings {
     pub multiple: fogbow_deviation,
     /// Of the light from elsewhere to surfaces.
     pub irradiance: fogbow_deviation,
+    /// Of the cached light in each channel, as a part of the mean of all channels.
+    pub channels: [fogbow_deviation; 3],
 }
 
 // SAFETY: `repr(C)`, the size first, then numbers.
@@ -163,6 +165,7 @@ pub unsafe extern "C" fn fogbow_audit_findings(
             surface: part(Part::Surface),
             multiple: part(Part::Multiple),
             irradiance: part(Part::Irradiance),
+            channels: found.channels.map(plain),
         };
         // SAFETY: what the head of the header asks of pointers.
         unsafe { arguments::write_sized(findings, "findings", answer) }

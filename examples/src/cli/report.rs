@@ -245,6 +245,12 @@ impl Report<'_> {
                     "warning: what is cached has an error of more than the {due}, in blotches that are too bright and too dark"
                 );
             }
+            let colours =
+                COLOURS.into_iter().zip(&findings.channels).filter(|(_, found)| found.exceeds(f64::from(most)));
+            let colours: Vec<String> = colours.map(|(name, found)| format!("{name} {}", percent(found))).collect();
+            if !colours.is_empty() {
+                say!("warning: colours are off by more than the {due}: {} of the mean light", colours.join(", "));
+            }
             if let Some(kinds) = misled(findings) {
                 say!("warning: gradients of {kinds} lead the wrong way, so that light between records is wrong");
             }
@@ -314,7 +320,9 @@ impl Report<'_> {
                 let all = [entry("all", &findings.all), entry("cached", &findings.cached), square(&findings.squared)];
                 let gradients = Kind::FINAL.into_iter().filter_map(|kind| Some(entry(kind.name(), &findings.gradients(kind)?)));
                 let gradients = format!("\"gradients\": {{{}}}", gradients.collect::<Vec<_>>().join(", "));
-                all.into_iter().chain(parts).chain([gradients]).collect::<Vec<_>>().join(", ")
+                let channels = COLOURS.into_iter().zip(&findings.channels).map(|(name, found)| entry(name, found));
+                let channels = format!("\"channels\": {{{}}}", channels.collect::<Vec<_>>().join(", "));
+                all.into_iter().chain([channels]).chain(parts).chain([gradients]).collect::<Vec<_>>().join(", ")
             };
             let repaired: Vec<String> = repaired.iter().map(|(found, _)| format!("{{{}}}", entries(found))).collect();
             let regions = map.regions().iter().map(|region| {
@@ -415,6 +423,9 @@ fn blamed(findings: &Findings) -> String {
         .collect();
     if names.is_empty() { String::new() } else { format!(" (by cache: {})", names.join(", ")) }
 }
+
+/// What the channels are called.
+const COLOURS: [&str; 3] = ["red", "green", "blue"];
 
 /// Bias of a single cache, as a part of all light, that is worth a word.
 const LITTLE: f64 = 0.005;
