@@ -581,6 +581,8 @@ typedef struct {
     fogbow_deviation multiple;
     // Of the light from elsewhere to surfaces.
     fogbow_deviation irradiance;
+    // Of the cached light in each channel, as a part of the mean of all channels.
+    fogbow_deviation channels[3];
 } fogbow_findings;
 
 // What is baked, and how well. Zeros are what suits most, but for `counts` or `spacing`.
