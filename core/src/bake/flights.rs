@@ -148,8 +148,8 @@ impl<'s> Photons<'s> {
                 Event::Met { .. } => is_due = parts.surfaces,
                 Event::Flew { reach, distance, power } if is_due => {
                     let Some((near, far)) = settings.bounds.intersect(reach) else { return };
-                    photon::for_each_piece(world.medium, reach, *distance, *power, &mut |from, to, power| {
-                        let (begin, end) = (near.max(from), far.min(to));
+                    photon::for_each_piece(world.medium, reach, far.min(*distance), *power, &mut |from, to, power| {
+                        let (begin, end) = (near.max(from), to);
                         if begin < end {
                             let (origin, length) = (reach.at(begin), end - begin);
                             let flight = PhotonFlight { origin, direction: reach.direction, length, power };

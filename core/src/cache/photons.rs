@@ -370,8 +370,8 @@ impl<'s> PhotonGrid<'s> {
                 flights += 1;
                 let straight = core::mem::replace(&mut is_straight, false);
                 let Some((near, far)) = bounds.intersect(reach).filter(|_| !straight) else { return };
-                for_each_piece(world.medium, reach, distance, power, &mut |from, to, power| {
-                    let (near, far) = (near.max(from), far.min(to));
+                for_each_piece(world.medium, reach, far.min(distance), power, &mut |from, to, power| {
+                    let (near, far) = (near.max(from), to);
                     let length = far - near;
                     if !(length > 0.0) {
                         return;
