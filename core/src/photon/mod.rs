@@ -18,7 +18,6 @@ pub mod trace;
 use glam::Vec3;
 
 pub use pieces::for_each_piece;
-
 pub use trace::{trace, trace_split};
 
 use crate::host::{Hit, Properties};

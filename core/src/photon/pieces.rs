@@ -48,7 +48,6 @@ pub fn for_each_piece(
             continue;
         }
         let cells = if segment.is_constant() { 0.0 } else { length / medium.resolution() };
-        // NaN becomes one piece.
         let count = libm::ceilf(cells.max(PER_FREE_PATH * segment.majorant.max_element() * length)).clamp(1.0, MOST);
         let step = length / count;
         for k in 0..count as u32 {
