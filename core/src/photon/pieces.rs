@@ -19,8 +19,9 @@ const MOST: f32 = 1024.0;
 /// ```
 ///
 /// Where extinction is grey that is `p` all along, one piece. Where it is not, a flight is drawn for a channel chosen in proportion to its power `p` at the start, and comes as far as `t` with
-/// the probability `P(t)`: as [`flight`](crate::transmittance::flight) weighs collisions (Wilkie et al. 2014). Pieces are a quarter of the least free path long, so that power in the middle of one
-/// is that of all of it to 0.3 %.
+/// the probability `P(t)`: as [`flight`](crate::transmittance::flight) weighs collisions (Wilkie et al. 2014). Pieces are a quarter of the least free path long at most (up to 1024 in one of
+/// the medium's segments), so that power in the middle of one is that of all of it to 0.3 %. Thickness up to there is exact where extinction is constant; where it changes, pieces are no longer than [`Medium::resolution`]
+/// and taken for what their middles are. A piece without end has the power that it begins with: endless flights are to be cut where nobody looks.
 ///
 /// ```
 /// # use fogbow::{math::{Ray, Vec3}, medium::Homogeneous, phase::Phase, photon::for_each_piece, spectrum::Spectrum};
