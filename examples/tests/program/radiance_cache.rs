@@ -87,7 +87,7 @@ fn means(name: &str, world: &World, samples: &str, options: &[&str]) -> [f64; 2]
     let folder = Folder::new(&format!("edge-{name}"));
     std::fs::write(folder.0.join("scene.xml"), world.text()).unwrap();
     let cached =
-        picture(&folder, "radiance-cache", &[&["--paths", "512", "--seed", "3"], &UNAUDITED[..], options].concat());
+        picture(&folder, "radiance-cache", &[&["--error", "0.05", "--seed", "3"], &UNAUDITED[..], options].concat());
     // Path tracing has nothing to do with how single scattering is cached.
     let at = options.iter().position(|option| *option == "--single").unwrap_or(options.len());
     let traced = picture(&folder, "path", &[&["--spp", samples], &options[..at]].concat());
@@ -103,7 +103,7 @@ fn agree(name: &str, world: &World, samples: &str, options: &[&str], tolerance: 
     );
 }
 
-/// Of means over 768 pixels: caches of 512 walks a record are off by some per cent (of fewer: too dark), and path tracing by one. Smaller
+/// Of means over 768 pixels: caches for an error of 5 % are off by a per cent, and path tracing by one. Smaller
 /// images would not do: no record's radius is less than one and a half pixels.
 const FEW_PER_CENT: f64 = 0.05;
 
@@ -304,7 +304,7 @@ fn a_camera_in_the_medium_and_single_pixels_look_as_path_traced() {
     let world = World::of(&[FOG, CONTAINER, WALLS, LAMP]);
     let folder = Folder::new("edge-pixel");
     std::fs::write(folder.0.join("scene.xml"), world.text()).unwrap();
-    let options = [&pixel[..], &UNAUDITED, &["--spp", "512", "--paths", "128"]].concat();
+    let options = [&pixel[..], &UNAUDITED, &["--spp", "512", "--error", "0.05"]].concat();
     let cached = mean(&picture(&folder, "radiance-cache", &options));
     let traced = mean(&picture(&folder, "path", &[&pixel[..], &["--spp", "100000"]].concat()));
     assert!((cached - traced).abs() <= FEW_PER_CENT * traced, "{cached} by caching, {traced} by paths");
