@@ -127,7 +127,7 @@ fn paths_see_the_same_in_other_units() {
 fn caches_see_the_same_in_other_units() {
     assert_same(|scale| {
         in_world(scale, |world, bounds| {
-            let usual = cache::Settings::for_outline(&Outline::of(world, bounds), 0.02).with_walks(16);
+            let usual = cache::Settings::for_outline(&Outline::of(world, bounds), 0.1).with_walks(16);
             let settings = cache::Settings { rays: 64, ..usual };
             let mut filling =
                 RadianceCaches::new(settings).fill(Asked::View { ray: |at| eye_ray(scale, at), pixel: 0.1 });

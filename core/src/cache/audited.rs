@@ -55,8 +55,11 @@ fn settings_of(world: &Fog<'_>) -> Settings {
     Settings { rays: 4096, ..settings }
 }
 
+/// Eye rays, and what is done to caches.
+type Way<'w> = (u32, &'w dyn Fn(&mut RadianceCaches<'_>));
+
 /// Findings in a ball of fog under a sky, with a lamp inside, and where, after each way to spoil caches that are right.
-fn spoilt<const N: usize>(ways: [(u32, &dyn Fn(&mut RadianceCaches<'_>)); N]) -> [(Findings, BiasMap); N] {
+fn spoilt<const N: usize>(ways: [Way<'_>; N]) -> [(Findings, BiasMap); N] {
     let (fog, lights) = (ball([0.2, 1.8]), within());
     let world = World { medium: &fog, scene: &crate::host::Empty, lights: (&lights).into() };
     let settings = settings_of(&world);

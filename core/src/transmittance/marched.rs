@@ -67,18 +67,35 @@ pub fn march(ray: &Ray, medium: &(impl Medium + ?Sized), marching: Marching, u: 
                 whole.value += extinction * (until - from);
             }
             Part::Changing { from, until, densest } => {
-                let (mut at, mut last) = (from, None);
-                marching.samples((from, until, densest), |t, weight| {
+                // Linear between samples. From an end that is sampled, too, to the next sample it is even, and such that sums are those of the samples.
+                let (mut at, mut end, mut last) = (from, None, None);
+                marching.samples((from, until, densest), |t, weight, is_end| {
                     let (extinction, gradient) = medium.extinction_with_gradient(ray.at(t));
-                    let here = (extinction[0], gradient);
-                    draw.advance(at, t - at, last.unwrap_or(here), here);
-                    (at, last) = (t, Some(here));
                     whole.value += extinction * weight;
                     whole.gradient_joint += gradient * weight;
                     moment += gradient * (weight * t);
+                    let here = (extinction[0], gradient);
+                    match last {
+                        None if is_end => {
+                            end = Some((weight, here));
+                            return false;
+                        }
+                        None => {
+                            let piece = even((weight, here), end, t - at);
+                            draw.advance(at, t - at, piece, piece);
+                        }
+                        Some((step, last)) if is_end => {
+                            let piece = even((step, last), Some((weight, here)), until - at);
+                            draw.advance(at, until - at, piece, piece);
+                            at = until;
+                            return true;
+                        }
+                        Some((_, last)) => draw.advance(at, t - at, last, here),
+                    }
+                    (at, last) = (t, Some((weight, here)));
                     !to_end && draw.found.is_some()
                 });
-                if let Some(last) = last {
+                if let Some((_, last)) = last {
                     draw.advance(at, until - at, last, last);
                 }
             }
@@ -90,6 +107,7 @@ pub fn march(ray: &Ray, medium: &(impl Medium + ?Sized), marching: Marching, u: 
         }
         !to_end && draw.found.is_some() || is_endless && is_opaque(whole.value)
     });
+    whole.value = whole.value.max(Spectrum::ZERO);
     // With the far end held, what lies near it moves less.
     let held = |joint: &Gradient, moment: &Gradient, value: Spectrum, length: f32| {
         if !(length > 0.0) {
@@ -121,6 +139,20 @@ pub fn march(ray: &Ray, medium: &(impl Medium + ?Sized), marching: Marching, u: 
     Marched { collision, whole: to_end.then_some(whole) }
 }
 
+/// Extinction in the first channel (m⁻¹), and its gradient.
+type Local = (f32, Gradient);
+
+/// What is even along a piece of some length between an end and the sample next to it, each with its weight (m): half of a step counts there, and what takes
+/// its offset away; without an end that of the sample.
+#[inline]
+fn even((step, (extinction, gradient)): (f32, Local), end: Option<(f32, Local)>, length: f32) -> Local {
+    let Some((weight, (end, end_gradient))) = end.filter(|_| length > 0.0) else {
+        return (extinction, gradient);
+    };
+    let (near, far) = (0.5 * step / length, weight / length);
+    ((extinction * near + end * far).max(0.0), gradient * near + end_gradient * far)
+}
+
 /// A collision being looked for.
 struct Draw {
     /// Thickness up to it.
@@ -139,7 +171,7 @@ impl Draw {
 
     /// A piece of a ray on which extinction and its gradient are linear.
     #[inline]
-    fn advance(&mut self, from: f32, length: f32, (a, slope_a): (f32, Gradient), (b, slope_b): (f32, Gradient)) {
+    fn advance(&mut self, from: f32, length: f32, (a, slope_a): Local, (b, slope_b): Local) {
         if self.found.is_some() || !(length > 0.0) {
             return;
         }

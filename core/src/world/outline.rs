@@ -127,6 +127,24 @@ pub struct Outline {
 }
 
 impl Outline {
+    /// Whether there may be light that photons bring and no path from an eye can find: that of lamps without extent (points, spots, projectors, suns) by way of mirrors or
+    /// glass. Caches that photons light hold it; path tracing, and with it an [`Audit`](crate::cache::Audit), takes it for too much.
+    ///
+    /// ```
+    /// # use fogbow::{host::Empty, light::{Light, PointLight}, math::{Bounds, Vec3}, spectrum::Spectrum};
+    /// # use fogbow::world::{Outline, World};
+    /// let lamps = [Light::Point(PointLight::new(Vec3::Z, Spectrum::ONE)?)];
+    /// let world = World { medium: &Empty, scene: &Empty, lights: (&lamps).into() };
+    /// let outline = Outline::of(&world, Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE });
+    /// assert!(!outline.hides_light() && Outline { has_mirrors: true, ..outline }.hides_light());
+    /// # Ok::<(), Box<dyn core::error::Error>>(())
+    /// ```
+    #[inline]
+    #[must_use]
+    pub const fn hides_light(&self) -> bool {
+        self.has_mirrors && self.lights.delta > 0
+    }
+
     /// Looks at a world: at 24³ points of its medium, along 1024 rays for its surfaces, and at what the medium says of
     /// itself. `bounds` (m) should hold all surfaces and media, or what matters of them. The same world gives the same
     /// outline.

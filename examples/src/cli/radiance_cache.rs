@@ -6,8 +6,8 @@ use std::time::Duration;
 use clap::{Arg, Args, ValueEnum};
 use fogbow::bytes::{Crc, Damage};
 use fogbow::cache::{
-    self, Asked, Audit, BiasMap, CachedRadiance, CachesError, Extrapolation, Filling, Findings, RadianceCaches,
-    RaySettings,
+    self, Asked, Audit, BiasMap, CachedRadiance, CachesError, Deviation, Extrapolation, Filling, Findings,
+    RadianceCaches, RaySettings,
 };
 use fogbow::covariance::image_sampling::Plan;
 use fogbow::host::Medium;
@@ -346,6 +346,8 @@ pub(crate) struct Audited {
     pub(crate) map: Box<BiasMap>,
     /// What earlier audits had found, because of which records were made anew.
     pub(crate) repaired: Vec<(Findings, Box<BiasMap>)>,
+    /// Whether what looks too bright may be light that paths cannot find.
+    pub(crate) may_be_hidden: bool,
 }
 
 impl CacheJob<'_> {
@@ -457,6 +459,25 @@ impl<M: Medium + Sync> Stages<'_, '_, M> {
         (ran.ending != Ending::Cancelled).then(|| (audit.findings(), Box::new(audit.map())))
     }
 
+    fn audited(
+        &self,
+        error: f32,
+        (findings, map): (Findings, Box<BiasMap>),
+        repaired: Vec<(Findings, Box<BiasMap>)>,
+    ) -> Audited {
+        let may_be_hidden = self.may_be_hidden((&findings, &map), error);
+        Audited { error, findings, map, repaired, may_be_hidden }
+    }
+
+    /// Whether something is too bright where there may be light that paths cannot find: then no repair helps.
+    fn may_be_hidden(&self, (findings, map): (&Findings, &BiasMap), error: f32) -> bool {
+        let error = f64::from(error);
+        let is_too_bright = |off: &Deviation| off.exceeds(error) && off.bias > 0.0;
+        self.outline.hides_light()
+            && (map.worst(error).is_some_and(|region| region.cached.bias > 0.0)
+                || [findings.all, findings.cached].iter().any(is_too_bright))
+    }
+
     /// Fills caches until nothing is missing; audits them, and makes anew what is wrong.
     fn fill(&self, mut caches: RadianceCaches<'static>, error: f32, spent: &mut Spent) -> Filled {
         let (job, world) = (self.job, self.world());
@@ -475,9 +496,14 @@ impl<M: Medium + Sync> Stages<'_, '_, M> {
             let Some((findings, map)) = self.audit(audit, None, spent) else {
                 return Filled::new(caches, (Ending::Cancelled, measured), None);
             };
-            let (ray, is_over) = (self.rays(), repaired.len() as u32 >= cache::MOST_REPAIRS);
+            let is_over = repaired.len() as u32 >= cache::MOST_REPAIRS || self.may_be_hidden((&findings, &map), error);
+            let ray = self.rays();
             if is_over || !caches.drop_wrong((&findings, &map), error, ray, &world) {
-                return Filled::new(caches, (Ending::Done, measured), Some(Audited { error, findings, map, repaired }));
+                return Filled::new(
+                    caches,
+                    (Ending::Done, measured),
+                    Some(self.audited(error, (findings, map), repaired)),
+                );
             }
             repaired.push((findings, map));
         }
@@ -493,7 +519,7 @@ impl<M: Medium + Sync> Stages<'_, '_, M> {
         }
         let audit = Audit::new(&caches, self.rays(), measured.audit_rays).held_to(error);
         let found = self.audit(audit, None, spent);
-        let audited = found.map(|(findings, map)| Audited { error, findings, map, repaired: Vec::new() });
+        let audited = found.map(|found| self.audited(error, found, Vec::new()));
         Ok(Filled::new(caches, (Ending::Done, measured), audited))
     }
 

@@ -195,7 +195,7 @@ impl Report<'_> {
         let all: f64 = self.statistics.phases.iter().map(|(_, seconds)| seconds.wall).sum();
         let rays = self.rays_per_second() * 1e-6;
         say!("{} in all; {}{cpu} for samples, {rays:.2} million rays per second", clock(all.max(wall)), clock(wall));
-        if let Some(Audited { error: most, findings, map, repaired }) = self.audited {
+        if let Some(Audited { error: most, findings, map, repaired, may_be_hidden }) = self.audited {
             let most = *most;
             let per_cent = (1e4 * most).round() / 100.0;
             // More time helps as long as what was asked for is not reached.
@@ -257,6 +257,11 @@ impl Report<'_> {
             if let Some(places) = in_places(map) {
                 say!("warning: off by more than the {due} {places}");
             }
+            if *may_be_hidden {
+                say!(
+                    "note: mirrors or glass send on light of lamps without extent. Photons bring it, but no path finds it: what is too bright may be that light"
+                );
+            }
         }
         if counters.non_finite > 0 {
             say!("warning: {} samples were no finite numbers and count as black", counters.non_finite);
@@ -306,7 +311,7 @@ impl Report<'_> {
                 recovered.join(", "),
             )
         });
-        let findings = self.audited.map_or_else(String::new, |Audited { error: made_for, findings, map, repaired }| {
+        let findings = self.audited.map_or_else(String::new, |Audited { error: made_for, findings, map, repaired, .. }| {
             let number = |x: f64| if x.is_finite() { format!("{x:.6e}") } else { "null".to_owned() };
             let entry = |name: &str, found: &Deviation| {
                 format!("{}: {{\"bias\": {}, \"error\": {}}}", quoted(name), number(found.bias), number(found.error))

@@ -187,6 +187,27 @@ fn every_picture_from_caches_says_how_far_it_is_off() {
     assert!(none.is_none() && !told.contains("bias") && same == image, "{told}");
 }
 
+/// Fog in a ball of glass, lit by a lamp without extent outside: photons get in, paths do not find the lamp. No repair changes that.
+#[test]
+fn light_that_no_path_can_find_is_told() {
+    let folder = Folder::new("cache-hidden");
+    let ball = r#"<shape type="sphere"><point name="center" x="0" y="0" z="0"/><float name="radius" value="0.8"/>
+        <bsdf type="dielectric"/><ref name="interior" id="fog"/></shape>"#;
+    let outside = SPARK.replace(r#"x="0.1" y="0.4" z="0.2""#, r#"x="1" y="1" z="1""#);
+    let render = |lamp: &str| {
+        std::fs::write(folder.0.join("scene.xml"), World::of(&[FOG, WALLS, ball, lamp]).text()).unwrap();
+        let options = ["--error", "0.2", "--spp", "1", "--size", "16x12", "--audit", "2048", "-o", "a.pfm"];
+        let output = folder.run(&[&["render", "scene.xml", "--method", "radiance-cache"], &options[..]].concat());
+        assert_eq!(output.status.code(), Some(0), "{}", said(&output));
+        said(&output)
+    };
+    let told = render(&outside);
+    assert!(told.contains("warning: ") && told.contains("note: mirrors or glass send on light of lamps"), "{told}");
+    assert!(!told.contains("repaired: "), "{told}");
+    let told = render(LAMP);
+    assert!(!told.contains("note: mirrors"), "{told}");
+}
+
 /// Without a method: by caching where it can, else by path tracing, and the reason. Which it is stands in the statistics, too.
 #[test]
 fn caching_is_what_is_taken_unless_something_speaks_against_it() {

@@ -11,7 +11,7 @@ use fogbow_std::threads::Ending;
 use fogbow_std::tiles::{self, Outcome, Reason};
 
 use super::super::covariance::Stopped;
-use super::{Audited, Done, Failure, Filled, Measured, Spent, Stages};
+use super::{Done, Failure, Filled, Measured, Spent, Stages};
 
 /// Layers of a picture on its way where nobody asks for parts: all light, and that of caches.
 pub(super) const LAYERS: [&str; 2] = ["total", "cached"];
@@ -363,7 +363,7 @@ impl<M: Medium + Sync> Stages<'_, '_, M> {
         // Time is limited, and nothing is dropped: one look is enough.
         let audit = || Audit::new(&caches, self.rays(), measured.audit_rays);
         let found = is_audited.then(|| self.audit(audit(), Some(time), spent)).flatten();
-        let audited = found.map(|(findings, map)| Audited { error, findings, map, repaired: Vec::new() });
+        let audited = found.map(|found| self.audited(error, found, Vec::new()));
         let filled = Filled::new(caches, (Ending::Done, measured), audited);
         // Nothing is as good a use of the rest as less noise; down to the error asked for, if that is what caches are filled for.
         let is_due = job.arguments.error.is_some_and(|due| error <= due);
