@@ -323,10 +323,7 @@ fn what_is_broken_in_records_is_repaired() {
     // A scale and gradients are dropped with the records that have them, as a wild one is.
     for broken in [Broken::Tolerance, Broken::Wild] {
         // Squares still tell the noise of records that were right, from few walks.
-        extern crate std;
-        let t = std::time::Instant::now();
         assert_eq!(verdict(Some(broken), MOST_REPAIRS)[..2], [false, false], "{broken:?}");
-        std::eprintln!("{:?}", t.elapsed());
     }
     assert_eq!(verdict(Some(Broken::Walks), 1), [true, true, true, false]);
 }
