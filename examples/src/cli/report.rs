@@ -245,6 +245,10 @@ impl Report<'_> {
                     "warning: what is cached has an error of more than the {due}, in blotches that are too bright and too dark"
                 );
             }
+            let noise = self.statistics.record_noise.filter(|noise| *noise > NOISY * most);
+            if let Some(noise) = noise {
+                say!("warning: what is cached has {:.1} % of noise in the picture, more than the {due}", 100.0 * noise);
+            }
             let colours =
                 COLOURS.into_iter().zip(&findings.channels).filter(|(_, found)| found.exceeds(f64::from(most)));
             let colours: Vec<String> = colours.map(|(name, found)| format!("{name} {}", percent(found))).collect();
@@ -428,6 +432,9 @@ fn blamed(findings: &Findings) -> String {
         .collect();
     if names.is_empty() { String::new() } else { format!(" (by cache: {})", names.join(", ")) }
 }
+
+/// Noise of caches over the error they are made for, from which on there is a warning. Photons, surfaces and records that all have what they may come to 1.0.
+const NOISY: f32 = 1.5;
 
 /// What the channels are called.
 const COLOURS: [&str; 3] = ["red", "green", "blue"];
