@@ -31,7 +31,8 @@ pub struct MarchedCollision {
 }
 
 /// Draws a collision in a grey medium from `u` in [0, 1): extinction is that of the samples of `marching`, linear between
-/// them.
+/// them and even before the first and after the last. Where steps are thick and ends are sampled as well, the even pieces are such
+/// that `τ` of a whole part is that of its samples (decision 120).
 ///
 /// ```text
 /// τ(t) = −ln(1 − u),   T/p = 1/σ(t)
