@@ -9,6 +9,8 @@
 
 mod known;
 mod rounds;
+#[cfg(all(test, feature = "alloc"))]
+mod tests;
 
 use super::resolved::MAX_DEGREE;
 use crate::host::{Medium, Scene};
@@ -45,6 +47,15 @@ fn cells_between(degree: usize) -> f32 {
     CELLS_BETWEEN * float::sqrt(1.0 + 0.5 * degree as f32)
 }
 
+/// Cells across the narrowest side of the bounds, as far as there are enough. Fewer: walls on both sides cut most of them, and walks end nowhere; more: photons.
+const ACROSS: f32 = 8.0;
+
+/// Sides of cells are at least that of a box with this part of it. Smaller: lines of cells without end; larger: narrow places have none that walls do not cut.
+const NARROWEST: f32 = 0.125;
+
+/// How far, in sides of cells, from the bounds cells may begin. Farther: where it is dark none know light; less: walls just within the bounds cut the outermost.
+const MOVED: f32 = 0.5;
+
 /// Cells that one job looks at for surfaces.
 pub(super) const CELLS_PER_JOB: u32 = 512;
 
@@ -56,7 +67,8 @@ const INSET: f32 = 1e-3;
 pub struct PhotonEffort {
     /// The box (m) that is divided into cells; it should hold all surfaces and media.
     pub bounds: Bounds,
-    /// Cells along its longest side.
+    /// Cells along its longest side. A box that is narrow has more, so that there are eight across it, if that makes no more of them
+    /// in all than this number in a cube.
     pub cells: u32,
     /// Degree of a cell's expansion of radiance by direction, at most [`TURNING_DEGREE`](super::TURNING_DEGREE): memory goes by the square.
     pub degree: usize,
@@ -70,21 +82,22 @@ pub struct PhotonEffort {
 }
 
 impl PhotonEffort {
-    /// The side of a cell (m) and how many there are along each axis; `None` if the bounds are no box.
-    fn division(&self) -> Option<(f32, [u32; 3])> {
+    /// How many cells there are along each axis, and about how long their sides are (m); `None` if the bounds are no box.
+    fn division(&self) -> Option<([u32; 3], f32)> {
         let size = self.bounds.size();
         let is_box = size.is_finite() && size.cmpge(Vec3::ZERO).all() && size.max_element() > 0.0;
         if !is_box || self.cells == 0 {
             return None;
         }
-        let side = size.max_element() / self.cells as f32;
-        let counts = size / side;
-        Some((side, counts.to_array().map(|count| (libm::ceilf(count - INSET) as u32).clamp(1, self.cells))))
+        let longest = size.max_element() / self.cells as f32;
+        let as_many = libm::cbrtf(size.element_product()) / self.cells as f32;
+        let side = (size.min_element() / ACROSS).max(as_many).max(NARROWEST * longest).min(longest);
+        Some(((size / side).to_array().map(|count| (libm::roundf(count) as u32).max(1)), side))
     }
 
     /// How many cells there are, and coefficients of all together, of light and of what halves differ by.
     pub(super) fn room(&self) -> (usize, usize) {
-        let cells = self.division().map_or(0, |(_, counts)| counts.iter().map(|&count| count as usize).product());
+        let cells = self.division().map_or(0, |(counts, _)| counts.iter().map(|&count| count as usize).product());
         (cells, 2 * cells * sh::coefficient_count(self.degree.min(MAX_DEGREE)))
     }
 }
@@ -129,8 +142,10 @@ pub struct PhotonCell {
 #[derive(Debug)]
 pub struct PhotonGrid<'s> {
     first: Vec3,
-    side: f32,
+    side: Vec3,
     counts: [u32; 3],
+    /// Where something scatters, as far as the first photons have seen, until cells fill that.
+    scouted: Option<Bounds>,
     cells: List<'s, PhotonCell>,
     degree: usize,
     /// `Σ power · length · Y(direction of travel)` (W·m), cell after cell, and as many of the even photons less the odd ones.
@@ -215,8 +230,9 @@ impl<'s> PhotonGrid<'s> {
     pub(super) fn new(cells: List<'s, PhotonCell>, moments: List<'s, Spectrum>) -> Self {
         Self {
             first: Vec3::ZERO,
-            side: 0.0,
+            side: Vec3::ZERO,
             counts: [0; 3],
+            scouted: None,
             cells,
             degree: 0,
             moments,
@@ -300,19 +316,42 @@ impl<'s> PhotonGrid<'s> {
     /// Dark cells that fill the bounds.
     pub(super) fn reset(&mut self, effort: &PhotonEffort) -> Result<(), Full> {
         (self.paths, self.flights, self.counted, self.counts) = (0, 0, 0, [0; 3]);
-        (self.lit, self.made_for, self.noise) = (None, None, (0.0, 0));
+        (self.lit, self.made_for, self.noise, self.scouted) = (None, None, (0.0, 0), None);
         self.cells.clear();
         self.moments.clear();
-        let Some((side, counts)) = effort.division() else { return Ok(()) };
-        self.side = side;
-        // Whole cells about the same middle.
-        self.first = effort.bounds.centre() - Vec3::from(counts.map(|count| count as f32)) * (0.5 * side);
+        let Some((counts, side)) = effort.division() else { return Ok(()) };
+        self.lay(&effort.bounds, counts, side);
+        self.scouted = Some(Bounds { min: effort.bounds.max, max: effort.bounds.min });
         self.degree = effort.degree.min(MAX_DEGREE);
         let (count, coefficients) = effort.room();
         self.cells.reset(count, PhotonCell::default())?;
         self.moments.reset(coefficients, Spectrum::ZERO)?;
         self.counts = counts;
         Ok(())
+    }
+
+    /// Divides a box into cells; one that is flat is about as thick as a cell's `side` (m).
+    fn lay(&mut self, bounds: &Bounds, counts: [u32; 3], side: f32) {
+        let size = bounds.size();
+        let counts = Vec3::from(counts.map(|count| count as f32));
+        let is_flat = size.cmplt(Vec3::splat(INSET * side));
+        let size = Vec3::select(is_flat, Vec3::splat(side), size);
+        (self.side, self.first) = (size / counts, bounds.centre() - 0.5 * size);
+    }
+
+    /// Lays cells anew, up to where the first photons have met what scatters: walls that lie a little within the bounds would cut all the outermost cells. Faces near
+    /// which they met none stay where they are, for there it is only dark, or clear.
+    fn fit(&mut self, bounds: &Bounds) {
+        let Some(scouted) = self.scouted.take() else { return };
+        let (margin, side) = (MOVED * self.side, self.side.max_element());
+        let min = Vec3::select((scouted.min - bounds.min).cmplt(margin), scouted.min, bounds.min);
+        let max = Vec3::select((bounds.max - scouted.max).cmplt(margin), scouted.max, bounds.max);
+        // What is flat has been met nowhere else, and has no room to be moved in.
+        let is_flat = bounds.size().cmplt(2.0 * margin);
+        let (min, max) = (Vec3::select(is_flat, bounds.min, min), Vec3::select(is_flat, bounds.max, max));
+        self.lay(&Bounds { min, max }, self.counts, side);
+        (self.paths, self.flights, self.counted) = (0, 0, 0);
+        self.cells.as_mut_slice().fill(PhotonCell::default());
     }
 
     pub(super) fn paths(&self) -> u32 {
@@ -358,7 +397,8 @@ impl<'s> PhotonGrid<'s> {
         let mut along = Generator::child(&mut rng);
         let (mut flights, mut kept, bounds) = (0, Ok(()), self.bounds());
         let is_counted = self.lit.is_none();
-        let spacing = self.side * if is_counted { COUNTED_IN } else { cells_between(self.degree) };
+        let side = self.side.min_element();
+        let spacing = side * if is_counted { COUNTED_IN } else { cells_between(self.degree) };
         // How far it flies until it next leaves something: begun anywhere, every point of its way is as likely.
         let mut left = spacing * uniform(&mut along);
         // What walks connect to is no business of cells.
@@ -407,6 +447,9 @@ impl<'s> PhotonGrid<'s> {
             self.counted += paths;
             for deposit in deposits {
                 let Some(cell) = cells.get_mut(deposit.cell as usize) else { continue };
+                if let Some(scouted) = self.scouted.as_mut().filter(|_| deposit.direction != Vec3::ZERO) {
+                    (scouted.min, scouted.max) = (scouted.min.min(deposit.at), scouted.max.max(deposit.at));
+                }
                 if cell.paths == 0 {
                     cell.met = deposit.at;
                 }
@@ -445,7 +488,7 @@ impl<'s> PhotonGrid<'s> {
         let [nx, ny, _] = self.counts;
         let index = Vec3::new((number % nx) as f32, (number / nx % ny) as f32, (number / (nx * ny)) as f32);
         let half = 0.5 * self.side;
-        let middle = self.first + index * self.side + Vec3::splat(half);
+        let middle = self.first + index * self.side + half;
         let is_free = |to: Vec3| {
             let ray = Ray::between(cell.met, middle + to * (half * (1.0 - INSET)));
             !scene.is_blocked(&ray)
@@ -480,189 +523,4 @@ fn halves(moments: &mut [Spectrum]) -> (&mut [Spectrum], &mut [Spectrum]) {
 
 fn sign(bit: usize) -> f32 {
     if bit == 0 { -1.0 } else { 1.0 }
-}
-
-#[cfg(all(test, feature = "alloc"))]
-mod tests {
-    use super::*;
-    use crate::host::Hit;
-    use crate::light::PointLight;
-    use crate::medium::{Homogeneous, Placed, Region};
-    use crate::path;
-    use crate::phase::{Lobe, Phase};
-    use crate::surface::Surface;
-
-    const BOX: Bounds = Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE };
-
-    fn effort(paths: u32) -> PhotonEffort {
-        PhotonEffort { bounds: BOX, cells: 5, degree: 2, paths, flights: u64::MAX, enough: u32::MAX }
-    }
-
-    /// Black, at `z = 0.1`.
-    struct Wall;
-
-    impl Scene for Wall {
-        fn closest_hit(&self, ray: &Ray) -> Option<Hit> {
-            let distance = (0.1 - ray.origin.z) / ray.direction.z;
-            (distance > 1e-6 && distance < ray.length).then_some(Hit {
-                distance,
-                normal: Vec3::NEG_Z,
-                shading: Vec3::NEG_Z,
-                surface: Surface::BLACK,
-                light: None,
-            })
-        }
-    }
-
-    /// Cells of 0.4 from -1 on: the wall lies within the middle layer.
-    #[test]
-    fn cells_that_a_surface_cuts_or_that_lie_in_the_dark_do_not_know() {
-        let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::ONE, Phase::ISOTROPIC).unwrap();
-        let lamps = [Light::Point(PointLight::from_flux(Vec3::new(0.0, 0.0, -0.5), Spectrum::ONE).unwrap())];
-        let world = World { medium: &fog, scene: &Wall, lights: (&lamps).into() };
-        let cells = PhotonGrid::lit(&world, &effort(4000), &path::Settings::default(), 1);
-        let known = |z: f32| cells.scattered(Vec3::new(0.1, 0.1, z), Vec3::X, &fog.properties(Vec3::ZERO)).is_some();
-        assert_eq!([-0.8, -0.4, 0.0, 0.15, 0.4].map(known), [true, true, false, false, false]);
-    }
-
-    /// White fog whose extinction is coloured, under an even sky of 1: as much light everywhere, in every channel.
-    #[test]
-    fn cells_of_coloured_fog_hold_the_light_of_every_channel() {
-        let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::new(0.5, 1.5, 4.0), Phase::ISOTROPIC).unwrap();
-        let ball = Placed::new(fog, Region::sphere(Vec3::ZERO, 1.0).unwrap());
-        let sky = [Light::Constant(Spectrum::ONE)];
-        let world = World { medium: &ball, scene: &crate::host::Empty, lights: (&sky).into() };
-        let cells = PhotonGrid::lit(&world, &effort(200_000), &path::Settings::default(), 1);
-        let properties = ball.properties(Vec3::ZERO);
-        for point in [Vec3::ZERO, Vec3::splat(0.3), Vec3::new(0.0, -0.4, 0.1)] {
-            let (light, _) = cells.scattered(point, Vec3::Z, &properties).unwrap();
-            let off = (light.radiance - Spectrum::ONE).map(f32::abs).max_element();
-            assert!(off < 0.05, "{point}: {light:?}");
-        }
-    }
-
-    /// What flows one way is scattered on by the phase function, as far as the degree of cells goes; light straight from a
-    /// lamp is not in them.
-    #[test]
-    fn cells_hold_directions_and_gradients_but_no_light_straight_from_lamps() {
-        let phase = Lobe::HenyeyGreenstein { g: 0.4 };
-        let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::ONE, phase).unwrap();
-        let dark = Homogeneous::new(Spectrum::ONE, Spectrum::ZERO, phase).unwrap();
-        let lamps = [Light::Point(PointLight::from_flux(Vec3::splat(-0.9), Spectrum::ONE).unwrap())];
-        let black = World { medium: &dark, scene: &crate::host::Empty, lights: (&lamps).into() };
-        let cells = PhotonGrid::lit(&black, &effort(2000), &path::Settings::default(), 1);
-        assert!(cells.cells.as_slice().iter().all(|cell| cell.paths == 0), "nothing is scattered");
-
-        let world = World { medium: &fog, ..black };
-        let cells = PhotonGrid::lit(&world, &effort(100_000), &path::Settings::default(), 1);
-        let at = |x: f32, to_eye: Vec3| cells.scattered(Vec3::splat(x), to_eye, &fog.properties(Vec3::ZERO)).unwrap();
-        let (away, towards) = (Vec3::ONE.normalize(), -Vec3::ONE.normalize());
-        let ((ahead, _), (back, _)) = (at(0.0, away), at(0.0, towards));
-        assert!(ahead.radiance[0] > 1.3 * back.radiance[0], "{ahead:?} {back:?}");
-        // Light falls off away from the lamp, and linearly from cell to cell.
-        let slope = ahead.gradient.channel(0).dot(away);
-        let difference = (at(0.19, away).0.radiance[0] - at(-0.19, away).0.radiance[0]) / (0.38 * 3_f32.sqrt());
-        assert!(slope < 0.0 && (slope / difference - 1.0).abs() < 1e-3, "{slope} {difference}");
-        // Turning the direction does what the basis says.
-        let turned = Vec3::new(1.0, 1.0, 1.1).normalize();
-        let change = at(0.0, turned).0.radiance[0] - ahead.radiance[0];
-        let told = at(0.0, (away + turned).normalize()).1.channel(0).dot(turned - away);
-        assert!((change / told - 1.0).abs() < 0.01, "{change} {told}");
-    }
-
-    /// Through twelve free paths of fog that absorbs a fifth, light falls by thousands of times: of whole photons as many fewer would come to a cell at the other end.
-    #[test]
-    fn photons_come_to_dark_cells_as_to_bright_ones() {
-        let fog = Homogeneous::new(Spectrum::splat(1.2), Spectrum::splat(4.8), Phase::ISOTROPIC).unwrap();
-        let ball = Placed::new(fog, Region::sphere(Vec3::ZERO, 1.4).unwrap());
-        let lamps = [Light::Point(PointLight::from_flux(Vec3::Z * 0.9, Spectrum::ONE).unwrap())];
-        let world = World { medium: &ball, scene: &crate::host::Empty, lights: (&lamps).into() };
-        let effort = PhotonEffort { cells: 8, enough: 100, ..effort(400_000) };
-        let cells = PhotonGrid::lit(&world, &effort, &path::Settings::default(), 1);
-        let cell =
-            |z: f32| cells.cells.as_slice()[cells.number(cells.cell_of(Vec3::new(0.1, 0.1, z)).unwrap()) as usize];
-        let [near, far] = [cell(0.6), cell(-0.9)];
-        let darker = far.light / near.light;
-        assert!(darker < 1e-3 && far.paths > 20, "{near:?} {far:?}");
-        assert!(far.paths as f32 > 10.0 * darker * near.paths as f32, "{near:?} {far:?}");
-    }
-
-    #[test]
-    fn halves_of_the_photons_tell_what_all_differ_by_from_seed_to_seed() {
-        const SEEDS: u64 = 64;
-        let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::ONE, Phase::ISOTROPIC).unwrap();
-        let ball = Placed::new(fog, Region::sphere(Vec3::ZERO, 1.0).unwrap());
-        let lamps = [Light::Point(PointLight::from_flux(Vec3::splat(0.3), Spectrum::ONE).unwrap())];
-        let world = World { medium: &ball, scene: &crate::host::Empty, lights: (&lamps).into() };
-        let (mut sum, mut squares, mut halves) = (0.0, 0.0, 0.0);
-        for seed in 0..SEEDS {
-            let mut cells = PhotonGrid::lit(&world, &effort(4_000), &path::Settings::default(), seed);
-            let mut light = |by: f32| {
-                cells.turn(by);
-                let point = Vec3::splat(-0.1);
-                f64::from(cells.scattered(point, Vec3::X, &ball.properties(point)).unwrap().0.radiance[0])
-            };
-            let [all, even, odd, again] = [0.0, 1.0, -2.0, 1.0].map(&mut light);
-            assert!((0.5 * (even + odd) / all - 1.0).abs() < 1e-5 && (again / all - 1.0).abs() < 1e-5);
-            (sum, squares, halves) = (sum + all, squares + all * all, halves + (even - odd).powi(2) / 4.0);
-        }
-        let seeds = SEEDS as f64;
-        let (told, seen) = (halves / seeds, (squares - sum * sum / seeds) / (seeds - 1.0));
-        // Squares of 64 normal numbers: both vary by 18 %.
-        assert!((0.5..2.0).contains(&(told / seen)), "{told:e} {seen:e}");
-        assert!(told.sqrt() > 0.01 * sum / seeds, "{told:e}");
-    }
-
-    /// Where nothing scatters no walk ends, and photons leave nothing; slopes look one cell beyond.
-    #[test]
-    fn cells_far_from_all_fog_are_dark() {
-        let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::ONE, Phase::ISOTROPIC).unwrap();
-        let ball = Placed::new(fog, Region::sphere(Vec3::ZERO, 0.15).unwrap());
-        let sky = [Light::Constant(Spectrum::ONE)];
-        let world = World { medium: &ball, scene: &crate::host::Empty, lights: (&sky).into() };
-        let effort = PhotonEffort { cells: 11, ..effort(100_000) };
-        let cells = PhotonGrid::lit(&world, &effort, &path::Settings::default(), 1);
-        let at = |i: u32| cells.scattered(Vec3::X * (2.0 / 11.0 * i as f32), Vec3::Z, &fog.properties(Vec3::ZERO));
-        assert_eq!([0, 1, 2, 3, 4, 5].map(|i| at(i).is_some()), [true, true, true, false, false, false]);
-        let (light, _) = at(0).unwrap();
-        assert!((light.radiance[0] - 1.0).abs() < 0.1, "{light:?}");
-        // Where nothing scatters at all, a first look is enough.
-        let dark = Homogeneous::new(Spectrum::ONE, Spectrum::ZERO, Phase::ISOTROPIC).unwrap();
-        let clear = World { medium: &dark, scene: &crate::host::Empty, lights: (&sky).into() };
-        assert_eq!(PhotonGrid::lit(&clear, &effort, &path::Settings::default(), 1).paths(), rounds::FIRST);
-    }
-
-    /// A finer level goes on where a coarser one has ended; with another division or other random numbers all begins anew.
-    #[test]
-    fn more_photons_come_to_those_that_there_are() {
-        let fog = Homogeneous::new(Spectrum::ZERO, Spectrum::ONE, Phase::ISOTROPIC).unwrap();
-        let ball = Placed::new(fog, Region::sphere(Vec3::ZERO, 1.0).unwrap());
-        let sky = [Light::Constant(Spectrum::ONE)];
-        let world = World { medium: &ball, scene: &crate::host::Empty, lights: (&sky).into() };
-        let walk = path::Settings::default();
-        let mut cells = PhotonGrid::lit(&world, &effort(2_000), &walk, 1);
-        cells.finish(&effort(2_000), 1);
-        assert_eq!(cells.paths(), 2_000);
-        cells.prepare(&effort(400_000), 1).unwrap();
-        assert_eq!((cells.paths(), cells.is_made()), (2_000, false));
-        cells.light(&world, (&effort(400_000), &walk, 1));
-        assert_eq!(cells.paths(), 400_000);
-        // Those that the first few have not met, too.
-        let at = |i: u32| Vec3::new((i % 4) as f32, (i / 4 % 4) as f32, (i / 16) as f32) * 0.3 - Vec3::splat(0.45);
-        for point in (0..64).map(at) {
-            let (light, _) = cells.scattered(point, Vec3::Z, &ball.properties(point)).unwrap();
-            assert!((light.radiance[0] - 1.0).abs() < 0.1, "{point}: {light:?}");
-        }
-        let counted = f64::from(cells.counted) / 400_000.0;
-        assert!((counted - rounds::COUNTED).abs() < 0.01, "{counted}");
-        let (light, _) = cells.scattered(Vec3::splat(0.1), Vec3::Z, &ball.properties(Vec3::ZERO)).unwrap();
-        assert!((light.radiance[0] - 1.0).abs() < 0.05, "{light:?}");
-        for (other, seed) in [(PhotonEffort { cells: 6, ..effort(800_000) }, 1), (effort(800_000), 2), (effort(10), 1)]
-        {
-            cells.finish(&effort(400_000), 1);
-            cells.prepare(&other, seed).unwrap();
-            assert_eq!(cells.paths(), 0);
-            cells.light(&world, (&effort(1), &walk, 1));
-        }
-    }
 }

@@ -11,8 +11,8 @@ impl<F> Filling<'_, F> {
     pub(super) fn shoot_more(&mut self) {
         let Some((effort, _)) = self.caches.photon_effort() else { return };
         let photons = &mut self.memory.photons;
-        self.photons_before = photons.paths();
         let (more, cells) = (photons.next_round(&effort), photons.len() as u32);
+        self.photons_before = photons.paths();
         self.photons_of_round = more.unwrap_or(0);
         match more {
             Some(more) => self.enter(Round::Shoot, more.div_ceil(PATHS_PER_JOB)),

@@ -52,7 +52,7 @@ impl PhotonGrid<'_> {
         let index = self.cell_of(point)?;
         let cell = self.trusted(index)?;
         let basis = TurningBasis::new(to_eye, self.degree);
-        let volume = self.side * self.side * self.side;
+        let volume = self.side.element_product();
         let straight = Spectrum::splat(self.straight(&properties.phase));
         let moments: [Spectrum; MAX_DEGREE + 1] = core::array::from_fn(|l| properties.phase.moment(l) - straight);
         let of_degree = |l: usize| l * l..(l + 1) * (l + 1);
@@ -73,9 +73,9 @@ impl PhotonGrid<'_> {
                 self.trusted(index).map(light)
             };
             let slope = match (beside(u32::MAX), beside(1)) {
-                (Some(before), Some(after)) => (after - before) * (0.5 / self.side),
-                (Some(before), None) => (here - before) / self.side,
-                (None, Some(after)) => (after - here) / self.side,
+                (Some(before), Some(after)) => (after - before) * (0.5 / self.side[axis]),
+                (Some(before), None) => (here - before) / self.side[axis],
+                (None, Some(after)) => (after - here) / self.side[axis],
                 (None, None) => Spectrum::ZERO,
             };
             gradient += Gradient::outer(slope, Vec3::AXES[axis]);

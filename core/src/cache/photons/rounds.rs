@@ -12,10 +12,19 @@ const KNOWN: f64 = 0.9;
 /// Photons of the first round.
 pub(super) const FIRST: u32 = 4096;
 
+/// Photons before them, that only see how far from the bounds something scatters. Fewer: cells end before walls do; more: time.
+const SCOUTS: u32 = 256;
+
 impl PhotonGrid<'_> {
     /// Photons of the next round, no more than all before it; `None` after the last. First they are counted, so long that they are about [`COUNTED`]
     /// of all, then they bring light: as many as it takes until [`PhotonEffort::enough`] pass nearly every cell that walks may end in.
     pub(in crate::cache) fn next_round(&mut self, effort: &PhotonEffort) -> Option<u32> {
+        if self.scouted.is_some() {
+            if self.paths == 0 {
+                return (effort.paths > 0 && effort.flights > 0).then_some(SCOUTS.min(effort.paths));
+            }
+            self.fit(&effort.bounds);
+        }
         let (paths, counted) = (self.paths, self.counted);
         if paths == 0 {
             let first = f64::from(FIRST).min(COUNTED * f64::from(effort.paths)) as u32;
