@@ -50,7 +50,7 @@ fn cells_between(degree: usize) -> f32 {
 /// Cells across the narrowest side of the bounds, as far as there are enough. Fewer: walls on both sides cut most of them, and walks end nowhere; more: photons.
 const ACROSS: f32 = 8.0;
 
-/// Sides of cells are at least that of a box with this part of it. Smaller: lines of cells without end; larger: narrow places have none that walls do not cut.
+/// Least side of a cell over that in a box which is not narrow. Smaller: lines of cells without end; larger: narrow places have none that walls do not cut.
 const NARROWEST: f32 = 0.125;
 
 /// How far, in sides of cells, from the bounds cells may begin. Farther: where it is dark none know light; less: walls just within the bounds cut the outermost.
@@ -141,6 +141,7 @@ pub struct PhotonCell {
 /// Cells of light: see [`PhotonEffort`].
 #[derive(Debug)]
 pub struct PhotonGrid<'s> {
+    /// The least corner of the first cell, and the sides of each (m).
     first: Vec3,
     side: Vec3,
     counts: [u32; 3],

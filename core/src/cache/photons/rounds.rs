@@ -16,7 +16,7 @@ pub(super) const FIRST: u32 = 4096;
 const SCOUTS: u32 = 256;
 
 impl PhotonGrid<'_> {
-    /// Photons of the next round, no more than all before it; `None` after the last. First they are counted, so long that they are about [`COUNTED`]
+    /// Photons of the next round, no more than all before it; `None` after the last. The first see how far cells reach ([`PhotonGrid::fit`]); the next are counted, so long that they are about [`COUNTED`]
     /// of all, then they bring light: as many as it takes until [`PhotonEffort::enough`] pass nearly every cell that walks may end in.
     pub(in crate::cache) fn next_round(&mut self, effort: &PhotonEffort) -> Option<u32> {
         if self.scouted.is_some() {
