@@ -5,10 +5,11 @@
 use core::fmt;
 use core::sync::atomic::{AtomicBool, Ordering};
 use core::time::Duration;
+use std::sync::{Mutex, PoisonError};
 
 use fogbow::work::Rounds;
 #[cfg(feature = "threads")]
-use rayon::iter::{IndexedParallelIterator, IntoParallelRefMutIterator, ParallelIterator};
+use rayon::iter::{IndexedParallelIterator, IntoParallelIterator, ParallelIterator};
 
 use crate::progress::Control;
 use crate::stats::{Seconds, Stopwatch};
@@ -91,14 +92,14 @@ impl Threads {
         1
     }
 
-    /// Calls `work(index, element)` for every element, on all threads.
-    fn each<T: Send>(&self, elements: &mut [T], work: impl Fn(usize, &mut T) + Sync) {
+    /// Calls `work` for every index below `count`, on all threads. Compiled once, whatever the work is.
+    fn each(&self, count: usize, work: &(dyn Fn(usize) + Sync)) {
         #[cfg(feature = "threads")]
-        if elements.len() > 1 {
-            self.pool.install(|| elements.par_iter_mut().with_max_len(1).enumerate().for_each(|(i, e)| work(i, e)));
+        if count > 1 {
+            self.pool.install(|| (0..count).into_par_iter().with_max_len(1).for_each(work));
             return;
         }
-        elements.iter_mut().enumerate().for_each(|(i, e)| work(i, e));
+        (0..count).for_each(work);
     }
 }
 
@@ -121,7 +122,8 @@ where
 {
     let clock = Stopwatch::start();
     let mut stages: Vec<(&'static str, Seconds)> = Vec::new();
-    let mut outputs: Vec<(bool, R::Output<'static>)> = Vec::new();
+    // Nobody else has the index of a job, so that no lock is ever waited for.
+    let mut outputs: Vec<Mutex<(bool, R::Output<'static>)>> = Vec::new();
     loop {
         let jobs = work.jobs();
         let is_late = || time.is_some_and(|time| clock.elapsed().wall >= time.as_secs_f64());
@@ -143,7 +145,8 @@ where
         let batch = &mut outputs[..count];
         let stop = AtomicBool::new(false);
         let (frozen, cancel) = (&*work, control.cancel);
-        threads.each(batch, |i, (is_done, output)| {
+        threads.each(count, &|i| {
+            let (is_done, output) = &mut *batch[i].lock().unwrap_or_else(PoisonError::into_inner);
             *is_done = !stop.load(Ordering::Relaxed);
             if !*is_done {
                 return;
@@ -154,7 +157,8 @@ where
             }
         });
         // What was not run is asked for again.
-        batch.iter().take_while(|(is_done, _)| *is_done).for_each(|(_, output)| work.accept(output));
+        let results = batch.iter_mut().map(|result| result.get_mut().unwrap_or_else(PoisonError::into_inner));
+        results.take_while(|(is_done, _)| *is_done).for_each(|(_, output)| work.accept(output));
         let took = began.elapsed();
         match stages.iter_mut().find(|(name, _)| *name == stage) {
             Some((_, sum)) => *sum = *sum + took,

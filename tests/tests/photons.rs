@@ -234,6 +234,7 @@ type Window<'a> = &'a dyn Fn(Vec3) -> Option<f32>;
 
 /// Whatever windows ask for, right, too low or too high, or nothing that makes sense, light stays the same; the right ones find what hardly a whole photon does.
 #[test]
+#[ignore = "long: tests/acceptance/long.sh"]
 fn photons_in_parts_bring_the_same_light_also_where_it_is_dark() {
     let (extinction, albedo) = (2.0_f32, 0.8_f32);
     let share = 1.0 - albedo;

@@ -276,6 +276,7 @@ fn a_box_of_points_has_records_everywhere_in_it() {
 }
 
 #[test]
+#[ignore = "long: tests/acceptance/long.sh"]
 fn other_seeds_fill_other_records_of_about_as_much_light() {
     let caches = filled(settled());
     let others = filled(Settings { seed: 2, ..settled() });

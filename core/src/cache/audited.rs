@@ -176,6 +176,7 @@ fn wrong_corner_is_found(map: &BiasMap) {
 }
 
 #[test]
+#[ignore = "long: tests/acceptance/long.sh"]
 fn whatever_the_seed_no_region_of_right_caches_looks_wrong() {
     for seed in 1..4 {
         let change = |settings: Settings| Settings { seed, ..settings };
@@ -331,6 +332,7 @@ fn what_is_broken_in_records_is_repaired() {
 /// At the edge of a cloud in the open light bends within a part of a free path. Fifteen of them, under an even sky: 1.7 ± 0.1 % too dark, and
 /// more in the middle, unless pilots say how far records may reach: 0.6 ± 0.1 %. Means of four seeds, as one has 0.25 % by chance.
 #[test]
+#[ignore = "long: tests/acceptance/long.sh"]
 fn pilots_know_how_light_falls_off_in_a_cloud_in_the_open() {
     const SEEDS: u64 = 4;
     let sky = [Light::Constant(Spectrum::ONE)];

@@ -497,6 +497,7 @@ mod measured {
     }
 
     #[test]
+    #[ignore = "long: tests/acceptance/long.sh"]
     fn what_glances_tell_is_the_noise_between_seeds() {
         let [told, seen] = told_and_seen(0.5);
         assert!((0.6..1.7).contains(&(told / seen)), "{told} {seen}");

@@ -145,6 +145,7 @@ mod tests {
     use crate::world::Outline;
 
     #[test]
+    #[ignore = "long: tests/acceptance/long.sh"]
     fn as_many_photons_are_shot_as_their_noise_asks_for() {
         let fog = Homogeneous::new(Spectrum::splat(0.1), Spectrum::splat(3.9), Phase::ISOTROPIC).unwrap();
         let ball = Placed::new(fog, Region::sphere(Vec3::ZERO, 1.0).unwrap());
