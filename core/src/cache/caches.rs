@@ -11,6 +11,7 @@ use super::record::Record;
 use super::room::{chunks_of, stride_of};
 use super::seen::{CachedRadiance, Caches, Reader, radiance, radiance_beyond};
 use super::settings::Settings;
+use super::shares::Shares;
 use super::slot::{ByKind, Slot};
 use super::{Estimator, SurfaceCache, VolumeCache};
 use crate::host::{Medium, Rng, Scene};
@@ -90,8 +91,8 @@ pub struct RadianceCaches<'s> {
     pub(super) dropped: u32,
     /// How often when photons were last to meet other chances.
     dropped_with_photons: u32,
-    /// What part of a picture's light each kind brings, in the order of [`Kind::FINAL`], as far as that is known.
-    pub(super) shares: [f64; Kind::FINAL.len()],
+    /// What part of the light of the last view each kind brings, as far as that is known.
+    pub(super) shares: Shares,
     /// The relative noise that coarse irradiance leaves in a picture, 0 before it is told.
     pub(super) ground: f32,
     /// The light in cells that the last complete shooting has left: of the world, not of a view.
@@ -115,7 +116,7 @@ impl RadianceCaches<'static> {
             settled: ByKind([0; Kind::COUNT]),
             dropped: 0,
             dropped_with_photons: 0,
-            shares: [1.0; Kind::FINAL.len()],
+            shares: Shares::UNKNOWN,
             ground: 0.0,
             photons: PhotonGrid::none(),
         }
@@ -170,7 +171,7 @@ impl<'s> RadianceCaches<'s> {
             settled: ByKind([0; Kind::COUNT]),
             dropped: 0,
             dropped_with_photons: 0,
-            shares: [1.0; Kind::FINAL.len()],
+            shares: Shares::UNKNOWN,
             ground: 0.0,
             photons: PhotonGrid::none(),
         }

@@ -184,7 +184,8 @@ pub(super) fn region_of(at: [f32; 2]) -> usize {
 pub(super) fn regions_in([x0, y0, x1, y1]: [f32; 4]) -> impl Iterator<Item = usize> {
     let [first, last] = [[x0, y0], [x1, y1]].map(region_of);
     let columns = first % SIDE..=last % SIDE;
-    (first / SIDE..=last / SIDE).flat_map(move |y| columns.clone().map(move |x| y * SIDE + x))
+    // Rows follow each other.
+    (first..=last).filter(move |region| columns.contains(&(region % SIDE)))
 }
 
 /// What rays have told, by region of the picture.

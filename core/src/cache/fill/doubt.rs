@@ -101,7 +101,7 @@ impl<F> Filling<'_, F> {
     pub(super) fn variance_of_places(&self, dark: f64) -> f64 {
         let region =
             |ray: usize| self.first_of((ray * READINGS) as u32).map_or(0, |first| region_of(Asked::at(first.ray)));
-        noise::of_halves(self.memory.glances.as_slice(), &region, self.caches.shares, dark)
+        noise::of_halves(self.memory.glances.as_slice(), &region, self.caches.shares.picture, dark)
     }
 
     /// Goes on with the other half, or to more photons where both are too noisy.

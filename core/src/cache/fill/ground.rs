@@ -81,7 +81,7 @@ mod tests {
             assert!(work::step(&mut filling, &world, &mut output));
         }
         // Of light in the medium alone.
-        filling.caches.shares = [0.0, 1.0, 0.0, 0.0];
+        filling.caches.shares.picture = [0.0, 1.0, 0.0, 0.0];
         let estimator = filling.estimator(&world);
         let read = core::array::from_fn(|i| {
             let ray = ray([i % 8, i / 8].map(|i| (i as f32 + 0.5) / 8.0));

@@ -164,6 +164,7 @@ impl<F> Filling<'_, F> {
         let film = self.film;
         let FillingMemory { wanted, chosen, estimates, higher, guides, .. } = &mut self.memory;
         let (wanted, chosen) = (wanted.as_slice(), chosen.as_slice());
+        let (shares, coarser) = (&self.caches.shares, self.caches.settings.coarser[step.kind as usize]);
         let slot = &mut self.caches.slots[step.kind];
         let (stride, bright) = (slot.stride(), usual_value(slot.records()));
         let mut added = 0;
@@ -172,17 +173,19 @@ impl<F> Filling<'_, F> {
             self.all_computed[step.kind] += 1;
             let Estimate { place, sums, limits, .. } = estimate;
             let limits = where_bright(*limits, effort.limits.min, sums.value.mean() / bright);
-            let Some(record) = Record::new(place.point, sums, effort.tolerance, limits) else { continue };
+            let Some(mut record) = Record::new(place.point, sums, effort.tolerance, limits) else { continue };
+            let asked = chosen.get(estimate.number as usize).and_then(|(from, _)| wanted.get(*from as usize));
+            let on_film = |radius| asked.map_or(estimate.learnt.film, |from| from.on_film(radius, film));
+            let finer = shares.finer(step.kind, coarser, on_film(record.radius));
+            record.radius = (record.radius * finer).max(effort.limits.min);
             if slot.covers(place, &reading) {
                 continue;
             }
             let attached = attached(step.kind, estimate, higher.as_slice(), i, stride);
             match slot.insert(record, attached) {
                 Inserted::Added => {
-                    let asked = chosen.get(estimate.number as usize).and_then(|(from, _)| wanted.get(*from as usize));
-                    let film = asked.map_or(estimate.learnt.film, |from| from.on_film(record.radius, film));
                     let mut guide = estimate.learnt;
-                    guide.film = film;
+                    guide.film = on_film(record.radius);
                     self.is_cut |= guides[step.kind].push(guide).is_err();
                     added += 1;
                 }

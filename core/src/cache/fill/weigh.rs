@@ -7,7 +7,7 @@ use crate::cache::kind::Kind;
 use crate::cache::memory::FilledRecords;
 use crate::cache::noise::Glance;
 use crate::cache::seen::radiance;
-use crate::cache::shares::{self, SCATTERINGS};
+use crate::cache::shares::{RAYS, SCATTERINGS, Shares};
 use crate::host::{Medium, Scene};
 use crate::math::Ray;
 use crate::path;
@@ -24,7 +24,7 @@ impl<F> Filling<'_, F> {
             return self.begin(0);
         }
         self.memory.glances.clear();
-        let rays = shares::RAYS.min(self.settings().rays);
+        let rays = RAYS.min(self.settings().rays);
         self.enter(Round::Weigh, rays.div_ceil(RAYS_PER_JOB));
     }
 
@@ -53,8 +53,8 @@ impl<F> Filling<'_, F> {
     /// Takes what eye rays have found: how coarse each kind may be.
     pub(super) fn take_shares(&mut self) {
         let glances = self.memory.glances.as_slice().iter().zip(0..);
-        self.caches.shares = shares::shares(glances.map(|(glance, number)| (*glance, Asked::at(number))));
-        let coarser = shares::coarser(self.caches.shares);
+        self.caches.shares = Shares::new(glances.map(|(glance, number)| (*glance, Asked::at(number))));
+        let coarser = self.caches.shares.coarser();
         self.memory.glances.clear();
         let all = &mut self.caches.settings.coarser;
         for (kind, (factor, new)) in Kind::ALL.into_iter().zip(all.iter_mut().zip(coarser)) {
