@@ -31,7 +31,7 @@ mkdir -p "$out"
 module plain "-Cllvm-args=-inline-threshold=5 -Cllvm-args=-inlinehint-threshold=40" &
 plain=$!
 # Instructions for vectors make shorter code: there is room to inline more.
-module simd "-Cllvm-args=-inline-threshold=10 -Cllvm-args=-inlinehint-threshold=60 -Ctarget-feature=+simd128"
+module simd "-Cllvm-args=-inline-threshold=10 -Cllvm-args=-inlinehint-threshold=55 -Ctarget-feature=+simd128"
 wait $plain
 node scripts/pack.mjs "$out/package" "$out/plain.wasm" "$out/simd.wasm"
 node scripts/site.mjs "$out/page" "$out/package"

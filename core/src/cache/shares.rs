@@ -4,6 +4,7 @@
 //! sample all light without any records, walks ending in the cells that photons have lit, and by what they find each kind is made for an error of its own. Where it brings more than
 //! usual in a region of the picture its records reach less far there.
 
+use super::asked::Asked;
 use super::kind::Kind;
 use super::noise::{Glance, REGIONS, region_of, regions_in};
 use super::presets::{MOST_COARSER, USUAL_SHARES};
@@ -39,12 +40,12 @@ impl Shares {
     /// As if each kind brought everything: none may be coarse.
     pub(super) const UNKNOWN: Self = Self { regions: [[1.0; KINDS]; REGIONS], picture: [1.0; KINDS] };
 
-    /// By what eye rays have found; each glance comes with where on the film it was.
-    pub(super) fn new(glances: impl Iterator<Item = (Glance, [f32; 2])>) -> Self {
+    /// By what the first eye rays of a view have found.
+    pub(super) fn new(glances: &[Glance]) -> Self {
         let mut regions = [[0.0; KINDS + 2]; REGIONS];
-        for (glance, at) in glances {
+        for (glance, number) in glances.iter().zip(0..) {
             let (kinds, all) = glance.light();
-            let sums = regions[region_of(at)].iter_mut();
+            let sums = regions[region_of(Asked::at(number))].iter_mut();
             sums.zip(kinds.into_iter().chain([all, 1.0])).for_each(|(sum, light)| *sum += f64::from(light));
         }
         let [all, rays] = [KINDS, KINDS + 1].map(|i| regions.iter().map(|region| region[i]).sum::<f64>());
@@ -95,16 +96,15 @@ fn times(factor: f64) -> f32 {
 mod tests {
     use super::*;
     use crate::cache::CachedRadiance;
-    use crate::cache::asked::Asked;
     use crate::spectrum::Spectrum;
 
     fn shares_of(light: impl Fn([f32; 2]) -> [f32; 3]) -> Shares {
-        Shares::new((0..RAYS).map(|number| {
-            let at = Asked::at(number);
-            let [medium_single, medium_multiple, emitted] = light(at).map(Spectrum::splat);
+        let glances: [_; RAYS as usize] = core::array::from_fn(|number| {
+            let [medium_single, medium_multiple, emitted] = light(Asked::at(number as u32)).map(Spectrum::splat);
             let seen = CachedRadiance { medium_single, medium_multiple, emitted, ..CachedRadiance::default() };
-            (Glance::scattered(&seen), at)
-        }))
+            Glance::scattered(&seen)
+        });
+        Shares::new(&glances)
     }
 
     #[test]

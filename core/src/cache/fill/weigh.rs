@@ -52,8 +52,7 @@ impl<F> Filling<'_, F> {
 
     /// Takes what eye rays have found: how coarse each kind may be.
     pub(super) fn take_shares(&mut self) {
-        let glances = self.memory.glances.as_slice().iter().zip(0..);
-        self.caches.shares = Shares::new(glances.map(|(glance, number)| (*glance, Asked::at(number))));
+        self.caches.shares = Shares::new(self.memory.glances.as_slice());
         let coarser = self.caches.shares.coarser();
         self.memory.glances.clear();
         let all = &mut self.caches.settings.coarser;
