@@ -89,7 +89,7 @@ pub struct Settings {
     /// The relative error that pictures may have: pilots shrink radii until extrapolation leaves less than its part of it; 0 for no pilots.
     pub error: f32,
     /// How many times that error each kind may have of its own light, at least 1, in the order of [`Kind::ALL`]: a fill for a view finds what part of
-    /// the picture a kind brings, and makes it for an error of its own.
+    /// the picture a kind brings, and makes it for an error of its own. Where it brings more in a region of the picture, its records reach less far.
     pub coarser: [f32; Kind::COUNT],
     /// Light of the lights, scattered once; `None` to leave it to connections.
     pub single: Option<Effort>,

@@ -3,6 +3,12 @@
 //! Where a kind brings a tenth of the light, an error of a fifth of it is one of a fiftieth of the picture. So before records are made, eye rays
 //! sample all light without any records, walks ending in the cells that photons have lit, and by what they find each kind is made for an error of its own. Where it brings more than
 //! usual in a region of the picture its records reach less far there.
+//!
+//! ```text
+//! s = L_k/√(L² + (0.1 L̄)²)                       share of a kind in a region: light of the kind, and all that is scattered, along its rays; L̄ is that of the picture
+//! c = usual/√⟨s²⟩ in [1, 8]                       how many times the error asked for the kind may have of its own light (decision 71)
+//! R′/R = √(min(c, c_r)/c),  c_r = usual/(2 max s) in [1, 8]      radius of a record that covers such regions (decision 122)
+//! ```
 
 use super::asked::Asked;
 use super::kind::Kind;
@@ -77,7 +83,7 @@ impl Shares {
         all
     }
 
-    /// The tolerance of a record over that of its kind, which is made `coarser` times as coarsely: what reaches into regions in which the kind brings more than
+    /// The radius of a record over what its kind allows, which is made `coarser` times as coarsely: what reaches into regions in which the kind brings more than
     /// usual is as fine as the one asks in which it brings most. `film` is what the record covers of the film, from two coordinates to two.
     pub(super) fn finer(&self, kind: Kind, coarser: f32, film: [f32; 4]) -> f32 {
         let Some(usual) = USUAL_SHARES.get(kind as usize) else { return 1.0 };
